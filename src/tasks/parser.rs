@@ -10,52 +10,34 @@
 //! Each port has a [`Session`] of its own, so that no port waits for the other's line: no line is begun before the first part
 //! of its response has room in the transmit ring, and a response that lacks room stays half written until there is some.
 
+mod answer;
+mod block;
+
 use core::future::poll_fn;
 use core::task::Poll;
 
 use embassy_futures::yield_now;
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_sync::mutex::MutexGuard;
-use heapless::Vec;
+
+pub use block::end_program;
+pub(super) use block::{is_free, run_block};
 
 use super::Never;
-use super::alarm;
-#[cfg(feature = "dialect-reprap")]
-use super::heat;
-use super::hold;
 use super::lines::{Class, LineId};
 use super::links::Links;
 use super::planner;
 use super::ports::{Chosen, Port, REPORT};
-use super::reporter::{tell_at_once, tell_startup};
+use super::reporter::tell_at_once;
 use super::row::{self, Row};
 use super::tx::Tx;
-use super::view::View;
-use crate::gcode::command::Stop;
-use crate::hal::eeprom::Eeprom;
-use crate::hal::event::{
-    Event, is_unheard, is_wanted, set_asked, wake_after, wake_after_transmitted,
-};
-use crate::hal::flags;
+use crate::hal::event::{Event, is_wanted, set_asked, wake_after, wake_after_transmitted};
 use crate::hal::serial::{PORTS, USB};
-use crate::hal::system;
-use crate::hal::time::millis;
-use crate::hal::uart;
-use crate::jobs::Job;
-use crate::machine::alarm::is_program_end;
-use crate::machine::{self, Alarm, Cycle};
-use crate::protocol::{Answers, Next, Notice, Out, Request, Span, asks_alarm, jog};
+use crate::machine::{self, Cycle};
+use crate::protocol::{Answers, Notice, Request, asks_alarm};
 use crate::status::Status;
-
-/// Bytes of an echo that are put at once.
-const ECHO: usize = 62;
-/// Most steps of a response before others have their turn: most answers take six. They have it as well behind each step while the
-/// ring of the second port is filling: to read a row of the tables may take 3 ms, and twice that while exec takes most of the CPU.
-const STEPS: u8 = 8;
-/// Most steps in a turn in which a millisecond has ended.
-const STEPS_LATE: u8 = 5;
-/// No step is begun when a turn has taken so long, ms.
-const TURN_MS: u32 = 4;
+use answer::{Answer, finish, go_on, has_room, leave};
+use block::{has_room_for_startup, is_working, job_line};
 
 /// Turns that an answer leaves in a row to those on other ports that have had none.
 const PATIENCE: u8 = 8;
@@ -77,31 +59,6 @@ enum Session {
     /// The line has been answered; it changes the rate, or resets the machine, when the response has left: since when
     /// there is nothing more of that in the ring, ms.
     Leave(Line, Option<u16>),
-}
-
-/// A response under way.
-struct Answer {
-    request: Request,
-    id: LineId,
-    /// How much of the line has been sent back.
-    echoed: u8,
-    /// The answer has had a turn.
-    has_stepped: bool,
-    /// The line is to be sent back.
-    echoes: bool,
-    /// Tables have to be waited for.
-    waits: bool,
-    /// From the first byte on: nobody else talks on this port.
-    tx: Option<Line>,
-}
-
-/// How far it has come.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Progress {
-    /// The answer is at its end.
-    Done,
-    /// The answer goes on later.
-    Waits,
 }
 
 /// What has been done at once.
@@ -508,209 +465,6 @@ fn tell(links: &Links, port: &Port) -> bool {
     told
 }
 
-/// Goes on with what is under way on a port, step by step while another is `awaited`. Whether it has come to its end.
-#[inline(never)]
-fn go_on(links: &'static Links, port: &'static Port, session: &mut Session, awaited: bool) -> bool {
-    match session {
-        Session::Idle => return false,
-        Session::Leave(tx, since) => {
-            if !has_left(links, tx, since) {
-                return false;
-            }
-        }
-        Session::Answer(answer) => match answer.step(links, port, awaited) {
-            Progress::Waits => return false,
-            Progress::Done => {
-                finish(links, port, answer.id);
-                let changes_rate = links.rate.get().is_some() && port.number == USB;
-                if links.restart.get().is_some() || changes_rate {
-                    leave(answer.tx.take(), session);
-                    return true;
-                }
-            }
-        },
-    }
-    *session = Session::Idle;
-    true
-}
-
-/// What is in the ring has to leave before anything else is said.
-#[inline(never)]
-#[small]
-fn leave(tx: Option<Line>, session: &mut Session) {
-    if let Some(tx) = tx {
-        *session = Session::Leave(tx, None);
-    }
-}
-
-/// Does what a response has been waited for if that has left: 1 to 4 ms after its last byte. Whether it has.
-#[inline(never)]
-#[small]
-fn has_left(links: &Links, tx: &mut Tx, since: &mut Option<u16>) -> bool {
-    if !tx.is_empty() {
-        *since = None;
-        return false;
-    }
-    let now = millis() as u16;
-    if now.wrapping_sub(*since.get_or_insert(now)) < tx.last_ms() {
-        return false;
-    }
-    if let Some(boot) = links.restart.take() {
-        if boot {
-            system::boot()
-        } else {
-            system::reset()
-        };
-    }
-    if let Some(rate) = links.rate.take() {
-        tx.set_rate(rate);
-    }
-    true
-}
-
-impl Answer {
-    /// Whether there is room for the next part of it, of a list only little ahead of what has left: a `?` is answered behind that. `None` if
-    /// it does not wait for room.
-    #[inline(never)]
-    #[small]
-    fn may_go_on(&self, port: &Port) -> Option<bool> {
-        match &self.tx {
-            _ if self.waits => None,
-            Some(tx) if self.request.is_list() => Some(tx.is_low()),
-            Some(tx) => Some(tx.has_room()),
-            None => has_room(port),
-        }
-    }
-
-    /// Goes on as far as there is room.
-    #[inline(never)]
-    fn step(&mut self, links: &'static Links, port: &'static Port, awaited: bool) -> Progress {
-        // A `?` is answered first.
-        self.has_stepped = self.id != LineId::NONE;
-        if self.waits && links.storage.is_awaited() && !port.asks_report() {
-            return Progress::Waits;
-        }
-        let begun = self.tx.is_some();
-        let Some(mut tx) = self.tx.take().or_else(|| port.tx.try_lock().ok()) else {
-            return Progress::Waits;
-        };
-        self.waits = false;
-        let (progress, talks) = self.steps(links, port, &mut tx, begun, awaited);
-        if talks {
-            self.tx = Some(tx);
-        }
-        progress
-    }
-
-    /// Carries the response on while there is room, a bounded number of steps. Says how far it has come, and whether the
-    /// transmitter is still needed.
-    #[inline(never)]
-    #[small]
-    fn steps(
-        &mut self,
-        links: &Links,
-        port: &Port,
-        tx: &mut Tx,
-        begun: bool,
-        awaited: bool,
-    ) -> (Progress, bool) {
-        if port.drops_unanswered() && !begun && self.id != LineId::NONE {
-            // Nobody waits for it.
-            return (Progress::Done, false);
-        }
-        let (mut begun, since) = (begun, millis());
-        // A `?` is answered in one turn, if that is short enough.
-        let asks = self.id == LineId::NONE;
-        for done in 0..if asks { 2 * STEPS } else { STEPS } {
-            // A list takes 50 ms and more.
-            if port.asks_report() && self.request.interject() {
-                port.take_asked(REPORT);
-            }
-            if !tx.has_room()
-                || (begun && self.request.is_list() && !tx.is_low())
-                || (done > 0 && (awaited || gives_way(if asks { 1 } else { done }, since)))
-            {
-                break;
-            }
-            if self.echoes {
-                self.echoes = echo(links, port, self.id, &mut self.echoed, tx);
-                begun = true;
-                continue;
-            }
-            match step(links, port, self.id, &mut self.request, tx) {
-                Next::More => begun = true,
-                // Of a response that has begun the rest is due.
-                Next::Wait => {
-                    self.waits = true;
-                    return (Progress::Waits, self.request.has_begun());
-                }
-                Next::Gcode { start, end } => {
-                    if !ran(links, port, self.id, Span { start, end }, &mut self.request) {
-                        // Nothing of the response has been put yet.
-                        self.waits = true;
-                        return (Progress::Waits, false);
-                    }
-                }
-                Next::Done(_) => return (Progress::Done, true),
-            }
-        }
-        (Progress::Waits, begun)
-    }
-}
-
-/// Whether others have their turn before a response goes on that has come so many steps on in this turn, which began then.
-#[inline(never)]
-#[small]
-fn gives_way(done: u8, since: u32) -> bool {
-    let late = || done >= STEPS_LATE && flags::has(Event::Tick);
-    uart::presses() || is_unheard() || late() || millis().wrapping_sub(since) >= TURN_MS
-}
-
-/// Whether a block can be carried out now, or refused: neither has the planner to be waited for, nor the
-/// tables, and nothing is being dropped.
-pub(super) fn is_free(links: &Links) -> bool {
-    let waits = links.commands_taken.get() || links.storage.is_awaited();
-    !waits && !machine::is_flushing()
-}
-
-/// Whether what becomes of the job's next line can be told, if it is told.
-#[inline(never)]
-#[small]
-fn has_room_for_startup(links: &Links) -> bool {
-    let tells = links.job.get().startup().is_some();
-    !tells || has_room(links.told()) == Some(true)
-}
-
-/// Carries out the next line of a built-in job. A line that is refused is told by an exception report. The end is told by
-/// the reporter, when everything is done.
-#[inline(never)]
-#[small]
-fn job_line(links: &Links) {
-    let mut job = links.job.get();
-    let mut line = Vec::new();
-    let startup = job.startup();
-    if !job.next_line(&Eeprom::take(), &mut line) {
-        job.end();
-    } else {
-        match interpret(links, &line, false).0 {
-            Status::Again => return,
-            status if startup.is_some() => {
-                if !line.is_empty() {
-                    tell_startup(links, startup.unwrap_or(0), status);
-                }
-            }
-            Status::Ok if links.commands.borrow().stop == Stop::End => job.end(),
-            Status::Ok | Status::Noop => {}
-            status => {
-                job = Job::default();
-                links.except(status);
-            }
-        }
-    }
-    links.job.set(job);
-    links.reporter_wake.signal();
-}
-
 /// How it goes on with a line.
 enum Begun {
     /// The line is being answered.
@@ -810,211 +564,4 @@ fn begin_report(port: &Port, session: &mut Session) -> bool {
         tx: None,
     });
     true
-}
-
-/// Whether there is room for the first part of an answer; `None` while somebody else talks on the port, whose end wakes the parser.
-#[inline(never)]
-#[small]
-fn has_room(port: &Port) -> Option<bool> {
-    port.tx.try_lock().ok().map(|tx| tx.has_room())
-}
-
-/// Sends a part of the line back, from `at` on. Whether there is more. It is done by the line, not by the byte, so
-/// that it never stands in the midst of a response or a report, and never loses anything.
-#[inline(never)]
-#[small]
-fn echo(links: &Links, port: &Port, id: LineId, at: &mut u8, tx: &mut Tx) -> bool {
-    let lines = port.lines.borrow();
-    let rest = lines.text(id).get(usize::from(*at)..).unwrap_or(&[]);
-    let part = rest.get(..ECHO).unwrap_or(rest);
-    tx.put_all(part.iter().copied());
-    *at += part.len() as u8;
-    let more = part.len() == ECHO;
-    if !more {
-        port.speech.get().put_line_end(&links.settings.borrow(), tx);
-    }
-    tx.flush();
-    more
-}
-
-/// Carries out the block of a request, if that can be done now; or drops it in a queue flush.
-#[inline(never)]
-fn ran(links: &Links, port: &Port, id: LineId, block: Span, request: &mut Request) -> bool {
-    if machine::is_flushing() {
-        request.ran(hold::dropped(), false);
-        return true;
-    }
-    let lines = port.lines.borrow();
-    if let Class::Fault(status) = lines.class(id) {
-        // It has been dropped since it was begun.
-        request.ran(status, false);
-        return true;
-    }
-    if links.may_feed(port) && !is_free(links) {
-        return false;
-    }
-    let (status, commented) = run_block(links, port, block.of(lines.text(id)), false);
-    if status == Status::Again {
-        return false;
-    }
-    request.ran(status, commented);
-    true
-}
-
-/// The line's slot is free again.
-#[inline(never)]
-fn finish(links: &Links, port: &Port, id: LineId) {
-    port.lines.borrow_mut().remove(id);
-    links.pool_space.signal();
-    links.reporter_wake.signal();
-}
-
-#[inline(never)]
-#[small]
-fn step(links: &Links, port: &Port, id: LineId, request: &mut Request, tx: &mut Tx) -> Next {
-    let lines = port.lines.borrow();
-    let next = request.step(lines.text(id), &mut View::of(links, port), tx);
-    tx.flush();
-    next
-}
-
-/// Interprets a block of a port's, if that feeds the machine.
-#[inline(never)]
-pub(super) fn run_block(
-    links: &Links,
-    port: &Port,
-    block: &[u8],
-    declined: bool,
-) -> (Status, bool) {
-    match links.may_feed(port) {
-        #[cfg(feature = "dialect-reprap")]
-        true if port.is_plain() => interpret_rewritten(links, port, block),
-        true => interpret(links, block, declined),
-        false => (Status::Muted, true),
-    }
-}
-
-/// Interprets a block of a printing host.
-#[cfg(feature = "dialect-reprap")]
-#[inline(never)]
-#[small]
-fn interpret_rewritten(links: &Links, port: &Port, block: &[u8]) -> (Status, bool) {
-    let mut text = crate::protocol::Rewritten::new();
-    let mut model = links.model.borrow_mut();
-    model.begin_printing();
-    heat::has_extruder(&mut links.settings.borrow_mut());
-    if model.is_far() && !machine::is_alarmed() && !machine::is_checking() {
-        drop(model);
-        return (move_back(links), true);
-    }
-    drop(model);
-    let done = match port.speech.get().rewrite(block, &mut text) {
-        Ok(block) => interpret(links, block, false),
-        Err(status) => (status, true),
-    };
-    if done.0 != Status::Again {
-        links.model.borrow_mut().leave_out(false);
-    }
-    done
-}
-
-/// Of a printer the extruder goes on and on: before it gets too far from the origin the place where it is gets a nearer one's name. [`Status::Again`]: the line is
-/// carried out then.
-#[cfg(feature = "dialect-reprap")]
-#[inline(never)]
-#[small]
-fn move_back(links: &Links) -> Status {
-    let mut commands = links.commands.borrow_mut();
-    links.model.borrow_mut().move_back(&mut commands);
-    links.commands_taken.set(true);
-    links.planner_wake.signal();
-    Status::Again
-}
-
-/// Ends the program, as M2 does, for one that has been killed, or reset. The planner is free.
-pub fn end_program(links: &Links, resets: bool) {
-    // It is never refused, not in an alarm either, and changes no table.
-    let _ = carry_out(links, b"M2", false);
-    if resets {
-        links.model.borrow_mut().reset();
-    }
-}
-
-/// Refuses a block in an alarm, unless it ends that, and else carries it out.
-fn interpret(links: &Links, block: &[u8], declined: bool) -> (Status, bool) {
-    let alarm = machine::alarm();
-    if alarm != Alarm::None {
-        if !(alarm.ends_with_program() && is_program_end(block)) {
-            return (alarm.status(), true);
-        }
-        // The queue has been dropped, so that nothing is waited for.
-        let _ = alarm::clear(links, &links.settings.borrow());
-    }
-    let done = carry_out(links, block, declined);
-    if machine::is_checking() && links.commands.borrow().stop == Stop::End {
-        links.except(Status::ProgramChecked);
-    }
-    done
-}
-
-/// Whether moves are under way or queued.
-#[cold]
-#[inline(never)]
-#[small]
-fn is_working(links: &Links) -> bool {
-    View::of(links, links.feeder()).has_work()
-}
-
-/// A jog of G-code begins, or G-code comes behind one.
-#[cold]
-#[inline(never)]
-fn enter(jogs: bool) {
-    machine::carry_out(if jogs { machine::Event::Jog } else { machine::Event::Done });
-}
-
-/// Interprets a block and hands its commands to the planner, but in check mode. Returns also whether it may have a
-/// comment. [`Status::Again`] while a jog is under way, unless it is another one.
-#[inline(never)]
-fn carry_out(links: &Links, block: &[u8], declined: bool) -> (Status, bool) {
-    let words = jog(block);
-    let jogs = machine::cycle() == Cycle::Jog;
-    if words.is_some() && (machine::is_held() || (!jogs && is_working(links))) {
-        // It waits for nothing but other jogs.
-        return (Status::NotAccepted, true);
-    }
-    if jogs && words.is_none() && !block.is_empty() && is_working(links) {
-        // The end of a jog drops what is queued: nothing that has been answered is to be behind it.
-        return (Status::Again, true);
-    }
-    let mut commands = links.commands.borrow_mut();
-    let settings = links.settings.borrow();
-    let mut model = links.model.borrow_mut();
-    let done = match (words, declined) {
-        (Some(words), _) => model.jog(words, &*settings, &mut commands),
-        // No need to look twice.
-        (None, true) => model.slow_path(block, &*settings, &mut commands),
-        _ => model.interpret(block, &*settings, &mut commands),
-    };
-    match done {
-        Ok(info) if info.deleted => (Status::Noop, true),
-        Ok(info) => {
-            if !commands.is_empty() && !machine::is_checking() {
-                if words.is_some() != jogs {
-                    enter(words.is_some());
-                }
-                links.commands_taken.set(true);
-                links.planner_wake.signal();
-            }
-            if model.take_lack() {
-                links.except(Status::NoToolLength);
-            }
-            (Status::Ok, info.commented)
-        }
-        Err(status) => {
-            if status.names_axis() {
-                links.except(status);
-            }
-            (status, true)
-        }
-    }
 }

@@ -157,10 +157,10 @@ const COLD: &[&str] = &[
     "kerf::motion::prep::Prep>::lengthen",
     "kerf::motion::steps::Motor>::",
     "kerf::store::log::Log>::append::",
-    "kerf::tasks::parser::echo",
-    "kerf::tasks::parser::has_left",
-    "kerf::tasks::parser::job_line",
-    "kerf::tasks::parser::ran",
+    "kerf::tasks::parser::answer::echo",
+    "kerf::tasks::parser::answer::has_left",
+    "kerf::tasks::parser::block::job_line",
+    "kerf::tasks::parser::answer::ran",
 ];
 
 /// How hot a function of this name is.

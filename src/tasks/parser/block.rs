@@ -1,0 +1,200 @@
+//! Blocks of G-code, from ports and built-in jobs: interpreted, and handed to the planner.
+
+use heapless::Vec;
+
+use super::answer::has_room;
+use crate::gcode::command::Stop;
+use crate::hal::eeprom::Eeprom;
+use crate::jobs::Job;
+use crate::machine::alarm::is_program_end;
+use crate::machine::{self, Alarm, Cycle};
+use crate::protocol::jog;
+use crate::status::Status;
+use crate::tasks::alarm;
+#[cfg(feature = "dialect-reprap")]
+use crate::tasks::heat;
+use crate::tasks::links::Links;
+use crate::tasks::ports::Port;
+use crate::tasks::reporter::tell_startup;
+use crate::tasks::view::View;
+
+/// Whether a block can be carried out now, or refused: neither has the planner to be waited for, nor the
+/// tables, and nothing is being dropped.
+pub fn is_free(links: &Links) -> bool {
+    let waits = links.commands_taken.get() || links.storage.is_awaited();
+    !waits && !machine::is_flushing()
+}
+
+/// Whether what becomes of the job's next line can be told, if it is told.
+#[inline(never)]
+#[small]
+pub(super) fn has_room_for_startup(links: &Links) -> bool {
+    let tells = links.job.get().startup().is_some();
+    !tells || has_room(links.told()) == Some(true)
+}
+
+/// Carries out the next line of a built-in job. A line that is refused is told by an exception report. The end is told by
+/// the reporter, when everything is done.
+#[inline(never)]
+#[small]
+pub(super) fn job_line(links: &Links) {
+    let mut job = links.job.get();
+    let mut line = Vec::new();
+    let startup = job.startup();
+    if !job.next_line(&Eeprom::take(), &mut line) {
+        job.end();
+    } else {
+        match interpret(links, &line, false).0 {
+            Status::Again => return,
+            status if startup.is_some() => {
+                if !line.is_empty() {
+                    tell_startup(links, startup.unwrap_or(0), status);
+                }
+            }
+            Status::Ok if links.commands.borrow().stop == Stop::End => job.end(),
+            Status::Ok | Status::Noop => {}
+            status => {
+                job = Job::default();
+                links.except(status);
+            }
+        }
+    }
+    links.job.set(job);
+    links.reporter_wake.signal();
+}
+
+/// Interprets a block of a port's, if that feeds the machine.
+#[inline(never)]
+pub fn run_block(links: &Links, port: &Port, block: &[u8], declined: bool) -> (Status, bool) {
+    match links.may_feed(port) {
+        #[cfg(feature = "dialect-reprap")]
+        true if port.is_plain() => interpret_rewritten(links, port, block),
+        true => interpret(links, block, declined),
+        false => (Status::Muted, true),
+    }
+}
+
+/// Interprets a block of a printing host.
+#[cfg(feature = "dialect-reprap")]
+#[inline(never)]
+#[small]
+fn interpret_rewritten(links: &Links, port: &Port, block: &[u8]) -> (Status, bool) {
+    let mut text = crate::protocol::Rewritten::new();
+    let mut model = links.model.borrow_mut();
+    model.begin_printing();
+    heat::has_extruder(&mut links.settings.borrow_mut());
+    if model.is_far() && !machine::is_alarmed() && !machine::is_checking() {
+        drop(model);
+        return (move_back(links), true);
+    }
+    drop(model);
+    let done = match port.speech.get().rewrite(block, &mut text) {
+        Ok(block) => interpret(links, block, false),
+        Err(status) => (status, true),
+    };
+    if done.0 != Status::Again {
+        links.model.borrow_mut().leave_out(false);
+    }
+    done
+}
+
+/// Of a printer the extruder goes on and on: before it gets too far from the origin the place where it is gets a nearer one's name. [`Status::Again`]: the line is
+/// carried out then.
+#[cfg(feature = "dialect-reprap")]
+#[inline(never)]
+#[small]
+fn move_back(links: &Links) -> Status {
+    let mut commands = links.commands.borrow_mut();
+    links.model.borrow_mut().move_back(&mut commands);
+    links.commands_taken.set(true);
+    links.planner_wake.signal();
+    Status::Again
+}
+
+/// Ends the program, as M2 does, for one that has been killed, or reset. The planner is free.
+pub fn end_program(links: &Links, resets: bool) {
+    // It is never refused, not in an alarm either, and changes no table.
+    let _ = carry_out(links, b"M2", false);
+    if resets {
+        links.model.borrow_mut().reset();
+    }
+}
+
+/// Refuses a block in an alarm, unless it ends that, and else carries it out.
+fn interpret(links: &Links, block: &[u8], declined: bool) -> (Status, bool) {
+    let alarm = machine::alarm();
+    if alarm != Alarm::None {
+        if !(alarm.ends_with_program() && is_program_end(block)) {
+            return (alarm.status(), true);
+        }
+        // The queue has been dropped, so that nothing is waited for.
+        let _ = alarm::clear(links, &links.settings.borrow());
+    }
+    let done = carry_out(links, block, declined);
+    if machine::is_checking() && links.commands.borrow().stop == Stop::End {
+        links.except(Status::ProgramChecked);
+    }
+    done
+}
+
+/// Whether moves are under way or queued.
+#[cold]
+#[inline(never)]
+#[small]
+pub(super) fn is_working(links: &Links) -> bool {
+    View::of(links, links.feeder()).has_work()
+}
+
+/// A jog of G-code begins, or G-code comes behind one.
+#[cold]
+#[inline(never)]
+fn enter(jogs: bool) {
+    machine::carry_out(if jogs { machine::Event::Jog } else { machine::Event::Done });
+}
+
+/// Interprets a block and hands its commands to the planner, but in check mode. Returns also whether it may have a
+/// comment. [`Status::Again`] while a jog is under way, unless it is another one.
+#[inline(never)]
+fn carry_out(links: &Links, block: &[u8], declined: bool) -> (Status, bool) {
+    let words = jog(block);
+    let jogs = machine::cycle() == Cycle::Jog;
+    if words.is_some() && (machine::is_held() || (!jogs && is_working(links))) {
+        // It waits for nothing but other jogs.
+        return (Status::NotAccepted, true);
+    }
+    if jogs && words.is_none() && !block.is_empty() && is_working(links) {
+        // The end of a jog drops what is queued: nothing that has been answered is to be behind it.
+        return (Status::Again, true);
+    }
+    let mut commands = links.commands.borrow_mut();
+    let settings = links.settings.borrow();
+    let mut model = links.model.borrow_mut();
+    let done = match (words, declined) {
+        (Some(words), _) => model.jog(words, &*settings, &mut commands),
+        // No need to look twice.
+        (None, true) => model.slow_path(block, &*settings, &mut commands),
+        _ => model.interpret(block, &*settings, &mut commands),
+    };
+    match done {
+        Ok(info) if info.deleted => (Status::Noop, true),
+        Ok(info) => {
+            if !commands.is_empty() && !machine::is_checking() {
+                if words.is_some() != jogs {
+                    enter(words.is_some());
+                }
+                links.commands_taken.set(true);
+                links.planner_wake.signal();
+            }
+            if model.take_lack() {
+                links.except(Status::NoToolLength);
+            }
+            (Status::Ok, info.commented)
+        }
+        Err(status) => {
+            if status.names_axis() {
+                links.except(status);
+            }
+            (status, true)
+        }
+    }
+}
