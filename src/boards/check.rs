@@ -1,0 +1,267 @@
+//! Refuses a board, when the image is built, of which a pin or a timer has two users, or cannot do what it is there for.
+
+use super::parts::{Handshake, Heaters, Pwm, Serial, Timer, Usart, inputs, outputs};
+use super::pins::{Pin, Port, gp, pin};
+use super::{Board, SPI};
+
+/// Most motors of a board that an image can be built for.
+const MOST_MOTORS: usize = 6;
+
+/// A pin that the firmware itself uses on every board: the transmitter of USART2, which is driven high for
+/// the sake of its interrupt (`avr_embassy::interrupt`).
+const OWN_PIN: Pin = pin(Port::H, 1);
+
+/// Ports a board may have, and pins of a port.
+const MAX_PORTS: usize = 2;
+const SERIAL_PINS: usize = 5;
+
+/// Beside those of motors and ports: of enables, hazards, the firmware, inputs, drivers, and SPI with what it selects.
+const OTHER_PINS: usize = 1 + 8 + 1 + inputs::COUNT + 2 + SPI.len() + 3;
+const MAX_PINS: usize = 3 * MOST_MOTORS + MAX_PORTS * SERIAL_PINS + OTHER_PINS;
+
+impl Serial {
+    const fn pins(&self) -> [Option<Pin>; SERIAL_PINS] {
+        let (rx, tx) = match self.usart.pins() {
+            Some([rx, tx]) => (Some(rx), Some(tx)),
+            None => (None, None),
+        };
+        let (rts, cts) = match self.handshake {
+            Some(Handshake { rts, cts }) => (Some(rts), Some(cts)),
+            None => (None, None),
+        };
+        [rx, tx, self.driver_enable, rts, cts]
+    }
+
+    /// Panics if one of its own pins is not where one instruction reaches it.
+    const fn check(&self) {
+        let pins = self.pins();
+        let mut i = 2;
+        while i < SERIAL_PINS {
+            if let Some(pin) = pins[i] {
+                assert!(pin.port as u8 <= Port::G as u8, "a pin of a serial port is beyond port G");
+            }
+            i += 1;
+        }
+    }
+}
+
+impl Board {
+    /// Panics, so fails the build when evaluated in a constant, if a pin or a timer has two users.
+    pub const fn check(&self) {
+        let mut pins = [None; MAX_PINS];
+        let mut n = 0;
+        let mut m = 0;
+        assert!(self.motors.len() >= 4, "a board has four motors at least");
+        while m < self.motors.len() {
+            pins[n] = Some(self.motors[m].step);
+            pins[n + 1] = Some(self.motors[m].dir);
+            pins[n + 2] = self.motors[m].enable;
+            n += 3;
+            m += 1;
+        }
+        pins[n] = self.enable_all;
+        n += 1;
+        let mut h = 0;
+        while h < self.hazards.len() {
+            pins[n] = Some(self.hazards[h]);
+            n += 1;
+            h += 1;
+        }
+        pins[n] = Some(OWN_PIN);
+        n += 1;
+        if let Some(drivers) = self.drivers {
+            (pins[n], pins[n + 1]) = (Some(drivers.tx), Some(drivers.rx));
+            n += 2;
+            assert!(drivers.addresses.len() == self.motors.len(), "a driver for each motor");
+        }
+        if let Some(Heaters { heaters: [hot_end, bed], .. }) = self.heaters {
+            (pins[n], pins[n + 1]) = (hot_end.select, bed.select);
+            n += 2;
+        }
+        if let Some(card) = self.card
+            && !card.is(SPI[0])
+        {
+            pins[n] = Some(card);
+            n += 1;
+        }
+        let mut s = 0;
+        while s < SPI.len() && self.has_spi() {
+            pins[n] = Some(SPI[s]);
+            n += 1;
+            s += 1;
+        }
+        let mut s = 0;
+        while s < self.serial.len() {
+            self.serial[s].check();
+            let own = self.serial[s].pins();
+            let mut o = 0;
+            while o < SERIAL_PINS {
+                pins[n] = own[o];
+                n += 1;
+                o += 1;
+            }
+            s += 1;
+        }
+        let mut s = 0;
+        while s < inputs::COUNT {
+            pins[n] = if self.is_shared_end(s) { None } else { self.inputs[s] };
+            n += 1;
+            s += 1;
+        }
+        let mut i = 0;
+        while i < n {
+            let mut j = i + 1;
+            while j < n {
+                if let (Some(a), Some(b)) = (pins[i], pins[j]) {
+                    assert!(!a.is(b), "a pin of this board is used twice");
+                }
+                j += 1;
+            }
+            i += 1;
+        }
+        assert!(
+            self.step_timer as u8 != self.tick_timer as u8,
+            "a timer of this board is used twice"
+        );
+        let first =
+            !self.serial.is_empty() && matches!(self.serial[0].usart, Usart::U0 | Usart::Usb);
+        assert!(first, "the first serial port of this board is not USART0, or its chip's USB");
+        self.check_pwm();
+        self.check_encoder();
+        self.check_outputs();
+        self.check_heaters();
+        let mut s = 0;
+        while s < inputs::COUNT {
+            if let Some(pin) = self.inputs[s] {
+                assert!(pin.interrupt().is_some(), "a switch of this board cannot interrupt");
+            }
+            s += 1;
+        }
+    }
+
+    /// Whether this input is the upper end of an axis on the pin of the lower one.
+    const fn is_shared_end(&self, input: usize) -> bool {
+        if input >= inputs::ENDS || input.is_multiple_of(2) {
+            return false;
+        }
+        match (self.inputs[input - 1], self.inputs[input]) {
+            (Some(min), Some(max)) => min.is(max),
+            _ => false,
+        }
+    }
+
+    /// Panics if the spindle's timer is another's, or has no such output.
+    const fn check_pwm(&self) {
+        let Some(pwm) = self.pwm else { return };
+        let wide = matches!(pwm.timer, Timer::T3 | Timer::T4 | Timer::T5);
+        let has_output = (wide && pwm.channel < 3) || matches!(pwm.timer, Timer::Slices);
+        assert!(has_output, "a timer of this board has no such output");
+        assert!(
+            pwm.timer as u8 != self.step_timer as u8 && pwm.timer as u8 != self.tick_timer as u8,
+            "a timer of this board is used twice"
+        );
+    }
+
+    /// Panics if a sensor of the spindle has no vector of its own, or another's pin, or if its timer is another's.
+    const fn check_encoder(&self) {
+        let Some(encoder) = self.encoder else { return };
+        let [index, sync] = encoder.vectors();
+        assert!(index != 0 && sync != 0, "a sensor of this board cannot interrupt");
+        assert!(index != sync, "the sensors of this board share a vector");
+        if let Some(second) = encoder.second {
+            assert!(
+                second.port as u8 == encoder.sync.port as u8,
+                "the level of a sensor is on another port"
+            );
+        }
+        let pwm = matches!(self.pwm, Some(Pwm { timer: Timer::T5, .. }));
+        let taken = matches!(self.step_timer, Timer::T5) || matches!(self.tick_timer, Timer::T5);
+        assert!(!pwm && !taken, "the timer of the encoder is used twice");
+        let mut h = 0;
+        while h < self.hazards.len() {
+            let hazard = self.hazards[h];
+            assert!(!hazard.is(encoder.index) && !hazard.is(encoder.sync), "a sensor is an output");
+            h += 1;
+        }
+    }
+
+    /// Panics if a heater would stay on after a panic, is an output of M3 to M9, or its sensor is not on a pin of the converter, or on one of
+    /// another's.
+    const fn check_heaters(&self) {
+        let Some(Heaters { heaters: [hot_end, bed], fan }) = self.heaters else { return };
+        let pins = [hot_end.pin, bed.pin, fan];
+        let mut p = 0;
+        while p < pins.len() {
+            assert!(self.is_hazard(pins[p]), "a heater of this board is not among its hazards");
+            let mut o = 0;
+            while o < outputs::COUNT {
+                if let Some(output) = self.outputs[o] {
+                    assert!(!output.is(pins[p]), "a heater of this board is an output");
+                }
+                o += 1;
+            }
+            p += 1;
+        }
+        assert!(hot_end.channel < 16 && bed.channel < 16, "a sensor is on no channel");
+        assert!(hot_end.channel != bed.channel, "two sensors of this board share a channel");
+        self.check_channel(hot_end.channel);
+        self.check_channel(bed.channel);
+    }
+
+    const fn is_hazard(&self, pin: Pin) -> bool {
+        let mut h = 0;
+        while h < self.hazards.len() {
+            if self.hazards[h].is(pin) {
+                return true;
+            }
+            h += 1;
+        }
+        false
+    }
+
+    /// Panics if the pin of a channel is a switch.
+    const fn check_channel(&self, channel: u8) {
+        let is_rp2040 = matches!(self.motors[0].step.port, Port::Gpio);
+        let pin = match channel {
+            0..3 if is_rp2040 => gp(26 + channel),
+            _ if is_rp2040 => panic!("a sensor is on no channel"),
+            ..8 => pin(Port::F, channel),
+            _ => pin(Port::K, channel - 8),
+        };
+        let mut i = 0;
+        while i < inputs::COUNT {
+            if let Some(input) = self.inputs[i] {
+                assert!(!input.is(pin), "a sensor of this board is a switch");
+            }
+            i += 1;
+        }
+    }
+
+    /// Panics if an output would stay on after a panic, or is switched by two codes.
+    const fn check_outputs(&self) {
+        let mut seen = 0u8;
+        let mut o = 0;
+        while o <= outputs::COUNT {
+            let output = match self.pwm {
+                Some(pwm) if o == outputs::COUNT => Some(pwm.pin()),
+                None if o == outputs::COUNT => None,
+                _ => self.outputs[o],
+            };
+            let mut found = output.is_none();
+            let mut h = 0;
+            while h < self.hazards.len() {
+                let hazard = self.hazards[h];
+                if let Some(pin) = output
+                    && pin.is(hazard)
+                {
+                    assert!(seen & 1 << h == 0, "an output of this board is used twice");
+                    seen |= 1 << h;
+                    found = true;
+                }
+                h += 1;
+            }
+            assert!(found, "an output of this board is not among its hazards");
+            o += 1;
+        }
+    }
+}

@@ -1,0 +1,116 @@
+use super::*;
+
+#[test]
+fn boards_are_found_by_name() {
+    assert!(by_name("ramps14").is_some_and(|b| b.motors[2].step == pin(Port::L, 3)));
+    assert!(by_name("nothing").is_none());
+}
+
+#[test]
+fn a_shared_enable_powers_all() {
+    let powered = |board: &Board| [0, 0b0010, 0b1111].map(|wanted| board.powered(wanted));
+    assert_eq!(powered(&MEGA2560_GRBL), [0, 0b1111, 0b1111]);
+    assert_eq!(powered(&RAMPS14), [0, 0b0010, 0b1111]);
+    let both = Board { enable_all: Some(pin(Port::G, 0)), ..RAMPS14 };
+    assert_eq!(powered(&both), [0, 0b0010, 0b1111]);
+    let neither = Board { enable_all: None, ..MEGA2560_GRBL };
+    assert_eq!(powered(&neither), [0b1111; 3]);
+}
+
+#[test]
+#[should_panic(expected = "pin of this board is used twice")]
+fn a_pin_that_is_used_twice_is_refused() {
+    let mut board = MEGA2560_GRBL;
+    board.enable_all = Some(board.motors[1].step);
+    board.check();
+}
+
+#[test]
+#[should_panic(expected = "pin of this board is used twice")]
+fn the_serial_line_is_taken() {
+    const TAKEN: &[Pin] = &[pin(Port::E, 1)];
+    Board { hazards: TAKEN, ..MEGA2560_GRBL }.check();
+}
+
+#[test]
+#[should_panic(expected = "pin of this board is used twice")]
+fn two_ports_on_one_usart_are_refused() {
+    Board { serial: &[USB, USB], ..MEGA2560_GRBL }.check();
+}
+
+#[test]
+#[should_panic(expected = "beyond port G")]
+fn pins_of_ports_are_within_reach() {
+    const FAR: Serial = Serial { driver_enable: Some(pin(Port::K, 7)), ..USB };
+    Board { serial: &[FAR], ..MEGA2560_GRBL }.check();
+}
+
+#[test]
+#[should_panic(expected = "not among its hazards")]
+fn outputs_are_hazards() {
+    Board { hazards: &[], ..MEGA2560_GRBL }.check();
+}
+
+#[test]
+#[should_panic(expected = "output of this board is used twice")]
+fn an_output_that_is_used_twice_is_refused() {
+    let mut board = MEGA2560_GRBL;
+    board.outputs[1] = board.outputs[0];
+    board.check();
+}
+
+#[test]
+fn both_ends_of_an_axis_may_share_a_pin() {
+    let mut board = RAMPS14;
+    board.inputs[inputs::Y_MAX] = board.inputs[inputs::Y_MIN];
+    board.check();
+}
+
+#[test]
+#[should_panic(expected = "pin of this board is used twice")]
+fn ends_of_two_axes_may_not() {
+    let mut board = RAMPS14;
+    board.inputs[inputs::Y_MIN] = board.inputs[inputs::X_MAX];
+    board.check();
+}
+
+#[test]
+#[should_panic(expected = "switch of this board cannot interrupt")]
+fn a_switch_must_interrupt() {
+    let mut board = RAMPS14;
+    board.inputs[inputs::A_MIN] = Some(pin(Port::C, 0));
+    board.check();
+}
+
+#[test]
+#[should_panic(expected = "the sensors of this board share a vector")]
+fn sensors_have_a_vector_each() {
+    let encoder = Some(Encoder { index: pin(Port::K, 1), sync: pin(Port::K, 7), second: None });
+    Board { encoder, ..MEGA2560_GRBL }.check();
+}
+
+#[test]
+#[should_panic(expected = "a sensor of this board cannot interrupt")]
+fn sensors_interrupt() {
+    let encoder = Some(Encoder { index: pin(Port::L, 1), sync: pin(Port::K, 7), second: None });
+    Board { encoder, ..MEGA2560_GRBL }.check();
+}
+
+#[test]
+#[should_panic(expected = "timer of this board is used twice")]
+fn the_spindle_has_a_timer_to_itself() {
+    let pwm = Some(Pwm { timer: Timer::T4, channel: 1 });
+    Board { step_timer: Timer::T4, pwm, ..MEGA2560_GRBL }.check();
+}
+
+#[test]
+#[should_panic(expected = "output of this board is used twice")]
+fn the_pin_of_the_pulses_is_nobody_elses() {
+    Board { pwm: Some(Pwm { timer: Timer::T4, channel: 2 }), ..MEGA2560_GRBL }.check();
+}
+
+#[test]
+#[should_panic(expected = "timer of this board is used twice")]
+fn a_timer_that_is_used_twice_is_refused() {
+    Board { tick_timer: Timer::T1, ..MEGA2560_GRBL }.check();
+}
