@@ -185,7 +185,7 @@ fn cargo_for(chip: &Chip) -> Result<std::process::Command> {
     let rust = Toolchain::find().context("no Rust that can build for AVR; `cargo xtask setup`")?;
     link::write_script(&root().join(LINKER))?;
     let mut cargo = rust.cargo();
-    cargo.current_dir(root()).env("RUSTFLAGS", flags(chip)).env(link::KEPT, "/dev/null");
+    cargo.current_dir(root()).env("RUSTFLAGS", flags(chip)).env_remove(link::KEPT);
     cargo.args(["build", "--release", "-Zbuild-std=core", "--target", "avr-none"]);
     cargo.arg("--target-dir").arg(target(chip));
     Ok(cargo)

@@ -8,8 +8,14 @@ use anyhow::{Context, Result, ensure};
 use crate::chips::Chip;
 use crate::process::run;
 
-/// What `rustc` takes for its linker: it writes its arguments into the file that `KERF_LINK` names, one a line, and links.
-const SCRIPT: &str = "#!/bin/sh\nprintf '%s\\n' \"$@\" > \"$KERF_LINK\"\nexec avr-gcc \"$@\"\n";
+/// What `rustc` takes for its linker. If `KERF_LINK` names a file, it writes its arguments there, one a line, and leaves an empty file where
+/// the program was to be: that is linked from the text later. Else it links.
+const SCRIPT: &str = r#"#!/bin/sh
+[ -n "$KERF_LINK" ] || exec avr-gcc "$@"
+printf '%s\n' "$@" > "$KERF_LINK"
+while [ "$1" != -o ]; do shift; done
+: > "$2"
+"#;
 
 /// The variable of the environment by which the script learns where to write.
 pub const KEPT: &str = "KERF_LINK";
@@ -52,9 +58,10 @@ impl Link {
         run(Command::new("avr-gcc").args(self.with(&object, &elf.to_string_lossy())?))
     }
 
-    /// The arguments with another program and another image.
+    /// The arguments with another program and another image. `rustc` first asks for `-no-pie`, which this linker does not know.
     fn with(&self, object: &str, elf: &str) -> Result<Vec<String>> {
-        let mut arguments = self.arguments.clone();
+        let known = self.arguments.iter().filter(|argument| *argument != "-no-pie");
+        let mut arguments: Vec<String> = known.cloned().collect();
         let output = arguments
             .iter()
             .position(|argument| argument == "-o")
@@ -77,8 +84,9 @@ mod tests {
     #[test]
     fn another_program_is_linked_alike() {
         let link = |text: &str| Link { arguments: text.split(' ').map(str::to_owned).collect() };
-        let with =
-            link("k.cgu-0.rcgu.o -lm b.rlib -o k.elf -Wl,--relax").with("s.o", "s.elf").unwrap();
+        let with = link("k.cgu-0.rcgu.o -lm -no-pie b.rlib -o k.elf -Wl,--relax")
+            .with("s.o", "s.elf")
+            .unwrap();
         assert_eq!(with.join(" "), "s.o -lm b.rlib -o s.elf -Wl,--relax");
         assert!(link("a.rcgu.o b.rcgu.o -o k.elf").with("s.o", "s.elf").is_err());
         assert!(link("a.rcgu.o -lm").with("s.o", "s.elf").is_err());

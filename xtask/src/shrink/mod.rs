@@ -39,7 +39,7 @@ use text::{Function, Insn, Line, Program};
 
 /// Two texts for the assembler.
 pub struct Texts {
-    /// The program as the compiler wrote it.
+    /// The program as the compiler wrote it, without what only a debugger reads.
     pub plain: String,
     /// What is linked: the program tidied, with what cold functions share.
     pub small: String,
@@ -57,7 +57,7 @@ pub fn shrink(text: &str) -> Result<Texts> {
     order::arrange(&mut small);
     via::share(&mut small);
     verify::check(&tidy, &small).context("the program that was made smaller is another one")?;
-    Ok(Texts { plain: plain.text(), small: small.text() })
+    Ok(Texts { plain: text::without_debug(&plain.text()), small: small.text() })
 }
 
 /// How much of a function may be shared.

@@ -182,6 +182,20 @@ fn address(line: &str) -> Option<&str> {
     is_address.then(|| inside.split(')').next())?
 }
 
+/// A text without what only a debugger reads: two thirds of it, and of the time in which it is assembled and linked.
+pub fn without_debug(text: &str) -> String {
+    let mut is_debug = false;
+    let mut is_code = |line: &str| {
+        let line = line.trim_start();
+        if line.starts_with(".section") || line == ".text" {
+            is_debug = line.contains(".debug_");
+        }
+        !is_debug && !line.starts_with(".loc\t")
+    };
+    let lines = text.split_inclusive('\n').filter(|line| is_code(line.trim_end()));
+    lines.collect()
+}
+
 /// Whether a directive only tells a debugger or the linker of what it names, or holds text.
 fn names_nothing(line: &str) -> bool {
     const DIRECTIVES: [&str; 5] = [".asciz", ".ascii", ".size", ".type", ".section"];
@@ -368,5 +382,11 @@ pub mod tests {
         let fixed: Vec<_> = program.functions[0].fixed().map(str::trim).collect();
         assert_eq!(fixed, ["sbrc\tr24, 1", "wait:", "rjmp\twait"]);
         assert_eq!(program.functions[0].insns().count(), 2);
+    }
+
+    #[test]
+    fn a_text_without_debug_has_all_code() {
+        let text = "\t.text\nf:\n\t.loc\t1 2 3\n\tret\n\t.section\t.debug_info,\"\"\n\t.long\t1\n\t.section\t.data\nv:\n";
+        assert_eq!(without_debug(text), "\t.text\nf:\n\tret\n\t.section\t.data\nv:\n");
     }
 }
