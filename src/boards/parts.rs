@@ -128,7 +128,7 @@ pub const USB: Serial =
 /// The first port of every board with an RP2040: its USB, which has no rate.
 pub const NATIVE_USB: Serial = Serial { usart: Usart::Usb, ..USB };
 
-/// Outputs that a program switches, as bits; of [`Board::outputs`] the index is the number of the bit.
+/// Outputs that a program switches, as bits; of [`Board::outputs`](super::Board::outputs) the index is the number of the bit.
 #[allow(missing_docs)]
 pub mod outputs {
     pub const SPINDLE: u8 = 1;
@@ -139,7 +139,7 @@ pub mod outputs {
     pub const COUNT: usize = 4;
 }
 
-/// Switches that the machine has, by their number in [`Board::inputs`] and as bits of a set.
+/// Switches that the machine has, by their number in [`Board::inputs`](super::Board::inputs) and as bits of a set.
 #[allow(missing_docs)]
 pub mod inputs {
     pub const X_MIN: usize = 0;

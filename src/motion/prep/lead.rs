@@ -1,4 +1,4 @@
-//! Pressure advance: the lead of the extruder in the segments of a block ([`Advance`] says how long it is).
+//! Pressure advance: the lead of the extruder in the segments of a block ([`Advance`](super::super::advance::Advance) says how long it is).
 
 use super::super::advance::{Lead, pushed};
 use super::super::block::Line;
@@ -27,7 +27,7 @@ impl Prep {
         }
     }
 
-    /// The machine is that fast, mm/s, at the end of a slice: see [`Advance::aim`].
+    /// The machine is that fast, mm/s, at the end of a slice: see [`Advance::aim`](super::super::advance::Advance::aim).
     #[inline(never)]
     pub fn aim(&mut self, velocity: f32, seconds: f32, pending: f32) {
         if let Some(extruder) = self.extruder.first_mut() {

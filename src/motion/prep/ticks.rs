@@ -23,7 +23,7 @@ pub(super) fn times(a: i16, b: u16) -> i32 {
     if a < 0 { -size } else { size }
 }
 
-/// `1 << n`, up to [`STEP`]. Cost: 15; the compiler makes a loop of six cycles a bit.
+/// `1 << n`, up to a step. Cost: 15; the compiler makes a loop of six cycles a bit.
 #[inline(always)]
 pub(super) fn bit(n: u8) -> u16 {
     let pair = if n & 2 != 0 { 4 } else { 1 };
