@@ -52,6 +52,27 @@ fn what_it_says_first_decides_anew() {
 }
 
 #[test]
+fn half_a_line_is_forgotten_with_the_program_that_sent_it() {
+    let machine = booted();
+    assert_eq!(say(&machine, "{xvm:n}\ng1x1"), "{\"r\":{\"xvm\":800},\"f\":[1,0,7]}\n");
+    machine.close_usb();
+    machine.run_ms(20);
+    open(&machine);
+    assert_eq!(say(&machine, "{xvm:n}\n"), "{\"r\":{\"xvm\":800},\"f\":[1,0,7]}\n");
+}
+
+#[test]
+fn a_whole_line_of_a_program_that_has_gone_is_carried_out() {
+    let machine = booted();
+    machine.send(b"{xvm:700}\n");
+    machine.run_ms(2);
+    machine.close_usb();
+    machine.run_ms(50);
+    open(&machine);
+    assert_eq!(say(&machine, "{xvm:n}\n"), "{\"r\":{\"xvm\":700},\"f\":[1,0,7]}\n");
+}
+
+#[test]
 fn a_dialect_that_is_set_stays() {
     let set = || {
         say(&booted(), "{dia:3}\n");

@@ -122,6 +122,9 @@ contract! {
         /// Whether a program has opened the first port since the last call, but for the first one, which hears the greeting of the start. It
         /// comes with [`Event::Realtime`](crate::hal::event::Event::Realtime). Thread mode.
         fn take_opened() -> bool;
+        /// Whether the program that had the first port open has closed it since the last call, and none has opened it since. It comes with
+        /// [`Event::Received`](crate::hal::event::Event::Received). Thread mode.
+        fn take_closed() -> bool;
         /// Line ends lost since start-up, modulo 2^16. Thread mode.
         fn lost_ends(port: u8) -> u16;
         /// Bytes that may come before any is lost, at most 254: one less than the receive ring has room for. Thread mode.

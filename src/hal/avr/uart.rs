@@ -357,6 +357,11 @@ pub fn take_opened() -> bool {
     false
 }
 
+/// Never: see [`sees_opening`].
+pub fn take_closed() -> bool {
+    false
+}
+
 /// Line ends lost since start-up, modulo 2^16.
 pub fn lost_ends(port: u8) -> u16 {
     let [low, high] = &flags(port).lost_ends;

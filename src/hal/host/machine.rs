@@ -47,6 +47,11 @@ impl Machine {
         uart::open_usb();
     }
 
+    /// The program closes the first port.
+    pub fn close_usb(&self) {
+        uart::close_usb();
+    }
+
     /// The sender puts a byte on the line that arrives damaged.
     pub fn send_damaged(&self) {
         uart::send_damaged(USB);

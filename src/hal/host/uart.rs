@@ -87,6 +87,8 @@ struct Line {
     rts: bool,
     /// A program has opened the port.
     opened: bool,
+    /// A program has closed the port.
+    closed: bool,
     lost_ends: u16,
     /// Bytes queued, modulo 256.
     queued: u8,
@@ -121,6 +123,7 @@ impl Line {
             cts: false,
             rts: false,
             opened: false,
+            closed: false,
             lost_ends: 0,
             queued: 0,
             realtime: 0,
@@ -269,10 +272,21 @@ pub fn take_opened() -> bool {
     with(USB, |line| core::mem::take(&mut line.opened))
 }
 
+/// Whether the program that had the first port open has closed it since the last call.
+pub fn take_closed() -> bool {
+    with(USB, |line| core::mem::take(&mut line.closed))
+}
+
 /// A program opens the first port.
 pub(super) fn open_usb() {
-    with(USB, |line| line.opened = true);
+    with(USB, |line| (line.opened, line.closed) = (true, false));
     flags::set(Event::Realtime);
+}
+
+/// The program closes it.
+pub(super) fn close_usb() {
+    with(USB, |line| line.closed = true);
+    flags::set(Event::Received);
 }
 
 /// Line ends lost since start-up, modulo 2^16.

@@ -567,6 +567,11 @@ pub fn take_opened() -> bool {
     usb::take_opened()
 }
 
+/// Whether the program that had USB open has closed it since the last call, and none has opened it since. Thread mode.
+pub fn take_closed() -> bool {
+    usb::take_closed()
+}
+
 /// Takes what is to leave by USB next. How much that is.
 pub(super) fn take(packet: &mut [u8]) -> usize {
     let mut count = 0;

@@ -53,6 +53,8 @@ static ASLEEP: AtomicBool = AtomicBool::new(false);
 
 /// A program has opened the port that is not the first, which nobody has taken yet.
 static OPENED: AtomicBool = AtomicBool::new(false);
+/// The program has closed the port, which nobody has taken yet.
+static CLOSED: AtomicBool = AtomicBool::new(false);
 
 /// Notices when the bus sleeps.
 struct Sleep;
@@ -108,12 +110,22 @@ pub(super) fn start() {
 
 /// Whether a program has opened the port since the last call, but for the first. Thread mode.
 pub(super) fn take_opened() -> bool {
-    let opened = OPENED.load(Ordering::Relaxed);
-    if opened {
-        // One that comes in between is greeted with this one.
-        OPENED.store(false, Ordering::Relaxed);
+    // One that comes in between is greeted with this one.
+    take(&OPENED)
+}
+
+/// Whether the program has closed the port since the last call, and none has opened it since. Thread mode.
+pub(super) fn take_closed() -> bool {
+    take(&CLOSED)
+}
+
+/// Clears a flag. Whether it was set.
+fn take(flag: &AtomicBool) -> bool {
+    let is_set = flag.load(Ordering::Relaxed);
+    if is_set {
+        flag.store(false, Ordering::Relaxed);
     }
-    opened
+    is_set
 }
 
 /// There may be something to send. While lines wait their answers are gathered into full packets, for a millisecond at most: see [`flush`].
@@ -158,9 +170,14 @@ async fn tell(mut sender: Sender<'static, Driver>, control: ControlChanged<'stat
     }
     let (mut packet, mut door) = ([0; PIECE], Door::default());
     loop {
+        let was_open = door.is_open;
         if door.opens_again(control.dtr()) {
             OPENED.store(true, Ordering::Relaxed);
             flags::set(Event::Realtime);
+        }
+        if was_open != door.is_open {
+            CLOSED.store(was_open, Ordering::Relaxed);
+            flags::set(Event::Received);
         }
         let hears = hears(&control);
         let kept = if hears { first.take(&mut packet) } else { 0 };
