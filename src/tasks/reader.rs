@@ -153,11 +153,9 @@ impl Intake {
                     look_ahead(links, self.port, &mut self.scan, &mut self.received.window());
                 self.received.release_many(taken);
             }
-            Left::Nothing if uart::sees_opening() && self.port.number == USB => {
-                if uart::take_closed() {
-                    // Else the next program's first line would go on with it.
-                    self.port.lines.borrow_mut().forget();
-                }
+            Left::Nothing if self.port.number == USB && uart::take_closed() => {
+                // Else the next program's first line would go on with it.
+                self.port.lines.borrow_mut().forget();
             }
             _ => {}
         }
