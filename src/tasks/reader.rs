@@ -153,13 +153,19 @@ impl Intake {
                     look_ahead(links, self.port, &mut self.scan, &mut self.received.window());
                 self.received.release_many(taken);
             }
-            Left::Nothing if self.port.number == USB && uart::take_closed() => {
-                // Else the next program's first line would go on with it.
-                self.port.lines.borrow_mut().forget();
-            }
             _ => {}
         }
+        if uart::sees_opening() && left == Left::Nothing {
+            self.see_to_closing();
+        }
         left
+    }
+
+    /// Of a program that has closed the port half a line may be there: the next program's first line would go on with it.
+    fn see_to_closing(&self) {
+        if self.port.number == USB && uart::take_closed() {
+            self.port.lines.borrow_mut().forget();
+        }
     }
 
     /// Takes a turn's bytes.
