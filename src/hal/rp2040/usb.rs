@@ -170,14 +170,17 @@ async fn tell(mut sender: Sender<'static, Driver>, control: ControlChanged<'stat
     }
     let (mut packet, mut door) = ([0; PIECE], Door::default());
     loop {
-        let was_open = door.is_open;
-        if door.opens_again(control.dtr()) {
-            OPENED.store(true, Ordering::Relaxed);
-            flags::set(Event::Realtime);
-        }
-        if was_open != door.is_open {
-            CLOSED.store(was_open, Ordering::Relaxed);
-            flags::set(Event::Received);
+        match door.turn(control.dtr()) {
+            Some(Turn::OpensAgain) => {
+                CLOSED.store(false, Ordering::Relaxed);
+                OPENED.store(true, Ordering::Relaxed);
+                flags::set(Event::Realtime);
+            }
+            Some(Turn::Closes) => {
+                CLOSED.store(true, Ordering::Relaxed);
+                flags::set(Event::Received);
+            }
+            None => {}
         }
         let hears = hears(&control);
         let kept = if hears { first.take(&mut packet) } else { 0 };
@@ -215,14 +218,26 @@ struct Door {
     was_open: bool,
 }
 
+/// What a change of that line tells.
+enum Turn {
+    /// A program has opened the port, and is not the first.
+    OpensAgain,
+    /// The program has closed it.
+    Closes,
+}
+
 impl Door {
-    /// The line is so now. Whether a program has opened the port by that, and is not the first.
-    fn opens_again(&mut self, dtr: bool) -> bool {
-        let opens = dtr && !self.is_open;
-        let again = opens && self.was_open;
-        self.was_open |= opens;
+    /// The line is so now. What that tells, if it has changed.
+    fn turn(&mut self, dtr: bool) -> Option<Turn> {
+        if dtr == self.is_open {
+            return None;
+        }
         self.is_open = dtr;
-        again
+        if !dtr {
+            return Some(Turn::Closes);
+        }
+        let again = core::mem::replace(&mut self.was_open, true);
+        again.then_some(Turn::OpensAgain)
     }
 }
 
