@@ -16,6 +16,7 @@ const CHANGE: f32 = 0.005;
 
 /// A feed waits so long for a spindle that stands still, s.
 const PATIENCE_S: f32 = 6.0;
+
 /// What lines have to do with the spindle.
 #[derive(Debug, Default)]
 pub(super) enum Follows {
