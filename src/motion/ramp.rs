@@ -134,7 +134,7 @@ pub(super) struct Leveling {
 /// The share of the acceleration limit that a change of velocity by `drop` reaches.
 fn share_of(drop: f32, kappa: f32) -> f32 {
     let twice = scaled(kappa, 1);
-    if below(drop, twice) { sqrt(drop / twice) } else { 1.0 }
+    if below(drop, twice) { sqrt(ratio(drop, twice)) } else { 1.0 }
 }
 
 impl Governor {
@@ -172,10 +172,11 @@ impl Governor {
         let rise = greater(share, 1e-4) * build;
         let half = scaled(limits.jerk, -1);
         // Only the whole deceleration is kept.
-        let hold = if same(share, 1.0) { greater((top - w) / limits.accel, rise) } else { rise };
+        let hold =
+            if same(share, 1.0) { greater(ratio(top - w, limits.accel), rise) } else { rise };
         let fall = hold + rise;
-        let coast = if slack > 0.0 { fall + slack / top } else { fall };
-        let begin = 0.5 * (top + w) * fall;
+        let coast = if slack > 0.0 { fall + ratio(slack, top) } else { fall };
+        let begin = scaled(fall, -1) * (top + w);
         let time = coast + alpha * build;
         let ramp = Ramp {
             time,

@@ -28,7 +28,7 @@
 
 use super::constraint::{Ahead, Ask, Clear, needed};
 use super::exec::SEGMENT_S;
-use super::float::{below, greater, least, less, lesser, scaled, some};
+use super::float::{below, greater, least, less, lesser, ratio, scaled, some};
 use super::governor::{Governor, same};
 use super::ramp::Phase;
 use super::slice::Span;
@@ -180,7 +180,7 @@ impl Governor {
 
     /// Lays out the ramp for what the last scan has found; the top is `at` so far on.
     fn slow_for_clear(&mut self, at: f32) {
-        let slack = 0.5 * self.clear.slack(at, self.limits.kappa) / self.limits.accel;
+        let slack = ratio(self.clear.slack(at, self.limits.kappa), scaled(self.limits.accel, 1));
         let Clear { target, closed, .. } = self.clear;
         self.lay(target, slack, closed);
         self.changed = false;
