@@ -35,12 +35,9 @@ fn flags(chip: &Chip) -> String {
     FLAGS.replace("CHIP", chip.name)
 }
 
-/// Where cargo builds for a chip: one directory for all boards of it, so that the dependencies are built once.
-fn target(chip: &Chip) -> PathBuf {
-    match chip.name == ATMEGA2560.name {
-        true => root().join("target/avr"),
-        false => root().join(format!("target/avr-{}", chip.name)),
-    }
+/// Where cargo builds for AVR: one directory for all boards and chips, so that what runs on the host is built once.
+fn target() -> PathBuf {
+    root().join("target/avr")
 }
 
 /// Where the images lie: `BOARD.elf`, or `BOARD-MACHINE.elf` if it is not for the usual machine. The name of one that lacks features says
@@ -77,7 +74,7 @@ pub fn build_without(board: Board, machine: Machine, without: &[String]) -> Resu
         return rp2040::build(&features, &image);
     }
     let rust = Toolchain::find().context("no Rust that can build for AVR; `cargo xtask setup`")?;
-    let target = target(&ATMEGA2560);
+    let target = target();
     let kept = target.join("kept").join(image.with_extension("").file_name().unwrap_or_default());
     link::write_script(&root().join(LINKER))?;
     std::fs::create_dir_all(&kept)?;
@@ -187,7 +184,7 @@ fn cargo_for(chip: &Chip) -> Result<std::process::Command> {
     let mut cargo = rust.cargo();
     cargo.current_dir(root()).env("RUSTFLAGS", flags(chip)).env_remove(link::KEPT);
     cargo.args(["build", "--release", "-Zbuild-std=core", "--target", "avr-none"]);
-    cargo.arg("--target-dir").arg(target(chip));
+    cargo.arg("--target-dir").arg(target());
     Ok(cargo)
 }
 
@@ -200,7 +197,7 @@ fn keep_examples(
 ) -> Result<()> {
     run(cargo.args(names.iter().flat_map(|name| ["--example", name])))?;
     for name in names {
-        let built = target(chip).join(format!("avr-none/release/examples/{name}.elf"));
+        let built = target().join(format!("avr-none/release/examples/{name}.elf"));
         elf::check_compiled(&built, chip)?;
         keep(&built, &folder.join(format!("{name}.elf")))?;
     }
