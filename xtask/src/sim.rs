@@ -99,8 +99,8 @@ pub fn run(args: &RunArgs) -> Result<ExitCode> {
     pass_through(&mut run_command(args, &elf)?)
 }
 
-/// Builds and offers the simulated board as a serial port. The simulator takes this process's place: `cargo run` does so as well, so that
-/// the number by which it was started is that of the board.
+/// Builds and offers the simulated board as a serial port. The simulator takes this process's place, so that the number by which it was
+/// started is that of the board.
 pub fn serve(args: &ServeArgs) -> Result<ExitCode> {
     let elf = prepare(args.board, args.machine)?;
     become_program(&mut serve_command(args, &elf))
@@ -131,9 +131,10 @@ pub fn prepare(board: Board, machine: Machine) -> Result<PathBuf> {
         setup::ensure(Scope::Simulator)?;
     }
     let elf = firmware::build(board, machine)?;
-    if !root().join("target/sim/kerf-sim").exists() {
+    if !program().exists() {
         eprintln!("building the simulator: some minutes, this once");
     }
+    build()?;
     Ok(elf)
 }
 
@@ -194,23 +195,23 @@ pub fn report(elf: &Path, job: &Path, set: &[String], file: &Path) -> Result<()>
     run_child(command.arg(job).arg("--quiet").arg("--report").arg(file))
 }
 
-/// Builds the simulator; where it lies.
+/// Builds the simulator; where it lies. Features are those of all packages together, so that no other package has to have what they
+/// share compiled again.
 pub fn build() -> Result<PathBuf> {
-    run_child(&mut cargo("build"))?;
-    Ok(root().join("target/sim/kerf-sim"))
+    let mut cargo = host_cargo();
+    cargo.current_dir(root());
+    run_child(cargo.args(["build", "--quiet", "--workspace", "--bin", "kerf-sim"]))?;
+    Ok(program())
+}
+
+fn program() -> PathBuf {
+    root().join("target/debug/kerf-sim")
 }
 
 fn simulator(verb: &str, elf: &Path, board: Board) -> Command {
-    let mut cargo = cargo("run");
-    cargo.args(["--", verb, "--elf"]).arg(elf).args(["--board", board.name()]);
-    cargo
-}
-
-fn cargo(verb: &str) -> Command {
-    let mut cargo = host_cargo();
-    cargo.args([verb, "--quiet", "--profile", "sim", "--package", "kerf-sim"]);
-    cargo.args(["--bin", "kerf-sim", "--manifest-path"]).arg(root().join("Cargo.toml"));
-    cargo
+    let mut simulator = Command::new(program());
+    simulator.args([verb, "--elf"]).arg(elf).args(["--board", board.name()]);
+    simulator
 }
 
 fn option(command: &mut Command, name: &str, value: Option<impl AsRef<std::ffi::OsStr>>) {
@@ -224,8 +225,8 @@ mod tests {
     use super::*;
     use crate::process::shown;
 
-    fn after_dashes(command: &Command) -> String {
-        shown(command).split_once(" -- ").unwrap().1.to_owned()
+    fn arguments(command: &Command) -> String {
+        shown(command).split_once("kerf-sim ").unwrap().1.to_owned()
     }
 
     #[test]
@@ -243,7 +244,7 @@ mod tests {
             smooth: Some(30),
         };
         assert_eq!(
-            after_dashes(&run_command(&args, Path::new("k.elf")).unwrap()),
+            arguments(&run_command(&args, Path::new("k.elf")).unwrap()),
             "run --elf k.elf --board ramps14 a.gcode --set {\"xvm\":800} --set {\"yvm\":800} \
              --baud 250000 --report r.json --vcd v.vcd --plot p.svg --span 1..2 --smooth 30"
         );
@@ -266,7 +267,7 @@ mod tests {
             BenchArgs { row: vec!["rate-1".into(), "lines".into()], board: Board::default() };
         let command = bench_command(&args, Path::new("k.elf"));
         let want = "bench --elf k.elf --board mega2560-grbl --row rate-1 --row lines";
-        assert_eq!(after_dashes(&command), want);
+        assert_eq!(arguments(&command), want);
     }
 
     #[test]
@@ -279,6 +280,6 @@ mod tests {
             gdb: Some(2345),
         };
         let command = serve_command(&args, Path::new("k.elf"));
-        assert_eq!(after_dashes(&command), "serve --elf k.elf --board mega2560-grbl --gdb 2345");
+        assert_eq!(arguments(&command), "serve --elf k.elf --board mega2560-grbl --gdb 2345");
     }
 }

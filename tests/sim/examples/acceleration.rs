@@ -1,5 +1,5 @@
 //! The acceleration of X and Y in a job, from their steps: percentiles, and where most is:
-//! `cargo run --profile sim -p kerf-sim --example acceleration -- ELF BOARD JOB STEPS_PER_MM WINDOW_MS LEAST [SETTING...]`,
+//! `cargo run -p kerf-sim --example acceleration -- ELF BOARD JOB STEPS_PER_MM WINDOW_MS LEAST [SETTING...]`,
 //! where only places count that are passed with LEAST mm/s or more.
 
 use std::path::Path;

@@ -1,5 +1,5 @@
 //! What calls of functions cost, with all they call and without interrupts:
-//! `cargo run --profile sim -p kerf-sim --example calls -- ELF BOARD JOB PATTERNS [SETTING...]`.
+//! `cargo run -p kerf-sim --example calls -- ELF BOARD JOB PATTERNS [SETTING...]`.
 //!
 //! PATTERNS are parts of function names, divided by commas. Only calls from thread code count.
 

@@ -1,5 +1,5 @@
 //! What exec takes for a segment of a job, and the longest, and each call of functions whose names end in what `KERF_CALLS`
-//! lists, with commas between: `cargo run --profile sim -p kerf-sim --example laps -- ELF BOARD JOB [SETTING...]`.
+//! lists, with commas between: `cargo run -p kerf-sim --example laps -- ELF BOARD JOB [SETTING...]`.
 
 use std::path::Path;
 

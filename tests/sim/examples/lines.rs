@@ -1,5 +1,5 @@
 //! What the lines of a job cost, and how long interrupts are off meanwhile:
-//! `cargo run --profile sim -p kerf-sim --example lines -- ELF BOARD BAUD JOB [SETTING...]`.
+//! `cargo run -p kerf-sim --example lines -- ELF BOARD BAUD JOB [SETTING...]`.
 //!
 //! Measures from the first line sent to the last one answered, so the cost of motion is in it only as
 //! far as it happens meanwhile. `KERF_ADDRESSES=FILE` writes cycles by address, for a symbolizer.

@@ -1,5 +1,5 @@
 //! Where a job's cycles go, function by function:
-//! `cargo run --profile sim -p kerf-sim --example profile -- ELF BOARD JOB [SETTING...]`. `{baud:500000}` is a setting, too.
+//! `cargo run -p kerf-sim --example profile -- ELF BOARD JOB [SETTING...]`. `{baud:500000}` is a setting, too.
 
 use std::path::Path;
 

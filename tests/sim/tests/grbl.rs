@@ -1,7 +1,7 @@
 //! Random conversations in grbl's dialect with the image on the simulated chip: those of `tests/grbl_random.rs`, and shorter; what is judged is in
 //! `tests/support/grbl_session.rs`.
 //!
-//! One machine has them all, one after the other: `KERF_SEED=47 KERF_CASES=1 cargo test -p kerf-sim-tests --profile sim grbl::` has one.
+//! One machine has them all, one after the other: `KERF_SEED=47 KERF_CASES=1 cargo test -p kerf-sim-tests grbl::` has one.
 
 use kerf::boards::MEGA2560_GRBL;
 use proptest::strategy::ValueTree;

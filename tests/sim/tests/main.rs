@@ -1,7 +1,7 @@
 //! The image on the simulated chip, and what simulates it. All files are one program: each of its own would be optimised and linked apart,
 //! which took longer than the tests.
 //!
-//! A name in front of `::` is a file here: `cargo test -p kerf-sim-tests --profile sim hold::` are the tests of `hold.rs`.
+//! A name in front of `::` is a file here: `cargo test -p kerf-sim-tests hold::` are the tests of `hold.rs`.
 
 #[macro_use]
 mod common;

@@ -1,5 +1,5 @@
 //! The image of `pico-cnc` on the emulated RP2040. `cargo xtask test` runs these, and installs the emulator; else
-//! `cargo test -p kerf-sim-tests --profile sim pico -- --ignored` does, behind a `cargo xtask sim --board pico-cnc`.
+//! `cargo test -p kerf-sim-tests pico -- --ignored` does, behind a `cargo xtask sim --board pico-cnc`.
 
 use std::path::Path;
 

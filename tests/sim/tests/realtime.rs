@@ -3,7 +3,7 @@
 //! `tests/support/session.rs`.
 //!
 //! Each of two machines has half of them, one after the other. The seed of one that fails is told:
-//! `KERF_SEED=47 KERF_CASES=1 cargo test -p kerf-sim-tests --profile sim realtime::` has it alone, and from the first
+//! `KERF_SEED=47 KERF_CASES=1 cargo test -p kerf-sim-tests realtime::` has it alone, and from the first
 //! seed of its machine on with all that came before it.
 
 use std::ops::Range;

@@ -2,7 +2,7 @@
 //! port's stream is in `tests/support/stream`.
 //!
 //! Each of two machines has half of them, one after the other. The seed of one that fails is told:
-//! `KERF_SEED=47 KERF_CASES=1 cargo test -p kerf-sim-tests --profile sim streams::` has it alone, and from the first seed
+//! `KERF_SEED=47 KERF_CASES=1 cargo test -p kerf-sim-tests streams::` has it alone, and from the first seed
 //! of its machine on with all that came before it.
 
 use std::ops::Range;

@@ -51,8 +51,12 @@ const WITH_SENDERS: &[Stage] = &[
     Stage { name: "the page in a browser", run: crate::web::test },
 ];
 
-/// What simulates boards, and what is tested on them: packages with a profile of their own.
-const SIMULATOR: [&str; 2] = ["kerf-sim", "kerf-sim-tests"];
+/// What of all packages together is tested without an image.
+const HOST_TARGETS: [&str; 8] =
+    ["--lib", "--bins", "--test", "host", "--test", "capabilities", "--test", "seeds"];
+
+/// What is tested on simulated and emulated boards.
+const BOARD_TARGETS: [&str; 2] = ["--test", "chip"];
 
 /// Runs all checks; stops at the first that fails.
 pub fn run() -> Result<()> {
@@ -84,15 +88,9 @@ fn format() -> Result<()> {
     Ok(())
 }
 
-/// The simulator's packages apart from the rest: in their own profile simavr is compiled once.
 fn lints() -> Result<()> {
     if has_component("clippy", "clippy") {
-        let deny = ["--all-targets", "--", "-D", "warnings"];
-        let [simulator, tests] = SIMULATOR;
-        let others = ["clippy", "--workspace", "--exclude", simulator, "--exclude", tests];
-        let own = ["clippy", "--profile", "sim", "--package", simulator, "--package", tests];
-        cargo(&[&others[..], &deny[..]].concat())?;
-        cargo(&[&own[..], &deny[..]].concat())?;
+        cargo(&["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"])?;
     }
     Ok(())
 }
@@ -120,13 +118,13 @@ fn has_component(subcommand: &str, component: &str) -> bool {
     found
 }
 
-/// With what the fuzzers do, done once, with what the page is made of, and with the firmware without capabilities, which refuses what it lacks.
+/// With what the fuzzers do, done once, with what the page is made of and what simulates, and with the firmware without capabilities,
+/// which refuses what it lacks.
 fn host_tests() -> Result<()> {
-    cargo(&["test"])?;
+    run_child(&mut tests(&HOST_TARGETS))?;
+    run_child(&mut tests(&["--doc"]))?;
     let features = ["--no-default-features", "--features", "std,dialect-tinyg"];
-    cargo(&[&["test", "--package", "kerf", "--test", "capabilities"], &features[..]].concat())?;
-    cargo(&["test", "--package", "kerf-web"])?;
-    cargo(&["test", "--package", "kerf-fuzz"])
+    cargo(&[&["test", "--package", "kerf", "--test", "capabilities"], &features[..]].concat())
 }
 
 /// What capabilities take of the flash, bytes, at the least: a check that leaving them out does leave them out.
@@ -152,20 +150,20 @@ fn size_all() -> Result<()> {
 /// With the simulator's program, which some of them run.
 fn build_simulator_tests() -> Result<()> {
     sim::build()?;
-    run_child(simulator_test().arg("--no-run"))
+    run_child(tests(&BOARD_TARGETS).arg("--no-run"))
 }
 
 /// With those on the emulated chip, which are ignored where there may be no emulator.
 fn simulator_tests() -> Result<()> {
-    run_child(simulator_test().args(["--", "--include-ignored"]))
+    run_child(tests(&BOARD_TARGETS).args(["--", "--include-ignored"]))
 }
 
-/// What builds the tests of simulated boards and of what simulates, and runs them.
-fn simulator_test() -> Command {
+/// What builds these tests and runs them. Of all packages together, even where few are chosen: the features of what they share are those
+/// of all, and it is compiled once.
+fn tests(targets: &[&str]) -> Command {
     let mut test = host_cargo();
     test.current_dir(root()).env("KERF_ELF_DIR", firmware::directory());
-    test.args(["test", "--profile", "sim", "--lib", "--bins", "--tests"]);
-    test.args(SIMULATOR.map(|package| ["--package", package]).concat());
+    test.args(["test", "--workspace"]).args(targets);
     test
 }
 

@@ -22,7 +22,7 @@ fn programs() -> PathBuf {
 pub fn kerf_sim() -> Command {
     let program = programs().join("kerf-sim");
     let name = program.display();
-    assert!(program.exists(), "no {name}: `cargo build -p kerf-sim --profile sim` makes it");
+    assert!(program.exists(), "no {name}: `cargo build -p kerf-sim` makes it");
     Command::new(program)
 }
 
