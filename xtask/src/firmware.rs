@@ -68,11 +68,32 @@ pub fn build(board: Board, machine: Machine) -> Result<PathBuf> {
 
 /// Builds and checks the image without some of the board's features; returns where it lies.
 pub fn build_without(board: Board, machine: Machine, without: &[String]) -> Result<PathBuf> {
+    if board.is_rp2040() {
+        let features = features(board, machine, without)?;
+        return rp2040::build(&features, &image_without(board, machine, without));
+    }
+    compile(board, machine, without)?.finish()
+}
+
+/// What the compiler has written for an image, whose program is to be made smaller and linked: half a minute, in which the compiler may be
+/// at work on the next image.
+pub struct Compiled {
+    text: PathBuf,
+    linked: PathBuf,
+    image: PathBuf,
+}
+
+impl Compiled {
+    /// Links and checks the image; returns where it lies.
+    pub fn finish(&self) -> Result<PathBuf> {
+        make_small(&self.text, &self.linked, &self.image)
+    }
+}
+
+/// An image for AVR, compiled.
+pub fn compile(board: Board, machine: Machine, without: &[String]) -> Result<Compiled> {
     let features = features(board, machine, without)?;
     let image = image_without(board, machine, without);
-    if board.is_rp2040() {
-        return rp2040::build(&features, &image);
-    }
     let rust = Toolchain::find().context("no Rust that can build for AVR; `cargo xtask setup`")?;
     let target = target();
     let kept = target.join("kept").join(image.with_extension("").file_name().unwrap_or_default());
@@ -87,14 +108,19 @@ pub fn build_without(board: Board, machine: Machine, without: &[String]) -> Resu
     cargo.args(["--package", "kerf", "--bin", "kerf", "--no-default-features", "--features"]);
     cargo.arg(features);
     run(cargo.args(["--", "--emit"]).arg(format!("asm={}", text.display())))?;
-    make_small(&text, &linked, &image)
+    Ok(Compiled { text, linked, image })
 }
 
 /// Builds and checks the image of a board without any capability, dialects apart; returns where it lies.
 pub fn build_bare(board: Board) -> Result<PathBuf> {
+    compile_bare(board)?.finish()
+}
+
+/// The image of a board for AVR without any capability, dialects apart, compiled.
+pub fn compile_bare(board: Board) -> Result<Compiled> {
     let is_capability = |feature: &String| !feature.starts_with("dialect-");
     let without: Vec<_> = board.features()?.into_iter().filter(is_capability).collect();
-    build_without(board, Machine::default(), &without)
+    compile(board, Machine::default(), &without)
 }
 
 /// The Cargo features of an image, separated by commas: what the board's file says, but for some.

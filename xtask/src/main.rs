@@ -165,22 +165,36 @@ fn build(args: &BuildArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Images for AVR and for the RP2040 beside each other: most of the time of each is a link, which takes one core.
+/// Images for AVR and for the RP2040 beside each other: most of the time of each is a link, which takes one core. For AVR a program is made
+/// smaller beside the compilation of the next one.
 fn build_all() -> anyhow::Result<()> {
     setup::ensure(Scope::Arm)?;
     let (arm, avr): (Vec<_>, Vec<_>) = Board::all().iter().partition(|board| board.is_rp2040());
-    let each = |boards: &[Board]| {
-        boards.iter().try_for_each(|board| {
-            println!("elf: {}", firmware::build(*board, Machine::default())?.display());
-            anyhow::Ok(())
-        })
-    };
     std::thread::scope(|scope| {
-        let arm = scope.spawn(|| each(&arm));
-        let avr =
-            each(&avr).and_then(|()| firmware::build_bare(Board::Ramps14)).and_then(|_| examples());
-        arm.join().expect("a build does not panic").and(avr)
+        let arm = scope.spawn(|| {
+            arm.iter().try_for_each(|board| told(firmware::build(*board, Machine::default())?))
+        });
+        let (compiled, waiting) = std::sync::mpsc::channel::<firmware::Compiled>();
+        let smaller =
+            scope.spawn(|| waiting.into_iter().try_for_each(|image| told(image.finish()?)));
+        let all = avr.iter().map(|board| firmware::compile(*board, Machine::default(), &[]));
+        let avr = all
+            .chain(std::iter::once_with(|| firmware::compile_bare(Board::Ramps14)))
+            .try_for_each(|image| {
+                // Who has failed takes no more.
+                let _ = compiled.send(image?);
+                anyhow::Ok(())
+            })
+            .and_then(|()| examples());
+        drop(compiled);
+        let [arm, smaller] = [arm, smaller].map(|one| one.join().expect("a build does not panic"));
+        avr.and(arm).and(smaller)
     })
+}
+
+fn told(image: std::path::PathBuf) -> anyhow::Result<()> {
+    println!("elf: {}", image.display());
+    Ok(())
 }
 
 fn examples() -> anyhow::Result<()> {
