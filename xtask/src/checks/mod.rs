@@ -44,6 +44,13 @@ const WITH_IMAGES: &[Stage] = &[
     Stage { name: "simulated and emulated boards", run: simulator_tests },
 ];
 
+/// What needs the senders that are installed beside [`WITH_IMAGES`], or a browser.
+const WITH_SENDERS: &[Stage] = &[
+    Stage { name: "real senders", run: senders::run_short },
+    Stage { name: "real senders at the emulated RP2040", run: senders::run_emulated },
+    Stage { name: "the page in a browser", run: crate::web::test },
+];
+
 /// What of all packages together is tested without an image.
 const HOST_TARGETS: [&str; 8] =
     ["--lib", "--bins", "--test", "host", "--test", "capabilities", "--test", "seeds"];
@@ -60,11 +67,7 @@ pub fn run() -> Result<()> {
     let senders = Beside::start(&["senders", "--install"])?;
     WITH_IMAGES.iter().try_for_each(|one| stage(one.name, one.run))?;
     stage("senders, installed beside", || senders.wait())?;
-    stage("real senders", senders::run_short)?;
-    // An emulated board takes one core.
-    let page = Beside::start(&["web", "--test"])?;
-    stage("real senders at the emulated RP2040", senders::run_emulated)?;
-    stage("the page in a browser, tested beside", || page.wait())?;
+    WITH_SENDERS.iter().try_for_each(|one| stage(one.name, one.run))?;
     println!("\ncargo xtask test: all stages passed");
     Ok(())
 }
