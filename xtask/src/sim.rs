@@ -131,9 +131,6 @@ pub fn prepare(board: Board, machine: Machine) -> Result<PathBuf> {
         setup::ensure(Scope::Simulator)?;
     }
     let elf = firmware::build(board, machine)?;
-    if !program().exists() {
-        eprintln!("building the simulator: some minutes, this once");
-    }
     build()?;
     Ok(elf)
 }
@@ -195,17 +192,20 @@ pub fn report(elf: &Path, job: &Path, set: &[String], file: &Path) -> Result<()>
     run_child(command.arg(job).arg("--quiet").arg("--report").arg(file))
 }
 
-/// Builds the simulator; where it lies. Features are those of all packages together, so that no other package has to have what they
+/// Builds the simulator, [`program`]. Features are those of all packages together, so that no other package has to have what they
 /// share compiled again.
-pub fn build() -> Result<PathBuf> {
+pub fn build() -> Result<()> {
+    if !program().exists() {
+        eprintln!("building the simulator: some minutes, this once");
+    }
     let mut cargo = host_cargo();
     cargo.current_dir(root());
-    run_child(cargo.args(["build", "--quiet", "--workspace", "--bin", "kerf-sim"]))?;
-    Ok(program())
+    run_child(cargo.args(["build", "--quiet", "--workspace", "--bin", "kerf-sim"]))
 }
 
-fn program() -> PathBuf {
-    root().join("target/debug/kerf-sim")
+/// Where the simulator lies: beside this program, wherever cargo has been told to build.
+pub fn program() -> PathBuf {
+    std::env::current_exe().unwrap_or_default().with_file_name("kerf-sim")
 }
 
 fn simulator(verb: &str, elf: &Path, board: Board) -> Command {

@@ -144,7 +144,6 @@ pub fn run(args: &SendersArgs) -> Result<()> {
     if args.install {
         return Ok(());
     }
-    let program = sim::build()?;
     let mut senders = args.sender.map_or(Sender::value_variants().to_vec(), |one| vec![one]);
     if let Some(board) = args.board {
         ensure!(board == Board::PicoCnc, "senders have boards of their own, or pico-cnc");
@@ -156,6 +155,7 @@ pub fn run(args: &SendersArgs) -> Result<()> {
     for &sender in &senders {
         elves.push(sim::prepare(board_of(sender), Machine::default())?);
     }
+    let program = sim::program();
     // A printer's host sends what a printer prints.
     let print = folder.join("print.gcode");
     std::fs::write(&print, job::prints())?;
