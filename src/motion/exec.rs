@@ -164,8 +164,8 @@ pub struct Exec {
     hold: bool,
     /// Stretches are twice as long, but in long lines without a jerk limit.
     coarse: bool,
-    /// There too.
-    hurry: bool,
+    /// There is room for longer stretches.
+    long: bool,
     /// A pass in step with the spindle is to end at once.
     breaks_off: bool,
     dwell_ms: u32,
@@ -215,7 +215,7 @@ impl Exec {
             running,
             hold: false,
             coarse: false,
-            hurry: false,
+            long: true,
             breaks_off: false,
             dwell_ms: 0,
             follows: Follows::Nothing,
@@ -276,8 +276,14 @@ impl Exec {
     /// long too, and the governor looks at nothing that may wait.
     #[inline(always)]
     pub fn set_coarse(&mut self, coarse: bool, hurry: bool) {
-        (self.coarse, self.hurry) = (coarse || hurry, hurry);
+        self.coarse = coarse || hurry;
         self.governor.set_hurry(hurry);
+    }
+
+    /// Whether there is room for stretches that are twice as long.
+    #[inline(always)]
+    pub fn set_long(&mut self, long: bool) {
+        self.long = long;
     }
 
     /// Whether the block that runs has a jerk limit.
@@ -574,8 +580,8 @@ impl Exec {
         let stretch = if holds {
             self.governor.halt(running.left, &ahead, SEGMENT_S)
         } else {
-            let coarse = self.coarse && (running.jerk || running.short) || self.hurry;
-            let seconds = if coarse { 2.0 * SEGMENT_S } else { SEGMENT_S };
+            let coarse = self.coarse && (running.jerk || running.short) || self.governor.hurry;
+            let seconds = if coarse && self.long { 2.0 * SEGMENT_S } else { SEGMENT_S };
             self.governor.stretch(running.left, cruise, &ahead, seconds)
         };
         self.hand_out(&stretch, blocks, out, segment, |exec| {

@@ -124,8 +124,8 @@ impl<'a> Task<'a> {
     #[inline(never)]
     fn go_on(&mut self) -> Option<Next> {
         let Self { runner, common } = self;
-        while runner.is_due() {
-            let next = runner.turn(common);
+        while let Some(room) = runner.is_due() {
+            let next = runner.turn(room, common);
             if next != Next::Turn {
                 return Some(next);
             }
@@ -135,22 +135,23 @@ impl<'a> Task<'a> {
 }
 
 impl Runner<'_> {
-    /// Whether there is room for a segment, or a stop to be seen to.
+    /// What there is room for, if there is room for a segment, or a stop to be seen to.
     #[inline(always)]
-    fn is_due(&mut self) -> bool {
+    fn is_due(&mut self) -> Option<Room> {
         health::answer(Sign::Exec);
         self.waiting.update(self.segments.used());
-        let due = self.waiting.has_room() || stepper::is_stopped();
+        let room = self.waiting.room();
+        let due = room != Room::None || stepper::is_stopped();
         if due && self.asked {
             self.asked = false;
             self.waiting.go_on(exec::was_idle());
         }
-        due
+        due.then_some(room)
     }
 
     /// Does the next thing there is to do.
     #[inline(always)]
-    fn turn(&mut self, common: &mut InterruptEnd<Common>) -> Next {
+    fn turn(&mut self, room: Room, common: &mut InterruptEnd<Common>) -> Next {
         uart::stop_late();
         let released = self.blocks.released();
         let rested = self.rests;
@@ -158,6 +159,7 @@ impl Runner<'_> {
             contact::catch_up(&self.segments);
         }
         let standstill = !stepper::running();
+        self.machine.set_long(room == Room::Long);
         let step = common.with(|common| self.step(standstill, common));
         if self.blocks.released() != released {
             flags::set(Event::BlockDone);
@@ -337,7 +339,7 @@ impl Runner<'_> {
         // While somebody asks, a ramp in usual stretches would keep the answer away for 9 ms, and scans of one segment after the
         // other for 14.
         let asked = event::is_asked();
-        waiting.coarse = asked || passed_over > PATIENCE || waiting.is_busy();
+        waiting.coarse = short || asked || passed_over > PATIENCE || waiting.is_busy();
         let scans_too_long = asked && has_jerk && passed_over > PATIENCE_ASKED;
         self.machine.set_coarse(waiting.coarse, short || scans_too_long);
         if !rested {
@@ -348,7 +350,7 @@ impl Runner<'_> {
             return Next::Turn;
         }
         self.asked = true;
-        if waiting.has_room() { Next::Idle } else { Next::Room }
+        if waiting.room() == Room::None { Next::Room } else { Next::Idle }
     }
 }
 
@@ -422,7 +424,7 @@ struct Waiting {
     count: u8,
     /// How many wait at least.
     fewest: u8,
-    /// Stretches are twice as long.
+    /// Stretches are twice as long, if there is room for them.
     coarse: bool,
     /// How many wait, as far as that is known, and how long they take together.
     used: u8,
@@ -433,6 +435,17 @@ struct Waiting {
     moved: u8,
     /// How many segments in a row were used up before thread mode was idle.
     busy: u8,
+}
+
+/// What there is room for.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Room {
+    /// There is none for another segment.
+    None,
+    /// There is room for one of the usual length.
+    Usual,
+    /// There is room for one that is twice as long.
+    Long,
 }
 
 /// After this many of them in a row thread mode has no time left.
@@ -473,6 +486,8 @@ const SOON: u16 = units(20);
 /// A segment that takes so long may wait alone, except under a jerk limit, where a ramp takes long to lay out.
 const LONG: u16 = units(30);
 
+/// What a stretch takes, if it is no end of a block.
+const USUAL_LENGTH: u16 = units(20);
 /// What a stretch takes at most while thread mode is busy.
 const COARSE: u16 = units(40);
 
@@ -550,7 +565,7 @@ impl Waiting {
     fn is_short(&mut self, rests: bool) -> bool {
         self.moved = if rests { 0 } else { self.moved.saturating_add(1) };
         // The end of a block behind a long segment waits alone for a moment.
-        let is_end = self.fewest == 1 && self.length(2) >= LONG;
+        let is_end = self.fewest == 1 && self.length(1) < USUAL_LENGTH && self.length(2) >= LONG;
         let short = usize::from(self.moved) > SEGMENTS && self.sum < WAITING_SHORT && !is_end;
         if short {
             self.pressed = PRESSED_FOR;
@@ -568,13 +583,24 @@ impl Waiting {
 
     /// Whether another one may wait: what is queued cannot be slowed down any more, nor kept from beginning.
     #[inline(never)]
-    fn has_room(&self) -> bool {
-        if self.used < self.fewest || self.sum < SOON {
-            return self.used < SEGMENTS as u8 - 1;
+    fn room(&self) -> Room {
+        if self.used >= SEGMENTS as u8 - 1 {
+            return Room::None;
         }
-        let next = if self.coarse && self.fewest == 1 { COARSE } else { self.length(1) };
-        let sum = self.length(self.used + 1) + self.sum + next;
-        self.used < SEGMENTS as u8 - 1 && sum <= self.limits().most && !self.gives_way()
+        if self.used < self.fewest || self.sum < SOON {
+            return Room::Long;
+        }
+        let queued = self.length(self.used + 1) + self.sum;
+        let fits = |next| queued + next <= self.limits().most && !self.gives_way();
+        if self.coarse && self.fewest == 1 {
+            return match fits(COARSE) {
+                true => Room::Long,
+                // It costs as much, and thread mode has the rest: only if little waits.
+                false if self.sum < LONG && fits(USUAL_LENGTH) => Room::Usual,
+                false => Room::None,
+            };
+        }
+        if fits(self.length(1)) { Room::Long } else { Room::None }
     }
 }
 
