@@ -4,6 +4,16 @@
 //! speed come from exec's snapshot while something runs, from the G-code model when nothing does. Steps of one report
 //! or group share what was [`Seen`] when the first of them told of motion, [`Port::seen`].
 
+#[cfg(feature = "bed-plane")]
+mod bed;
+#[cfg(feature = "sd")]
+mod card;
+mod cycles;
+#[cfg(feature = "dialect-reprap")]
+mod extruder;
+mod settings;
+mod values;
+
 use kerf_macros::small;
 
 use core::cell::{OnceCell, RefMut};
@@ -11,7 +21,6 @@ use core::cell::{OnceCell, RefMut};
 use super::alarm;
 use super::common::{snapshot, with};
 use super::drivers;
-use super::health;
 use super::heat;
 use super::hold;
 use super::homing;
@@ -20,50 +29,32 @@ use super::overrides;
 use super::ports::{Port, RESET};
 use super::power;
 use super::setup::counted;
-use super::spindle;
 use super::switches;
-use super::turning;
-use crate::baud;
 use crate::boards::{MOTORS, inputs};
-use crate::capability::Capability;
 #[cfg(feature = "sd")]
 use crate::card::{Entry, Op};
 #[cfg(feature = "bed-plane")]
 use crate::config::bed::Bed;
 use crate::config::{Setting, Settings};
-#[cfg(feature = "bed-plane")]
-use crate::gcode::command::Feed;
 use crate::gcode::command::Motion;
-#[cfg(feature = "dialect-reprap")]
-use crate::gcode::heating::{Heat, Part, Wait};
-use crate::gcode::limits::is_near;
-#[cfg(feature = "bed-plane")]
-use crate::gcode::modal::MotionMode;
-use crate::gcode::modal::{Coolant, Turn};
 use crate::gcode::overrides::Change;
-use crate::gcode::printing::EXTRUDER;
-use crate::gcode::setup::{AxisMode, Setup};
 use crate::gcode::tables::TableRow;
 use crate::hal::Thread;
 use crate::hal::eeprom::Eeprom;
 use crate::hal::event::Event;
-use crate::hal::{flags, gpio, inputs as pins, stepper, uart, watchdog};
+use crate::hal::{flags, inputs as pins, stepper};
 use crate::heat::Standing;
 #[cfg(feature = "dialect-reprap")]
 use crate::heat::tune::Tune;
-use crate::jobs::{Job, LINE_MAX, STORED};
-use crate::machine::jog::Bar;
+use crate::jobs::LINE_MAX;
 use crate::machine::{self, Alarm, Cycle, Doing};
-use crate::motion::dynamics;
 use crate::motion::queue;
 use crate::motion::snapshot::{Moment, Program};
 #[cfg(feature = "bed-plane")]
 use crate::protocol::Level;
 #[cfg(feature = "dialect-reprap")]
 use crate::protocol::{Cold, Extruder};
-use crate::protocol::{
-    Hold, Machine, Memory, Remembers, Speech, Store, Value, Warning, thousandths,
-};
+use crate::protocol::{Hold, Machine, Memory, Remembers, Store, Value, Warning};
 use crate::status::Status;
 use crate::store::kept::ITEMS;
 use crate::store::program;
@@ -82,10 +73,6 @@ pub fn moves(doing: Doing, hold: Hold) -> bool {
 /// The least `qr` that is told. A full queue shows in responses that are not there yet; but a sender that is
 /// told of five or less (CNCjs) keeps the last response to itself, and forgets it if it is paused meanwhile.
 const QUEUE_FREE_MIN: usize = 6;
-
-/// The axis that follows the bed.
-#[cfg(feature = "bed-plane")]
-const Z: usize = 2;
 
 /// A look at the machine.
 pub struct View<'a> {
@@ -120,10 +107,6 @@ impl Seen {
 fn is_queued(links: &Links) -> bool {
     links.commands_taken.get() || queue::used() > 0
 }
-
-/// How much hotter than its target a heater may get in an autotune, eighths of a degree.
-#[cfg(feature = "dialect-reprap")]
-const OVERSHOOT: u16 = 80;
 
 #[small]
 impl<'a> View<'a> {
@@ -202,18 +185,8 @@ impl<'a> View<'a> {
         // An axis that moves no motor is where it should be.
         let at = counted(&self.settings, &self.motion().position, axis, None);
         #[cfg(feature = "bed-plane")]
-        let at = at.map(|at| self.lowered(axis, at));
+        let at = at.map(|at| bed::lowered(self, axis, at));
         at.unwrap_or(programmed)
-    }
-
-    /// Where an axis is in machine coordinates, its motor being there: Z may follow the bed.
-    #[cfg(feature = "bed-plane")]
-    #[inline(never)]
-    fn lowered(&self, axis: usize, at: Length) -> Length {
-        let Some(bed) = self.settings.followed_bed().filter(|_| axis == Z) else { return at };
-        let place = |axis| counted(&self.settings, &self.motion().position, axis, None);
-        let [x, y] = [0, 1].map(|axis| place(axis).unwrap_or(Length::ZERO));
-        bed.lowered_z(x, y, at)
     }
 
     /// `home`: 2 while homing, 1 when all axes that have a switch for it are homed.
@@ -310,34 +283,7 @@ impl<'a> View<'a> {
 
     /// S, thousandths of a turn a minute.
     fn programmed_speed(&self) -> i32 {
-        self.modal(Value::SpindleSpeed).min(2_000_000) * 1_000
-    }
-
-    #[small]
-    fn modal(&self, value: Value) -> i32 {
-        let model = self.links.model.borrow();
-        let modal = model.modal();
-        match value {
-            Value::Units => modal.units as i32,
-            Value::Plane => modal.plane as i32,
-            Value::Path => modal.path as i32,
-            Value::Distance => modal.distance as i32,
-            Value::ArcDistance => modal.arc_distance as i32,
-            Value::SpindleOn => i32::from(modal.spindle != Turn::Off),
-            Value::SpindleDirection => i32::from(modal.spindle == Turn::Counterclockwise),
-            Value::SpindleSpeed => model.spindle_speed() as i32,
-            Value::Mist => i32::from(modal.coolant & Coolant::Mist as u8 != 0),
-            Value::Flood => i32::from(modal.coolant & Coolant::Flood as u8 != 0),
-            Value::ToolOffset(axis) => {
-                model.tool_length().get(usize::from(axis)).map_or(0, |length| length.0)
-            }
-            Value::FeedMode => modal.feed_mode as i32,
-            Value::MotionMode => modal.motion as i32,
-            Value::Coordinates => model.coordinate_system().into(),
-            Value::Feed => thousandths(model.feed_rate()),
-            Value::BlockLine => model.line() as i32,
-            _ => 0,
-        }
+        values::modal(self, Value::SpindleSpeed).min(2_000_000) * 1_000
     }
 }
 
@@ -352,59 +298,7 @@ impl Machine for View<'_> {
     }
 
     fn set(&mut self, setting: Setting, value: i32) -> Result<Warning, Status> {
-        self.may_set()?;
-        if setting.is_cold() {
-            let is_encoder = turning::is_own(setting);
-            if is_encoder {
-                Capability::Lathe.check()?;
-            }
-            if setting.needs_rest() && self.is_busy() {
-                return Err(Status::NotAccepted);
-            }
-            self.links.storage.set_cold(setting, value)?;
-            if drivers::set(&mut self.settings, setting, value) {
-                set_hardware(self.links.thread, &self.settings);
-                return Ok(Warning::None);
-            }
-            if Capability::Printer.is_built_in() {
-                heat::set(&self.links.heat, &mut self.settings, setting, value);
-                // The planner asks for the extruder's lead.
-                self.links.changes.note(Changes::SETTINGS);
-            }
-            if is_encoder {
-                turning::set_up(self.links.thread, self.links.storage);
-                return Ok(Warning::None);
-            }
-            spindle::set(self.links.thread, setting, value);
-            return Ok(Warning::None);
-        }
-        if setting.needs_rest() {
-            if self.is_busy() {
-                return Err(Status::NotAccepted);
-            }
-            self.links.changes.note(Changes::STEPS);
-        }
-        if setting.is_baud() {
-            self.links.rate.set(baud::rate(value));
-        }
-        self.settings.store(setting, value);
-        let is_machine = setting.is_machine();
-        if is_machine {
-            self.settings.take_over(value as u8);
-        }
-        let drivers = dynamics::MachineLimits::drivers(&*self.settings);
-        let rate = |motors| drivers.step_rate_max(motors) as u32;
-        let lowered = self.settings.limit_velocity(setting, rate);
-        self.links.changes.note(Changes::SETTINGS);
-        self.note(setting, lowered || is_machine);
-        set_hardware(self.links.thread, &self.settings);
-        self.links.set_flow(&self.settings);
-        Ok(match lowered {
-            true => Warning::Velocity,
-            false if self.settings.has_idle_jerk(setting) => Warning::Jerk,
-            false if self.settings.has_fast_search(setting) => Warning::Search,
-            false => Warning::None,
-        })
+        settings::set(self, setting, value)
     }
 
     fn set_row(&mut self, row: TableRow, axis: u8, value: Length) -> Result<(), Status> {
@@ -421,84 +315,8 @@ impl Machine for View<'_> {
         overrides::change(self.links.thread, change);
     }
 
-    #[small]
     fn value(&mut self, value: Value) -> i32 {
-        match value {
-            Value::Working => self.has_work().into(),
-            Value::Running => self.motion().running.into(),
-            // Lines that move nothing are finished when all before them are.
-            Value::FinishedLine if !self.is_busy() => self.modal(Value::BlockLine),
-            Value::Flow => self.links.model.borrow().flow().into(),
-            Value::FinishedLine => self.motion().finished as i32,
-            Value::MotionLine => self.motion().line as i32,
-            Value::Velocity => thousandths(self.motion().velocity * 60.0),
-            Value::QueueFree => queue_free() as i32,
-            Value::BlocksFree => queue::free() as i32,
-            Value::QueueAdded => self.links.queue_count.take_added(),
-            Value::QueueRemoved => self.links.queue_count.take_removed(),
-            Value::SlotsFree => self.port.promise(&self.port.lines.borrow()).into(),
-            Value::BytesFree => uart::room(self.port.number).into(),
-            Value::MachinePosition(axis) => self.position(axis.into()).0,
-            Value::Position(axis) => {
-                let axis = axis.into();
-                self.position(axis).0.wrapping_sub(self.offset(axis).0)
-            }
-            Value::Offset(axis) => self.offset(axis.into()).0,
-            Value::Shift(axis) => {
-                self.links.model.borrow().shift().get(usize::from(axis)).map_or(0, |shift| shift.0)
-            }
-            Value::TableRow(row, axis) => self.links.storage.value(row, axis).0,
-            Value::Powered(motor) => i32::from(gpio::powered() >> motor & 1),
-            Value::Target(axis) => {
-                self.links.model.borrow().position().get(usize::from(axis)).map_or(0, |at| at.0)
-            }
-            Value::Steps(motor) => {
-                self.motion().position.get(usize::from(motor)).map_or(0, |at| *at)
-            }
-            Value::Homed(axis) => i32::from(self.links.model.borrow().is_homed(axis)),
-            Value::Override(which) => overrides::now(self.links.thread).factor(which).into(),
-            Value::OverrideOn(which) => overrides::now(self.links.thread).is_on(which).into(),
-            Value::Tool => self.links.model.borrow().tool().into(),
-            Value::Choice => self.port.choice.get() as i32,
-            Value::SelectedTool => self.links.model.borrow().selected_tool().into(),
-            Value::Input(input) => self.input(input),
-            Value::ProbeState => self.links.probe.state() as i32,
-            // Only answers of a dialect in order wait for that.
-            Value::ProbeUntold => {
-                let is_told = || self.port.number == self.links.told().number;
-                i32::from(Speech::HAS_QUESTION && self.links.probe.is_untold() && is_told())
-            }
-            // An axis that turns stands still in a probing move.
-            Value::Probed(axis) => {
-                let at = self.links.probe.at(axis);
-                at.unwrap_or_else(|| self.position(usize::from(axis))).0
-            }
-            Value::LimitHit => match self.links.notices.limits_hit.get() {
-                0 => -1,
-                hit => hit.trailing_zeros() as i32,
-            },
-            Value::Reset => watchdog::cause() as i32,
-            Value::SpindleSpeed => match turning::speed(self.links.thread) {
-                Some(speed) => speed,
-                None => self.programmed_speed(),
-            },
-            Value::SpindleProgrammed if Capability::Lathe.is_built_in() => self.programmed_speed(),
-            Value::PulsesPerTurn => turning::per_turn(self.links.thread).into(),
-            Value::SyncError => turning::error(self.links.thread).into(),
-            Value::Pass => turning::pass(self.links.thread) as i32,
-            Value::PulseMisfits => turning::misfits(self.links.thread).into(),
-            Value::Starvations => health::starvations().into(),
-            Value::Temperature(heater) => self.standing(heater).now.into(),
-            Value::WantedTemperature(heater) => self.standing(heater).to.into(),
-            Value::HeaterPower(heater) => i32::from(self.standing(heater).power) * 1_000 / 255,
-            Value::Kept => self.links.storage.is_done().into(),
-            Value::Home => self.home_state(),
-            Value::Door if !self.links.signs.door.get() => 0,
-            Value::Door => 1 + i32::from(machine::is_resuming()),
-            Value::Check => machine::is_checking().into(),
-            Value::Blamed => self.links.model.borrow().blamed().into(),
-            modal => self.modal(modal),
-        }
+        values::value(self, value)
     }
 
     fn moment(&mut self, first: bool) {
@@ -538,24 +356,7 @@ impl Machine for View<'_> {
     }
 
     fn restore(&mut self) -> Status {
-        if self.is_busy() {
-            return Status::NotAccepted;
-        }
-        let rate = self.settings.baud();
-        self.settings.set_defaults();
-        if self.settings.baud() != rate {
-            self.links.rate.set(baud::rate(self.settings.baud()));
-        }
-        self.report.restore();
-        self.links.changes.note(Changes::STEPS | Changes::SETTINGS);
-        self.links.storage.forget_cold();
-        drivers::recall(&mut self.settings, self.links.storage);
-        spindle::set_all(self.links.thread, self.links.storage);
-        heat::set_all(&self.links.heat, &mut self.settings, self.links.storage);
-        self.links.storage.note(0, ITEMS);
-        set_hardware(self.links.thread, &self.settings);
-        self.links.set_flow(&self.settings);
-        Status::Ok
+        settings::restore(self)
     }
 
     fn alarm(&mut self, alarm: Alarm) {
@@ -588,58 +389,15 @@ impl Machine for View<'_> {
     }
 
     fn start_job(&mut self, number: u8) -> Status {
-        let Some(job) = Job::new(number) else {
-            return Capability::Jobs.check().err().unwrap_or(Status::Error);
-        };
-        if !job.is_none() && self.is_busy() {
-            return Status::NotAccepted;
-        }
-        if number == STORED && program::check(&Eeprom::take()).is_none() {
-            return Status::Error;
-        }
-        self.links.job.set(job);
-        self.links.parser_wake.signal();
-        Status::Ok
+        cycles::start_job(self, number)
     }
 
     fn home(&mut self, axes: u8) -> Status {
-        let axes = homing::axes(&self.settings) & axes;
-        if axes == 0 {
-            return Status::HomingSwitches;
-        }
-        if let Err(status) = self.may_begin() {
-            return status;
-        }
-        for axis in (0..homing::AXES).filter(|axis| axes & 1 << axis != 0) {
-            if let Err(status) = homing::of(&self.settings, axis) {
-                self.links.model.borrow_mut().blame(axis);
-                self.links.except(status);
-                return status;
-            }
-        }
-        self.links.model.borrow_mut().cancel_motion();
-        self.begin(Motion::Home { axes, set: true }, machine::Event::Homing)
+        cycles::home(self, axes)
     }
 
     fn check(&mut self, on: bool) -> Status {
-        if on == machine::is_checking() {
-            return Status::Ok;
-        }
-        let alarm = machine::alarm();
-        if alarm != Alarm::None {
-            return alarm.status();
-        }
-        // Check mode is no work; a hold in it is.
-        let links = self.links;
-        let waits = self.has_others() || links.chain_waits.get();
-        let works = machine::is_held() || self.has_work() || waits;
-        // What an alarm or a `^d` switches off is off.
-        let runs =
-            self.modal(Value::SpindleOn) + self.modal(Value::Mist) + self.modal(Value::Flood);
-        if works || (on && runs != 0) {
-            return Status::NotAccepted;
-        }
-        self.begin(Motion::Check, if on { machine::Event::Check } else { machine::Event::Done })
+        cycles::check(self, on)
     }
 
     fn heater(&mut self, heater: u8) -> Option<Standing> {
@@ -672,68 +430,12 @@ impl Machine for View<'_> {
 
     #[cfg(feature = "dialect-reprap")]
     fn extruder(&mut self, what: Extruder) -> Status {
-        let (links, alarm) = (self.links, machine::alarm());
-        let mut model = links.model.borrow_mut();
-        match what {
-            Extruder::Relative(relative) => model.set_relative(relative),
-            Extruder::Flow(flow) => model.set_flow(flow),
-            Extruder::LeaveOut => model.leave_out(true),
-            _ if alarm != Alarm::None => return alarm.status(),
-            _ if machine::is_checking() => {}
-            _ if links.commands_taken.get() || machine::is_flushing() => return Status::Again,
-            Extruder::Advance(time) => {
-                let Some(heating) = self.settings.heating.first_mut() else {
-                    return Status::NotBuiltIn;
-                };
-                heating.advance = time;
-                // The planner tells exec before the next line.
-                links.changes.note(Changes::SETTINGS);
-            }
-            Extruder::Move { by, feed } => {
-                heat::has_extruder(&mut self.settings);
-                if let Err(status) = Setup::extrudes(&*self.settings) {
-                    return status;
-                }
-                let done = model.extrude(by, feed as f32, &mut links.commands.borrow_mut());
-                if let Err(status) = done {
-                    return status;
-                }
-                links.commands_taken.set(true);
-                links.planner_wake.signal();
-            }
-        }
-        Status::Ok
+        extruder::extruder(self, what)
     }
 
     #[cfg(feature = "dialect-reprap")]
     fn tune(&mut self, heater: u8, to: u16, cycles: u8, uses: bool) -> Status {
-        let (links, alarm) = (self.links, machine::alarm());
-        let part = if heater == 0 { Part::HotEnd } else { Part::Bed };
-        if alarm != Alarm::None {
-            return alarm.status();
-        }
-        if !self.may_feed() {
-            return Status::Muted;
-        }
-        if let Err(status) = Setup::heats(&*self.settings, part) {
-            return status;
-        }
-        if to.saturating_add(OVERSHOOT) > Setup::hottest(&*self.settings, part) {
-            return Status::AboveMaximum;
-        }
-        if machine::is_checking() {
-            return Status::Ok;
-        }
-        if links.commands_taken.get() || machine::is_flushing() {
-            return Status::Again;
-        }
-        heat::ask_tune(&links.heat, cycles, uses);
-        let mut commands = links.commands.borrow_mut();
-        commands.clear();
-        commands.motion = Motion::Heat(Heat { part, to: Some(to), wait: Wait::Tuned });
-        links.commands_taken.set(true);
-        links.planner_wake.signal();
-        Status::Ok
+        extruder::tune(self, heater, to, cycles, uses)
     }
 
     #[cfg(feature = "dialect-reprap")]
@@ -748,26 +450,7 @@ impl Machine for View<'_> {
 
     #[cfg(feature = "sd")]
     fn card(&mut self, what: Op<'_>) -> Status {
-        let mut card = self.links.card.borrow_mut();
-        let disturbs = matches!(what, Op::Begin | Op::Release | Op::Open(_) | Op::Delete(_));
-        if disturbs && card.prints() {
-            return Status::NotAccepted;
-        }
-        match what {
-            Op::Begin => card.begin(),
-            Op::Release => {
-                card.release();
-                Status::Ok
-            }
-            Op::Open(name) => card.open(name),
-            Op::Seek(at) => card.seek(at),
-            Op::Delete(name) => card.delete(name),
-            Op::Print(true) if machine::is_alarmed() => machine::alarm().status(),
-            Op::Print(prints) => {
-                self.links.parser_wake.signal();
-                card.print(prints)
-            }
-        }
+        card::card(self, what)
     }
 
     #[cfg(feature = "sd")]
@@ -793,41 +476,7 @@ impl Machine for View<'_> {
 
     #[cfg(feature = "bed-plane")]
     fn level(&mut self, what: Level) -> Status {
-        let (links, alarm) = (self.links, machine::alarm());
-        if alarm != Alarm::None {
-            return alarm.status();
-        }
-        if !self.may_feed() {
-            return Status::Muted;
-        }
-        if machine::is_checking() {
-            return Status::NotAccepted;
-        }
-        if links.commands_taken.get() || machine::is_flushing() {
-            return Status::Again;
-        }
-        let mut model = links.model.borrow_mut();
-        let mut target = *model.position();
-        if let Level::Go(to) | Level::Probe(to) = what {
-            target.iter_mut().zip(to).for_each(|(place, to)| *place = to);
-            if !is_near(&target, &*self.settings) {
-                return Status::OutOfRange;
-            }
-        }
-        let mut commands = links.commands.borrow_mut();
-        commands.clear();
-        commands.motion = match what {
-            Level::Follow(follows) => Motion::FollowBed(follows),
-            Level::Go(_) => Motion::Traverse { target },
-            Level::Probe(_) => {
-                let feed = Feed::PerMinute(self.settings.latch_velocity(Z));
-                Motion::Probe { target, feed, mode: MotionMode::ProbeTowards }
-            }
-        };
-        model.set_position(&target);
-        links.commands_taken.set(true);
-        links.planner_wake.signal();
-        Status::Ok
+        bed::level(self, what)
     }
 
     #[cfg(feature = "dialect-reprap")]
@@ -842,32 +491,7 @@ impl Machine for View<'_> {
     }
 
     fn jog(&mut self, axis: u8, place: Length) -> Status {
-        if Setup::mode(&*self.settings, axis) == AxisMode::Disabled {
-            return Status::AxisDisabled;
-        }
-        if self.links.signs.jogs.get() != Bar::Open {
-            return Status::Terminated;
-        }
-        if usize::from(axis) == EXTRUDER
-            && let Err(status) = Setup::extrudes(&*self.settings)
-        {
-            return status;
-        }
-        if let Err(status) = self.may_begin() {
-            return status;
-        }
-        let model = self.links.model.borrow();
-        let mut target = *model.position();
-        let travel = self.settings.travel(axis).filter(|_| model.is_homed(axis));
-        drop(model);
-        let near = is_near(&target, &*self.settings);
-        if let Some(at) = target.get_mut(usize::from(axis)) {
-            *at = travel.map_or(place, |(low, high)| place.max(low).min(high));
-        }
-        if !near || !is_near(&target, &*self.settings) {
-            return Status::OutOfRange;
-        }
-        self.begin(Motion::Jog { target }, machine::Event::Jog)
+        cycles::jog(self, axis, place)
     }
 
     fn store(&mut self, what: Store<'_>) -> Result<(), Status> {

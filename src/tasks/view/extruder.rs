@@ -1,0 +1,86 @@
+//! What printing hosts do beside G-code: the extruder's modes and moves, autotune of heaters.
+
+use kerf_macros::small;
+
+use super::View;
+use crate::gcode::command::Motion;
+use crate::gcode::heating::{Heat, Part, Wait};
+use crate::gcode::setup::Setup;
+use crate::machine::{self, Alarm};
+use crate::protocol::Extruder;
+use crate::status::Status;
+use crate::tasks::heat;
+use crate::tasks::links::Changes;
+
+/// How much hotter than its target a heater may get in an autotune, eighths of a degree.
+const OVERSHOOT: u16 = 80;
+
+/// Changes a mode of the extruder, or moves it.
+#[small]
+#[inline(always)]
+pub(super) fn extruder(view: &mut View<'_>, what: Extruder) -> Status {
+    let (links, alarm) = (view.links, machine::alarm());
+    let mut model = links.model.borrow_mut();
+    match what {
+        Extruder::Relative(relative) => model.set_relative(relative),
+        Extruder::Flow(flow) => model.set_flow(flow),
+        Extruder::LeaveOut => model.leave_out(true),
+        _ if alarm != Alarm::None => return alarm.status(),
+        _ if machine::is_checking() => {}
+        _ if links.commands_taken.get() || machine::is_flushing() => return Status::Again,
+        Extruder::Advance(time) => {
+            let Some(heating) = view.settings.heating.first_mut() else {
+                return Status::NotBuiltIn;
+            };
+            heating.advance = time;
+            // The planner tells exec before the next line.
+            links.changes.note(Changes::SETTINGS);
+        }
+        Extruder::Move { by, feed } => {
+            heat::has_extruder(&mut view.settings);
+            if let Err(status) = Setup::extrudes(&*view.settings) {
+                return status;
+            }
+            let done = model.extrude(by, feed as f32, &mut links.commands.borrow_mut());
+            if let Err(status) = done {
+                return status;
+            }
+            links.commands_taken.set(true);
+            links.planner_wake.signal();
+        }
+    }
+    Status::Ok
+}
+
+/// Begins an autotune of a heater.
+#[small]
+#[inline(always)]
+pub(super) fn tune(view: &mut View<'_>, heater: u8, to: u16, cycles: u8, uses: bool) -> Status {
+    let (links, alarm) = (view.links, machine::alarm());
+    let part = if heater == 0 { Part::HotEnd } else { Part::Bed };
+    if alarm != Alarm::None {
+        return alarm.status();
+    }
+    if !view.may_feed() {
+        return Status::Muted;
+    }
+    if let Err(status) = Setup::heats(&*view.settings, part) {
+        return status;
+    }
+    if to.saturating_add(OVERSHOOT) > Setup::hottest(&*view.settings, part) {
+        return Status::AboveMaximum;
+    }
+    if machine::is_checking() {
+        return Status::Ok;
+    }
+    if links.commands_taken.get() || machine::is_flushing() {
+        return Status::Again;
+    }
+    heat::ask_tune(&links.heat, cycles, uses);
+    let mut commands = links.commands.borrow_mut();
+    commands.clear();
+    commands.motion = Motion::Heat(Heat { part, to: Some(to), wait: Wait::Tuned });
+    links.commands_taken.set(true);
+    links.planner_wake.signal();
+    Status::Ok
+}

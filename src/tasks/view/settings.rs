@@ -1,0 +1,100 @@
+//! What a setting that changes has to tell, and the defaults.
+
+use kerf_macros::small;
+
+use super::{View, set_hardware};
+use crate::baud;
+use crate::capability::Capability;
+use crate::config::Setting;
+use crate::motion::dynamics;
+use crate::protocol::{Remembers, Warning};
+use crate::status::Status;
+use crate::store::kept::ITEMS;
+use crate::tasks::drivers;
+use crate::tasks::heat;
+use crate::tasks::links::Changes;
+use crate::tasks::spindle;
+use crate::tasks::turning;
+
+/// Changes a setting, and tells all that go by it.
+#[small]
+#[inline(always)]
+pub(super) fn set(view: &mut View<'_>, setting: Setting, value: i32) -> Result<Warning, Status> {
+    view.may_set()?;
+    if setting.is_cold() {
+        let is_encoder = turning::is_own(setting);
+        if is_encoder {
+            Capability::Lathe.check()?;
+        }
+        if setting.needs_rest() && view.is_busy() {
+            return Err(Status::NotAccepted);
+        }
+        view.links.storage.set_cold(setting, value)?;
+        if drivers::set(&mut view.settings, setting, value) {
+            set_hardware(view.links.thread, &view.settings);
+            return Ok(Warning::None);
+        }
+        if Capability::Printer.is_built_in() {
+            heat::set(&view.links.heat, &mut view.settings, setting, value);
+            // The planner asks for the extruder's lead.
+            view.links.changes.note(Changes::SETTINGS);
+        }
+        if is_encoder {
+            turning::set_up(view.links.thread, view.links.storage);
+            return Ok(Warning::None);
+        }
+        spindle::set(view.links.thread, setting, value);
+        return Ok(Warning::None);
+    }
+    if setting.needs_rest() {
+        if view.is_busy() {
+            return Err(Status::NotAccepted);
+        }
+        view.links.changes.note(Changes::STEPS);
+    }
+    if setting.is_baud() {
+        view.links.rate.set(baud::rate(value));
+    }
+    view.settings.store(setting, value);
+    let is_machine = setting.is_machine();
+    if is_machine {
+        view.settings.take_over(value as u8);
+    }
+    let drivers = dynamics::MachineLimits::drivers(&*view.settings);
+    let rate = |motors| drivers.step_rate_max(motors) as u32;
+    let lowered = view.settings.limit_velocity(setting, rate);
+    view.links.changes.note(Changes::SETTINGS);
+    view.note(setting, lowered || is_machine);
+    set_hardware(view.links.thread, &view.settings);
+    view.links.set_flow(&view.settings);
+    Ok(match lowered {
+        true => Warning::Velocity,
+        false if view.settings.has_idle_jerk(setting) => Warning::Jerk,
+        false if view.settings.has_fast_search(setting) => Warning::Search,
+        false => Warning::None,
+    })
+}
+
+/// Sets all settings to their defaults.
+#[small]
+#[inline(always)]
+pub(super) fn restore(view: &mut View<'_>) -> Status {
+    if view.is_busy() {
+        return Status::NotAccepted;
+    }
+    let rate = view.settings.baud();
+    view.settings.set_defaults();
+    if view.settings.baud() != rate {
+        view.links.rate.set(baud::rate(view.settings.baud()));
+    }
+    view.report.restore();
+    view.links.changes.note(Changes::STEPS | Changes::SETTINGS);
+    view.links.storage.forget_cold();
+    drivers::recall(&mut view.settings, view.links.storage);
+    spindle::set_all(view.links.thread, view.links.storage);
+    heat::set_all(&view.links.heat, &mut view.settings, view.links.storage);
+    view.links.storage.note(0, ITEMS);
+    set_hardware(view.links.thread, &view.settings);
+    view.links.set_flow(&view.settings);
+    Status::Ok
+}
