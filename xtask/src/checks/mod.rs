@@ -36,19 +36,12 @@ const WITHOUT_IMAGES: &[Stage] = &[
     Stage { name: "tests of simulated boards, built", run: build_simulator_tests },
 ];
 
-/// What needs the images. Senders are installed beside it: most of that time is a network's.
+/// What needs the images. Senders are installed beside it, which is mostly a network's time, and the page is built.
 const WITH_IMAGES: &[Stage] = &[
     Stage { name: "an image without capabilities", run: without_capabilities },
     Stage { name: "sizes and stack of every board", run: size_all },
     Stage { name: "the emulator of the RP2040", run: emulator::test },
     Stage { name: "simulated and emulated boards", run: simulator_tests },
-];
-
-/// What needs the senders that are installed beside [`WITH_IMAGES`], or a browser.
-const WITH_SENDERS: &[Stage] = &[
-    Stage { name: "real senders", run: senders::run_short },
-    Stage { name: "real senders at the emulated RP2040", run: senders::run_emulated },
-    Stage { name: "the page in a browser", run: crate::web::test },
 ];
 
 /// What of all packages together is tested without an image.
@@ -65,9 +58,15 @@ pub fn run() -> Result<()> {
     WITHOUT_IMAGES.iter().try_for_each(|one| stage(one.name, one.run))?;
     stage("the images", || images.wait())?;
     let senders = Beside::start(&["senders", "--install"])?;
+    let page = Beside::start(&["web"])?;
     WITH_IMAGES.iter().try_for_each(|one| stage(one.name, one.run))?;
     stage("senders, installed beside", || senders.wait())?;
-    WITH_SENDERS.iter().try_for_each(|one| stage(one.name, one.run))?;
+    stage("the page, built beside", || page.wait())?;
+    stage("real senders", senders::run_short)?;
+    // The emulated board of a session takes one core, the page the other one.
+    let page = Beside::start(&["web", "--test"])?;
+    stage("real senders at the emulated RP2040", senders::run_emulated)?;
+    stage("the page in a browser, tested beside", || page.wait())?;
     println!("\ncargo xtask test: all stages passed");
     Ok(())
 }
