@@ -6,8 +6,8 @@
 /// takes 25,000 of it: G76 6,000, for its words, its geometry and powers of floats, G33.1 3,300, X that leaves the cut in what is queued already 600. The chip has 253,952, which its largest
 /// boot loader, 8 KiB, leaves: the rest is not for what is to come, that has to find its room. Calls through a pointer reach 128 KiB; the
 /// linker leads those that go further through jumps at the beginning of the image (`.trampolines`). The last 300 are for the board of the printer: the watchdog
-/// looks whether ticks interrupt, G-code waits for the end of a jog, motors of very fine steps merge no lines, and the step stream outlasts looks ahead
-/// at high step rates (200).
+/// looks whether ticks interrupt, G-code waits for the end of a jog, motors of very fine steps merge no lines, and exec makes a usual segment where a
+/// long one does not fit (200).
 pub const FLASH: u64 = 253_700;
 /// `.data`: constants that landed in RAM; tables and text belong in program memory. In the image with an SD card the messages of `embedded-sdmmc`,
 /// which nobody reads, take 240 of it; the others have less than 400.

@@ -4,10 +4,7 @@
 //!
 //! `KERF_SEED` and `KERF_CASES` choose the jobs: `KERF_CASES=1000` for a thousand.
 
-use std::collections::VecDeque;
 use std::fmt::Write;
-use std::sync::Mutex;
-use std::thread;
 
 use kerf::boards::MEGA2560_GRBL;
 use kerf_sim::job::{self, Options};
@@ -17,10 +14,10 @@ use proptest::strategy::ValueTree;
 use crate::common::firmware;
 use crate::seeds;
 
-/// Jobs unless asked otherwise: about two minutes on two cores.
+/// Jobs unless asked otherwise: half a minute on two cores.
 const CASES: u64 = 50;
 
-/// Of those with holds and overrides: about a minute.
+/// Of those with holds and overrides: some seconds.
 const DISTURBED: u64 = 12;
 
 /// Of those with lines shorter than a step: a quarter of a minute.
@@ -227,8 +224,8 @@ impl Job {
     }
 }
 
-/// Plays the job of a seed; what is wrong with it.
-fn play(seed: u64, any: impl Strategy<Value = Job>) -> Option<String> {
+/// Plays the job of a seed.
+fn play(seed: u64, any: impl Strategy<Value = Job>) -> Result<(), String> {
     let (tree, _) = seeds::case(seed, &any);
     let job = tree.current();
     let interjections = job.said.clone();
@@ -237,51 +234,26 @@ fn play(seed: u64, any: impl Strategy<Value = Job>) -> Option<String> {
     let lines = job::lines_of(&job.text());
     let report = job::run(&mut machine, &lines, &options, |_| {}).map_err(|why| why.to_string());
     let problems = match report {
-        Ok(report) if report.ok => return None,
+        Ok(report) if report.ok => return Ok(()),
         Ok(report) => report.problems.join("; "),
         Err(why) => why,
     };
     let Job { jerk, accel, per_mm, .. } = job;
     let lines = lines.len();
-    Some(format!(
-        "seed {seed}, jerk {jerk}, {accel} mm/s2, {per_mm} steps/mm, {lines} lines: {problems}"
-    ))
+    Err(format!("jerk {jerk}, {accel} mm/s2, {per_mm} steps/mm, {lines} lines: {problems}"))
 }
 
 #[test]
 fn random_jobs_have_no_pause_and_end_exactly() {
-    play_all(CASES, |seed| play(seed, any_job()));
+    seeds::try_all(CASES, |seed| play(seed, any_job()));
 }
 
 #[test]
 fn holds_and_overrides_at_high_step_rates_make_no_pause() {
-    play_all(DISTURBED, |seed| play(seed, fast_job()));
+    seeds::try_all(DISTURBED, |seed| play(seed, fast_job()));
 }
 
 #[test]
 fn lines_shorter_than_a_step_make_no_pause() {
-    play_all(BRIEF, |seed| play(seed, brief_job()));
-}
-
-/// Plays as many as there are to be, two at a time.
-fn play_all(cases: u64, play: impl Fn(u64) -> Option<String> + Sync) {
-    let seeds = seeds::seeds(cases);
-    let waiting: Mutex<VecDeque<u64>> = Mutex::new(seeds.clone().collect());
-    let wrong = Mutex::new(Vec::new());
-    let work = || {
-        loop {
-            let next = waiting.lock().unwrap().pop_front();
-            let Some(seed) = next else { return };
-            // Before the lock is taken: under it the threads would take turns.
-            let problem = play(seed);
-            wrong.lock().unwrap().extend(problem);
-        }
-    };
-    thread::scope(|scope| {
-        scope.spawn(work);
-        scope.spawn(work);
-    });
-    let wrong = wrong.into_inner().unwrap();
-    let (count, of) = (wrong.len(), seeds.count());
-    assert!(wrong.is_empty(), "{count} of {of} jobs:\n{}", wrong.join("\n"));
+    seeds::try_all(BRIEF, |seed| play(seed, brief_job()));
 }
