@@ -7,7 +7,7 @@ use kerf::motion::block::{Line as Move, QueuedAction};
 use kerf::motion::dynamics::Dynamics;
 use kerf::motion::exec::BLOCK_S_MIN;
 use kerf::motion::factors::Factors;
-use kerf::motion::junction::{self, Heading, ONE};
+use kerf::motion::junction::{self, Heading, ONE, Velocities};
 use kerf::motion::line::STEPS_MAX;
 use kerf::motion::line::{Builder, Built, Line};
 use kerf::units::{AXES, FIRST_ROTARY, Length, PerAxis};
@@ -307,7 +307,8 @@ fn junction_velocities() {
     for start in [0.0, 30.0, 200.0] {
         let corner = |angle: f64| {
             let (a, b) = (heading(start), heading(start + angle));
-            60.0 * junction::limit(&a, &b, 1e5 / 3600.0, 1e9)
+            let velocities = Velocities { cruise: 1e9, top: 1e9 };
+            60.0 * junction::limit(&a, &b, 1e5 / 3600.0, velocities)
         };
         for (angle, velocity) in [
             (10.0, 1144.10),

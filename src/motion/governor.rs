@@ -17,7 +17,7 @@
 pub use super::constraint::Ahead;
 use super::constraint::Clear;
 use super::exec::SEGMENT_S;
-use super::float::{greater, scaled, some};
+use super::float::{below, greater, scaled, some};
 use super::ramp::{Phase, Ramp};
 use super::rise::MARGIN_FIRST;
 use super::slice::Rest;
@@ -41,9 +41,9 @@ pub const ACCEL_MOST: f32 = 1e6;
 /// A jerk limit that takes the acceleration to its limit in less is none: stretches are no shorter.
 pub(super) const JERK_TIME_MIN: f32 = 0.001;
 
-/// The jerk to put into a block, 0 for none; `accel` is its acceleration. Cost: 500.
+/// The jerk to put into a block, 0 for none; `accel` is its acceleration. Neither is negative. Cost: 160.
 pub fn effective_jerk(jerk: f32, accel: f32) -> f32 {
-    if jerk > 0.0 && accel > jerk * JERK_TIME_MIN { jerk } else { 0.0 }
+    if some(jerk) && below(jerk * JERK_TIME_MIN, accel) { jerk } else { 0.0 }
 }
 
 /// Whether two limits are equal, or one velocity is the other. Cost: 15.

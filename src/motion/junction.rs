@@ -9,7 +9,8 @@
 use kerf_macros::small;
 
 use super::dynamics::Dynamics;
-use super::float::{OCTAVE, below, log, scaled, some};
+use super::float::{below, scaled, some};
+use super::short::{Log, OCTAVE, Short};
 use crate::hal::arithmetic::product;
 use crate::math::sqrt;
 use crate::units::PerAxis;
@@ -20,13 +21,19 @@ const STRAIGHT: u32 = 1000;
 /// Beyond this the direction is reversed, about 0.4 degree from it; rounding decides what is left.
 const REVERSED: f32 = 1.0 - 1e-5;
 
+/// Changes of direction beyond this, some 30 degrees, are not for [`rough`]: the square of one, in 2^-28.
+const WIDE: u32 = 1 << 26;
+/// The logarithm of the square of the velocity of a corner, less those of deviation and acceleration and with that of the square of the
+/// change of direction, in 2^-28: `c (1 + c) = 1.9` at [`WIDE`], a quarter of the square, and what the logarithms are off.
+const STRAIGHT_ON: i16 = 30 * OCTAVE + 238 - 27;
+
 /// The direction of a move.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Heading {
     /// How far each axis travels for a unit of the path, in 2^-14: up to [`ONE`].
     pub unit: PerAxis<i16>,
     /// Junction deviation in this direction, mm.
-    pub deviation: f32,
+    pub deviation: Short,
 }
 
 /// 1 in the units of a heading.
@@ -34,19 +41,19 @@ pub const ONE: i16 = 1 << 14;
 
 /// The junction deviation along `unit`. Cost: 150 where all axes that move have the same, else
 /// 1,000 + 900 for each axis that moves.
-pub fn deviation(unit: &PerAxis<i16>, dynamics: &Dynamics) -> f32 {
+pub fn deviation(unit: &PerAxis<i16>, dynamics: &Dynamics) -> Short {
     let mut same = None;
     for (&u, axis) in unit.iter().zip(&dynamics.axes) {
         if u != 0 && *same.get_or_insert(axis.deviation) != axis.deviation {
             return mean_deviation(unit, dynamics);
         }
     }
-    same.unwrap_or_default().get()
+    same.unwrap_or_default()
 }
 
 #[inline(never)]
 #[small]
-fn mean_deviation(unit: &PerAxis<i16>, dynamics: &Dynamics) -> f32 {
+fn mean_deviation(unit: &PerAxis<i16>, dynamics: &Dynamics) -> Short {
     let (mut norm, mut sum) = (0.0, 0.0);
     for (&u, axis) in unit.iter().zip(&dynamics.axes) {
         if u != 0 {
@@ -56,39 +63,58 @@ fn mean_deviation(unit: &PerAxis<i16>, dynamics: &Dynamics) -> f32 {
             sum += part * part;
         }
     }
-    if some(norm) { sqrt(sum / norm) } else { 0.0 }
+    if some(norm) { Short::new(sqrt(sum / norm)) } else { Short::ZERO }
+}
+
+/// How fast the blocks on both sides of a corner may be run, mm/s.
+#[derive(Clone, Copy, Debug)]
+pub struct Velocities {
+    /// At 100 %, or less.
+    pub cruise: f32,
+    /// Under any override.
+    pub top: f32,
 }
 
 /// The highest velocity from heading `a` into heading `b`, mm/s, with the junction `acceleration`,
-/// mm/s^2: 0 for a reversal, [`f32::MAX`] straight on, or where it is above `most`.
+/// mm/s^2: 0 for a reversal, [`f32::MAX`] straight on, or where it is above the top. Where it is above the cruise velocity, so
+/// that only an override asks for it, it is up to a tenth too low.
 ///
 /// The axes' velocities change by `(b.unit - a.unit) * velocity`, also where the two paths are
 /// measured differently (linear, rotary, both), so that it is this difference that counts.
 ///
-/// Cost: 350 + 50 for each axis that moves where the corner is plainly no limit, else 800 more; 1,600
-/// more for one below `most`.
+/// Cost: 400 + 50 for each axis that moves; 2,000 more for one that limits the cruise velocity.
 #[inline(never)]
-pub fn limit(a: &Heading, b: &Heading, acceleration: f32, most: f32) -> f32 {
+pub fn limit(a: &Heading, b: &Heading, acceleration: f32, velocities: Velocities) -> f32 {
     let sum = turn(&a.unit, &b.unit);
     if sum < STRAIGHT {
         return f32::MAX;
     }
-    let same = a.deviation.to_bits() == b.deviation.to_bits();
-    // Far below what limits: 4 product > sum most^2, with an octave for the logarithms' error.
-    let plain = |sum: i32| {
-        let limit = log(a.deviation) + log(acceleration) + 2 * OCTAVE;
-        sum + 2 * log(most) + OCTAVE < limit
-    };
-    if same && sum < 1 << 16 && plain(-12 * OCTAVE) {
-        return f32::MAX;
+    let same = a.deviation == b.deviation;
+    if same && sum < WIDE {
+        let rough = rough(sum, a.deviation, Short::new(acceleration));
+        if rough >= Short::above(velocities.top) {
+            return f32::MAX;
+        }
+        if rough >= Short::above(velocities.cruise) {
+            return rough.get();
+        }
     }
-    // The square of twice the sine.
-    let sum = scaled(sum as f32, -28);
-    if same && below(sum, 1.44) && plain(log(sum)) {
-        return f32::MAX;
+    let (a, b) = (a.deviation.get(), b.deviation.get());
+    let deviation = if same { a } else { mean(a, b) };
+    // The square of the sine of half the angle.
+    let sine = scaled(sum as f32, -30);
+    arc(sine, deviation * acceleration, velocities.top)
+}
+
+/// The velocity of a corner that is not [`WIDE`], or up to a tenth less, by logarithms: what [`arc`] says for a cosine of 1, less what
+/// that may be off. Cost: 170.
+#[inline(never)]
+fn rough(sum: u32, deviation: Short, acceleration: Short) -> Short {
+    if deviation == Short::ZERO || acceleration == Short::ZERO {
+        return Short::ZERO;
     }
-    let deviation = if same { a.deviation } else { mean(a.deviation, b.deviation) };
-    arc(scaled(sum, -2), deviation * acceleration, most)
+    let product = deviation.log().0 + acceleration.log().0;
+    Log((product + STRAIGHT_ON - Log::of_wide(sum).0) / 2).power()
 }
 
 /// The square of the change of direction, in 2^-28.
@@ -126,4 +152,32 @@ fn arc(sine: f32, product: f32, most: f32) -> f32 {
     // Radius = deviation * c / (1 - c) with c = cos(angle / 2).
     let cosine = sqrt(1.0 - sine);
     sqrt(product * cosine * (1.0 + cosine) / sine)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn rough_corners_are_up_to_a_tenth_slower(
+            angle in 0.002f64..0.5, start in 0f64..6.3, deviation in 1e-4f32..10.0, acceleration in 1f32..1e6,
+        ) {
+            let deviation = Short::new(deviation);
+            let heading = |angle: f64| {
+                let (y, x) = angle.sin_cos();
+                let unit = [x, y, 0.0, 0.0, 0.0, 0.0].map(|u| (u * f64::from(ONE)).round() as i16);
+                Heading { unit, deviation }
+            };
+            let (a, b) = (heading(start), heading(start + angle));
+            let at = |cruise, top| limit(&a, &b, acceleration, Velocities { cruise, top });
+            let exact = at(1e20, 1e20);
+            prop_assume!(exact != f32::MAX);
+            let rough = at(0.0, 1e20);
+            prop_assert!(rough <= exact && rough > 0.9 * exact, "{rough} of {exact}");
+            prop_assert!(at(0.0, 0.89 * exact) == f32::MAX);
+            prop_assert!(at(exact, 1.01 * exact) == exact);
+        }
+    }
 }

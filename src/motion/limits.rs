@@ -54,6 +54,10 @@ const HALF_STEP: u16 = 1 << (PARTS_LOG2 - 1);
 
 /// The share of the step rate that short blocks may have.
 const SHORT_SHARE: f32 = 0.625;
+/// Its logarithm.
+const SHORT_SHARE_LOG: i16 = -174;
+/// More than what a sum of three logarithms is off.
+const SPARE: i16 = 24;
 
 impl Path {
     /// The axes that move, with the size of their part of the heading, or a little more: never less
@@ -162,33 +166,43 @@ impl Path {
 
     /// Keeps motors within the rate that so many can have together, or, in chords of arcs and in blocks short enough for parts of a
     /// step, within five eighths of that: exec has much more to do there than in a long line. Keeps every block long enough for exec.
+    ///
+    /// Cost: 300 where logarithms tell; 1,000 for a feed beyond the limit, or just below it. What lies between the feed and the
+    /// top, which only an override asks for, is up to a tenth below what the motors can.
     #[inline(never)]
     pub(super) fn limit_steps(&mut self, rates: &[f32; MOTORS], chord: bool) {
         if self.most < HALF_STEP {
             return self.limit_time();
         }
-        let mut rate = rates[usize::from(self.moving) - 1];
-        let rough = |x| Short::new(x).rough().0;
-        let (top, length) = (rough(self.top), rough(self.length));
-        let octaves = if self.whole_steps { 0 } else { i16::from(PARTS_LOG2) };
+        let rate = rates[usize::from(self.moving) - 1];
         let short = chord || !self.whole_steps;
-        // Logarithms tell whether a block is plainly below the limit: an octave covers their error. Five eighths are 0.68 octaves.
-        let spare = if short { 7 * short::OCTAVE / 4 } else { short::OCTAVE };
+        let octaves = if self.whole_steps { 0 } else { i16::from(PARTS_LOG2) };
+        let log = |x| Short::new(x).log().0;
+        let (top, length) = (log(self.top), log(self.length));
+        let share = if short { SHORT_SHARE_LOG } else { 0 };
         let most = Log::of(self.most).0 - octaves * short::OCTAVE;
-        if top + most + spare > rough(rate) + length {
-            if short {
-                rate *= SHORT_SHARE;
-            }
-            let most = scaled(f32::from(self.most), -octaves as i8);
-            let way = rate * self.length;
-            if below(way, self.top * most) {
-                self.top = way / most;
+        let limit = log(rate) + length - most + share - SPARE;
+        if top + SPARE > limit {
+            if log(self.cruise) + SPARE > limit {
+                self.limit_rate(if short { rate * SHORT_SHARE } else { rate }, octaves as i8);
+            } else {
+                self.top = least(self.top, Log(limit).power().get());
             }
         }
         if top + BLOCK_S_LOG > length {
             self.top = least(self.top, self.length * (1.0 / BLOCK_S_MIN));
         }
         self.cruise = least(self.cruise, self.top);
+    }
+
+    /// Keeps the motor that goes farthest within a step rate, which is not 0. Its way is in steps, or in that power of two of them.
+    #[inline(never)]
+    fn limit_rate(&mut self, rate: f32, octaves: i8) {
+        let most = scaled(f32::from(self.most), -octaves);
+        let way = rate * self.length;
+        if below(way, self.top * most) {
+            self.top = way / most;
+        }
     }
 
     /// Whether it may be over before exec can prepare the next block.

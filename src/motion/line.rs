@@ -18,7 +18,7 @@ use super::curve::{Bend, Curve};
 use super::dynamics::Dynamics;
 use super::factors::Reserve;
 use super::float::{least, some};
-use super::junction::{self, Heading};
+use super::junction::{self, Heading, Velocities};
 use super::limits::LastFeed;
 use super::path::{Path, Way};
 use super::steps::Motor;
@@ -132,7 +132,8 @@ impl Builder {
         // The chords of an arc have its limits, and no corners between them.
         let goes_on = matches!(line.curve, Some(curve) if curve.goes_on);
         if some(entry) && !goes_on {
-            entry = junction::limit(&self.heading, &path.heading, dynamics.junction, entry);
+            let velocities = Velocities { cruise: path.cruise, top: entry };
+            entry = junction::limit(&self.heading, &path.heading, dynamics.junction, velocities);
         }
         self.heading = path.heading;
         self.top = path.top;

@@ -26,7 +26,7 @@ fn main() -> Result<()> {
         }
     }
     let lines = job::read_lines(Path::new(&path))?;
-    let options = Options { settings: args.collect(), ..Options::default() };
+    let options = Options::with_settings(args);
     job::run(&mut machine, &lines, &options, |_| {})?;
     println!("    count      mean       max  a line");
     for (name, stopwatch) in names.iter().zip(machine.stopwatches()) {

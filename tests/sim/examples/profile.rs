@@ -16,14 +16,7 @@ fn main() -> Result<()> {
     let mut machine = Machine::load(Path::new(&elf), board)?;
     machine.start_profile();
     let lines = job::read_lines(Path::new(&path))?;
-    let mut options = Options { settings: args.collect(), ..Options::default() };
-    options.settings.retain(|setting| match setting.strip_prefix("{baud:") {
-        Some(rate) => {
-            options.baud = rate.trim_end_matches('}').parse().ok();
-            false
-        }
-        None => true,
-    });
+    let options = Options::with_settings(args);
     let report = job::run(&mut machine, &lines, &options, |_| {})?;
     println!("{report}");
     let total = machine.cycle() as f64;

@@ -58,6 +58,20 @@ impl Default for Options {
     }
 }
 
+impl Options {
+    /// Those of a job after these settings; of `{baud:N}` the speed is taken, which the sender has to follow.
+    pub fn with_settings(settings: impl Iterator<Item = String>) -> Self {
+        let mut options = Self::default();
+        for setting in settings {
+            match setting.strip_prefix("{baud:") {
+                Some(rate) => options.baud = rate.trim_end_matches('}').parse().ok(),
+                None => options.settings.push(setting),
+            }
+        }
+        options
+    }
+}
+
 /// Splits G-code text into the lines a sender sends: no blank ones and no `%`, which would flush
 /// the queue.
 pub fn lines_of(text: &str) -> Lines {
