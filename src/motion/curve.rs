@@ -270,7 +270,7 @@ impl Path {
     /// 2^-14, within `span` mm.
     #[inline(never)]
     fn bends_too_much(&self, both: Log, span: Log, (accel, jerk): (Short, Short)) -> bool {
-        let top = Short::new(self.top).log().0;
+        let top = Log::of_float(self.top).0;
         // v^2 / r and v^3 / r^2.
         let once = top + both.0 - 14 * OCTAVE - span.0 + top;
         accel != Short::ZERO && once > accel.log().0
@@ -304,7 +304,7 @@ impl Path {
             let log = slowest.jerk.log().0 - JERK_SPARE - 2 * curvature;
             velocity = velocity.min(third(log));
         }
-        if velocity < Short::new(self.top).log().0 {
+        if velocity < Log::of_float(self.top).0 {
             // To one of eight values in an octave, so that lines of a curve have one velocity in spite of what is
             // rounded: 2 % up or 6 % down.
             self.slow_down(Log((velocity + OCTAVE / 32) & !(OCTAVE / 8 - 1)).power().get());

@@ -91,7 +91,7 @@ pub fn limit(a: &Heading, b: &Heading, acceleration: f32, velocities: Velocities
     }
     let same = a.deviation == b.deviation;
     if same && sum < WIDE {
-        let rough = rough(sum, a.deviation, Short::new(acceleration));
+        let rough = rough(sum, a.deviation, acceleration);
         if rough >= Short::above(velocities.top) {
             return f32::MAX;
         }
@@ -109,11 +109,11 @@ pub fn limit(a: &Heading, b: &Heading, acceleration: f32, velocities: Velocities
 /// The velocity of a corner that is not [`WIDE`], or up to a tenth less, by logarithms: what [`arc`] says for a cosine of 1, less what
 /// that may be off. Cost: 170.
 #[inline(never)]
-fn rough(sum: u32, deviation: Short, acceleration: Short) -> Short {
-    if deviation == Short::ZERO || acceleration == Short::ZERO {
+fn rough(sum: u32, deviation: Short, acceleration: f32) -> Short {
+    if deviation == Short::ZERO || !some(acceleration) {
         return Short::ZERO;
     }
-    let product = deviation.log().0 + acceleration.log().0;
+    let product = deviation.log().0 + Log::of_float(acceleration).0;
     Log((product + STRAIGHT_ON - Log::of_wide(sum).0) / 2).power()
 }
 
@@ -141,6 +141,7 @@ fn mean(a: f32, b: f32) -> f32 {
 /// The velocity on the arc, from the square of the sine of half the angle and the product of deviation
 /// and acceleration.
 #[inline(never)]
+#[small]
 fn arc(sine: f32, product: f32, most: f32) -> f32 {
     // Up to 75 degrees the factor of the cosine below is above 1.
     if below(sine, 0.36) && below(sine * most * most, product) {

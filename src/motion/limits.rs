@@ -177,7 +177,7 @@ impl Path {
         let rate = rates[usize::from(self.moving) - 1];
         let short = chord || !self.whole_steps;
         let octaves = if self.whole_steps { 0 } else { i16::from(PARTS_LOG2) };
-        let log = |x| Short::new(x).log().0;
+        let log = |x| Log::of_float(x).0;
         let (top, length) = (log(self.top), log(self.length));
         let share = if short { SHORT_SHARE_LOG } else { 0 };
         let most = Log::of(self.most).0 - octaves * short::OCTAVE;
@@ -197,6 +197,7 @@ impl Path {
 
     /// Keeps the motor that goes farthest within a step rate, which is not 0. Its way is in steps, or in that power of two of them.
     #[inline(never)]
+    #[small]
     fn limit_rate(&mut self, rate: f32, octaves: i8) {
         let most = scaled(f32::from(self.most), -octaves);
         let way = rate * self.length;

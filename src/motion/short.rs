@@ -36,13 +36,6 @@ impl Short {
         Log::new(power.wrapping_sub(ONE), mantissa)
     }
 
-    /// The logarithm of the number, or up to 0.09 octaves less. Cost: 5.
-    #[inline(always)]
-    pub fn rough(self) -> Log {
-        let (mantissa, power) = self.parts();
-        Log(i16::from_le_bytes([mantissa, power.wrapping_sub(ONE)]))
-    }
-
     /// From a mantissa without the leading 1, and an exponent.
     #[inline(always)]
     pub fn of_parts(mantissa: u8, power: u8) -> Self {
@@ -84,6 +77,12 @@ impl Log {
     #[inline(always)]
     fn new(power: u8, mantissa: u8) -> Self {
         Self(i16::from_le_bytes([mantissa.wrapping_add(bulge(mantissa)), power]))
+    }
+
+    /// The logarithm of a float above 0. Cost: 40.
+    #[inline(never)]
+    pub fn of_float(x: f32) -> Self {
+        Short::new(x).log()
     }
 
     /// The logarithm of an integer, not 0. Cost: 45 to 85.
