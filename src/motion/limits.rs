@@ -8,7 +8,7 @@ use super::block::PARTS_LOG2;
 use super::divide::quotient;
 use super::dynamics::{Axis, Dynamics};
 use super::exec::BLOCK_S_MIN;
-use super::float::{OCTAVE, below, least, log, scaled, some};
+use super::float::{below, least, scaled, some};
 use super::governor::{ACCEL_MOST, effective_jerk};
 use super::junction::ONE;
 use super::path::Path;
@@ -34,12 +34,13 @@ pub(super) struct LastFeed {
 }
 
 impl LastFeed {
-    /// `feed`, mm/min, in mm/s, times `stretch` if there is one. Cost: 30; 300 for another feed.
-    fn per_second(&mut self, feed: f32, stretch: f32) -> f32 {
+    /// `feed`, mm/min, in mm/s, within what no division goes wrong with. Cost: 20; 300 for another feed.
+    #[inline(always)]
+    fn per_second(&mut self, feed: f32) -> f32 {
         if self.feed.to_bits() != feed.to_bits() {
-            *self = Self { feed, velocity: times(feed, 1.0 / 60.0) };
+            *self = Self { feed, velocity: within(times(feed, 1.0 / 60.0)) };
         }
-        if some(stretch) { times(self.velocity, stretch) } else { self.velocity }
+        self.velocity
     }
 }
 
@@ -83,15 +84,11 @@ impl Path {
     #[inline(never)]
     pub(super) fn limit(&mut self, feed: Option<Feed>, last: &mut LastFeed, dynamics: &Dynamics) {
         self.cruise = match feed {
-            Some(Feed::PerMinute(feed)) => last.per_second(feed, self.stretch),
-            Some(Feed::Minutes(time)) if some(time) => self.length / (time * 60.0),
-            _ => CRUISE_MOST,
+            Some(Feed::PerMinute(feed)) if !some(self.stretch) => last.per_second(feed),
+            _ => self.unusual_velocity(feed, last),
         };
-        // Within what no division goes wrong with.
-        self.cruise = within(self.cruise);
         // An override may double a feed.
-        let top = if feed.is_some() { scaled(self.cruise, 1) } else { self.cruise };
-        self.top = within(top);
+        self.top = if feed.is_some() { scaled(self.cruise, 1) } else { self.cruise };
         let mut left = self.moved;
         for (u, axis) in self.heading.unit.iter().zip(&dynamics.axes) {
             if left & 1 != 0 {
@@ -106,7 +103,20 @@ impl Path {
                 break;
             }
         }
-        self.cruise = least(self.cruise, self.top);
+        if below(self.top, self.cruise) {
+            self.cruise = self.top;
+        }
+    }
+
+    /// How fast a move is to be whose feed is none of a length, mm/s.
+    #[inline(never)]
+    #[small]
+    fn unusual_velocity(&self, feed: Option<Feed>, last: &mut LastFeed) -> f32 {
+        within(match feed {
+            Some(Feed::PerMinute(feed)) => last.per_second(feed) * self.stretch,
+            Some(Feed::Minutes(time)) if some(time) => self.length / (time * 60.0),
+            _ => CRUISE_MOST,
+        })
     }
 
     /// Acceleration and jerk.
@@ -116,21 +126,26 @@ impl Path {
         if some(self.stretch) {
             self.look_along(&mut slowest, dynamics);
         } else {
-            for (u, axis) in self.axes(dynamics) {
-                slowest.look(u, axis.accel, axis.jerk);
+            let mut left = self.moved;
+            for (u, axis) in self.heading.unit.iter().zip(&dynamics.axes) {
+                if left & 1 != 0 {
+                    slowest.look(part(*u), axis.accel, axis.jerk);
+                }
+                left >>= 1;
+                if left == 0 {
+                    break;
+                }
             }
         }
         self.slowest = (slowest.least, slowest.jerk);
-        let jerk = slowest.jerk.get();
         if slowest.least != Short::ZERO {
-            let least = slowest.least.get();
-            // Plainly of no effect if it allows the acceleration within 2^-11 s.
-            let plain = log(least) + 11 * OCTAVE < log(jerk);
-            let jerk = if !some(jerk) || plain { 0.0 } else { effective_jerk(jerk, least) };
-            let accel = if some(jerk) { slowest.least } else { over(slowest.accel, slowest.unit) };
+            let jerk = slowest.effective_jerk();
+            let accel =
+                if jerk != Short::ZERO { slowest.least } else { over(slowest.accel, slowest.unit) };
             self.accel = accel.min(Short::new(ACCEL_MOST));
-            self.jerk = Short::new(jerk);
-        } else if some(jerk) {
+            self.jerk = jerk;
+        } else if slowest.jerk != Short::ZERO {
+            let jerk = slowest.jerk.get();
             // What a ramp to full speed comes to, so that the jerk alone limits it.
             let accel = least(sqrt(jerk * power_of_two_above(self.cruise)), ACCEL_MOST);
             self.accel = Short::new(accel);
@@ -192,7 +207,9 @@ impl Path {
         if top + BLOCK_S_LOG > length {
             self.top = least(self.top, self.length * (1.0 / BLOCK_S_MIN));
         }
-        self.cruise = least(self.cruise, self.top);
+        if below(self.top, self.cruise) {
+            self.cruise = self.top;
+        }
     }
 
     /// Keeps the motor that goes farthest within a step rate, which is not 0. Its way is in steps, or in that power of two of them.
@@ -237,6 +254,7 @@ fn part(u: i16) -> u16 {
 }
 
 /// No slower than the least and no faster than the most. Cost: 40.
+#[inline(never)]
 fn within(cruise: f32) -> f32 {
     if below(cruise, CRUISE_LEAST) { CRUISE_LEAST } else { least(cruise, CRUISE_MOST) }
 }
@@ -282,6 +300,17 @@ impl Slowest {
     #[inline(never)]
     pub(super) fn look_at(&mut self, u: u16, accel: Short, jerk: Short) {
         self.look(u, accel, jerk);
+    }
+
+    /// The jerk limit, if it has an effect.
+    #[inline(always)]
+    fn effective_jerk(&self) -> Short {
+        // Plainly of none if it allows the acceleration within 2^-10 s.
+        let octaves = Short::octaves_between(self.least, self.jerk);
+        if self.jerk == Short::ZERO || octaves >= 11 {
+            return Short::ZERO;
+        }
+        Short::new(effective_jerk(self.jerk.get(), self.least.get()))
     }
 
     #[inline(always)]
