@@ -2,6 +2,7 @@
 
 use kerf_macros::small;
 
+use crate::hal::arithmetic::product;
 pub use crate::hal::arithmetic::{ratio, whole};
 
 /// The size of a number, without its sign. Cost: 1.
@@ -62,6 +63,22 @@ pub fn scaled(x: f32, power: i8) -> f32 {
     f32::from_bits(x.to_bits().wrapping_add_signed(i32::from(power) << 23))
 }
 
+/// The product of two positive numbers, from the first 16 bits of each: up to 2^-14 less than it is. Neither is tiny or huge.
+/// Cost: 65, where a multiplication takes 115.
+#[inline(never)]
+pub fn brief_product(a: f32, b: f32) -> f32 {
+    let (a, b) = (a.to_bits(), b.to_bits());
+    let mantissa = |bits: u32| (bits >> 8) as u16 | 0x8000;
+    let power = (((a >> 23) as u8).wrapping_add((b >> 23) as u8)).wrapping_sub(127);
+    let product = product(mantissa(a), mantissa(b));
+    let (product, power) = if product >> 31 == 0 {
+        (product << 1, power)
+    } else {
+        (product, power.wrapping_add(1))
+    };
+    f32::from_bits(u32::from(power) << 23 | (product >> 8) & 0x7F_FFFF)
+}
+
 /// The logarithm of a positive number, or a little less: up to 0.09 [`OCTAVE`]s. Sums of these tell in 20
 /// cycles what products of floats would in 400, if the answer is plain.
 #[inline(always)]
@@ -115,6 +132,16 @@ mod tests {
                 assert_eq!(below(a, b), a < b, "{a} {b}");
             }
         }
+    }
+
+    #[test]
+    fn brief_products_are_products() {
+        for n in 1..2_000u16 {
+            let (a, b) = (f32::from(n) * 0.017_3, 1e9 / f32::from(n).powi(2));
+            let (exact, brief) = (a * b, brief_product(a, b));
+            assert!(brief <= exact && brief >= exact * (1.0 - 1.0 / 16_384.0), "{a} {b}");
+        }
+        assert_eq!(brief_product(0.5, 4.0), 2.0);
     }
 
     #[test]

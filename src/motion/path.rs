@@ -6,7 +6,7 @@
 //! Units: those of [`Length`] on the way in, mm (or degrees) on the way out.
 
 use super::divide::{quotient, root};
-use super::float::below;
+use super::float::{below, brief_product};
 use super::junction::{Heading, ONE};
 use super::short::Short;
 use crate::hal::arithmetic::product;
@@ -95,7 +95,7 @@ impl Path {
         self.length = if shift > 0 {
             length_of(&self.travel)
         } else {
-            composed(length, 127 + 15 + i16::from(shift)) * 1e-4
+            brief_product(composed(length, 127 + 15 + i16::from(shift)), 1e-4)
         };
         Way::Near
     }

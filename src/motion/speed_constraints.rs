@@ -51,7 +51,7 @@
 
 use super::block::Line;
 use super::factors::{Factors, Reserve};
-use super::float::{OCTAVE, least, lesser, log, scaled, some};
+use super::float::{OCTAVE, brief_product, least, lesser, log, scaled, some};
 use super::queue::{BLOCKS, FIRM, SEQ};
 use super::short::Short;
 use crate::hal::arithmetic;
@@ -95,10 +95,10 @@ impl Line {
     }
 
     /// How much potential it has, (mm/s)^2. More than several times the square of the highest velocity that
-    /// an override gives it never matters, and is left away where it is much. Cost: 350.
+    /// an override gives it never matters, and is left away where it is much. Cost: 160.
     #[inline(never)]
     pub fn gain(&self) -> f32 {
-        let full = scaled(self.accel.get(), 1) * self.extent.length();
+        let full = brief_product(scaled(self.accel.get(), 1), self.extent.length());
         // Plainly below the square of its velocity, as short blocks have it.
         if log(full) + OCTAVE < 2 * log(self.cruise) { full } else { self.capped(full) }
     }
