@@ -22,7 +22,8 @@ use super::junction::{self, Heading, Velocities};
 use super::limits::LastFeed;
 use super::path::{Path, Way};
 use super::steps::Motor;
-use crate::boards::MOTORS;
+use crate::boards::{MOTORS, each_motor};
+use crate::capability::Capability;
 use crate::config::StepRatio;
 use crate::gcode::command::Feed;
 use crate::kinematics;
@@ -262,18 +263,29 @@ impl Path {
         machine: &impl Motors,
         ways: &mut [i16; MOTORS],
     ) -> u8 {
-        let all = motors.iter_mut().zip(ways).zip(&dynamics.drives);
-        for (m, ((motor, way), &drives)) in all.enumerate() {
+        let mut drive = |m: usize| {
+            let drives = dynamics.drives[m];
             let travel = kinematics::travel(drives, &self.travel).filter(|way| *way != 0);
-            let Some(travel) = travel else { continue };
-            let Some(to) = kinematics::place(drives, to) else { continue };
-            match motor.go(machine.ratio(m), travel, to) {
-                Some(parts) => {
-                    *way = parts;
-                    self.go(parts.unsigned_abs());
+            let (Some(travel), Some(to)) = (travel, kinematics::place(drives, to)) else {
+                return true;
+            };
+            let parts = motors[m].go(machine.ratio(m), travel, to);
+            let way = parts.unwrap_or_default();
+            ways[m] = way;
+            self.go(way.unsigned_abs());
+            parts.is_some()
+        };
+        if Capability::CoreXy.is_built_in() {
+            for m in 0..MOTORS {
+                if !drive(m) {
+                    return m as u8;
                 }
-                None => return m as u8,
             }
+        } else {
+            // A third of the cycles, where what a motor drives is short.
+            each_motor!(M => if !drive(M) {
+                return M as u8;
+            });
         }
         MOTORS as u8
     }
