@@ -79,6 +79,8 @@ contract! {
         fn release();
         /// Whether ticks are coming. Any level.
         fn running() -> bool;
+        /// How long the segment that runs takes yet, in counts of the timer, or more; `u32::MAX` where that is not known. Exec. Cost: 40.
+        fn left() -> u32;
         /// Every motor is where its last pulse has put it; nothing is left of the segments, of which `held` would have come first after those
         /// that are queued. What they lack is taken off `position`, in steps. Exec, while no ticks come.
         fn settle(held: Option<Segment>, position: &mut [i32; MOTORS]);

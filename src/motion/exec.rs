@@ -280,6 +280,12 @@ impl Exec {
         self.governor.set_hurry(hurry);
     }
 
+    /// No time is left for looks at the end of an acceleration.
+    #[inline(always)]
+    pub fn set_tight(&mut self, tight: bool) {
+        self.governor.tight = tight;
+    }
+
     /// Whether there is room for stretches that are twice as long.
     #[inline(always)]
     pub fn set_long(&mut self, long: bool) {

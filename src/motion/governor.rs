@@ -112,6 +112,8 @@ pub struct Governor {
     pub(super) spares: bool,
     /// No time for looks ahead.
     pub(super) hurry: bool,
+    /// No time for looks at the end of an acceleration.
+    pub(super) tight: bool,
     /// Slices until it is worth another try to go faster.
     pub(super) wait: u8,
     /// Slices until it is worth while to go faster by little.
@@ -147,6 +149,7 @@ impl Governor {
             square: 0.0,
             spares: false,
             hurry: false,
+            tight: false,
             wait: 0,
             calm: 0,
             margin: MARGIN_FIRST,

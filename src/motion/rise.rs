@@ -248,7 +248,7 @@ impl Governor {
             if self.scanned {
                 return false;
             }
-            let has_time = !self.hurry || !some(alpha);
+            let has_time = !(self.hurry || self.ends_early()) || !some(alpha);
             if !has_time || !self.look_ahead(&next, span, ahead) {
                 self.go_on(span, ahead);
                 return true;
@@ -260,11 +260,18 @@ impl Governor {
         true
     }
 
+    /// Whether an acceleration that is about to end is not to be drawn out by looks: each gains half as much as the one before, and
+    /// takes half as long as its slice.
+    #[inline(always)]
+    fn ends_early(&self) -> bool {
+        self.tight && self.closing
+    }
+
     /// While it is known that the next state is safe: looks further, if it is not for those that follow. Whatever the answer, the
     /// next state stays safe.
     #[inline(always)]
     fn look_early(&mut self, next: &Next, span: &Span, ahead: &impl Ahead) {
-        if self.scanned || self.hurry || self.margin == 0 || !below(self.clear.top, span.cruise) {
+        if self.scanned || self.hurry || self.ends_early() || self.margin == 0 || !below(self.clear.top, span.cruise) {
             return;
         }
         let gain = self.limits.accel * span.seconds;

@@ -342,6 +342,7 @@ impl Runner<'_> {
         waiting.coarse = short || asked || passed_over > PATIENCE || waiting.is_busy();
         let scans_too_long = asked && has_jerk && passed_over > PATIENCE_ASKED;
         self.machine.set_coarse(waiting.coarse, short || scans_too_long);
+        self.machine.set_tight(has_jerk && waiting.is_tight());
         if !rested {
             health::look_for_starvation();
         }
@@ -480,6 +481,9 @@ const PRESSED_FOR: u8 = 100;
 /// With less than this exec is late, and makes longer stretches.
 const WAITING_SHORT: u16 = units(25);
 
+/// With less than this an acceleration that is about to end under a jerk limit ends, the rest of the segment that runs counted in.
+const TIGHT: u16 = units(58);
+
 /// With less than this another segment may wait in any case.
 const SOON: u16 = units(20);
 
@@ -571,6 +575,15 @@ impl Waiting {
             self.pressed = PRESSED_FOR;
         }
         short
+    }
+
+    /// Whether so little waits, with what the segment that runs takes yet, that it would not outlast the end of an acceleration and a ramp behind it.
+    #[inline(always)]
+    fn is_tight(&self) -> bool {
+        let all = self.length(self.used + 1);
+        let left = stepper::left().saturating_add((1 << UNIT_LOG2) - 1) >> UNIT_LOG2;
+        let running = u16::try_from(left).map_or(all, |left| left.min(all));
+        running + self.sum < TIGHT
     }
 
     /// Whether thread mode gets a turn before more is prepared, after so many segments without one.

@@ -7,6 +7,7 @@
 use core::cell::UnsafeCell;
 use kerf_macros::small;
 
+use super::arithmetic::product;
 use super::gpio;
 use crate::boards::{ACTIVE, MOTORS, Timer, each_motor};
 use crate::dda::Drivers;
@@ -141,6 +142,15 @@ pub fn release() {
 /// Whether ticks are coming.
 pub fn running() -> bool {
     RUNNING.get() != 0 && !is_stopped()
+}
+
+/// How long the segment that runs takes yet, CPU cycles. Exec.
+pub fn left() -> u32 {
+    let (ticks, top) = super::mask(|| {
+        // SAFETY: reading has no effect.
+        unsafe { (TICKS.map(|register| register.read_volatile()), OCR1A.read_volatile()) }
+    });
+    product(u16::from_le_bytes(ticks), top)
 }
 
 /// Every motor is where its last pulse has put it; nothing is left of the segments, of which `held` would have

@@ -148,6 +148,12 @@ pub fn running() -> bool {
     stepper().next_tick.get() != NEVER
 }
 
+/// How long the segment that runs takes yet, cycles.
+pub fn left() -> u32 {
+    let stepper = stepper();
+    u32::from(stepper.dda.borrow().ticks) * stepper.pins.borrow().period as u32
+}
+
 /// Every motor is where its last pulse has put it; nothing is left of the segments, of which `held` would have
 /// come first after those that are queued. What they lack is taken off `position`. For exec, while no ticks come.
 pub fn settle(mut held: Option<Segment>, position: &mut [i32; MOTORS]) {

@@ -89,6 +89,11 @@ pub fn running() -> bool {
     RUNNING.load(Relaxed) && !is_stopped()
 }
 
+/// How long the segment that runs takes yet: not known, for what the feeder has made of it waits to be sent. Exec.
+pub fn left() -> u32 {
+    u32::MAX
+}
+
 /// Every motor is where its last pulse has put it; nothing is left of the segments, of which `held` would have come first after those that are
 /// queued. What they lack is taken off `position`. Exec, while no steps come.
 pub fn settle(mut held: Option<Segment>, position: &mut [i32; MOTORS]) {
