@@ -51,6 +51,7 @@ use super::divide::quotient;
 use super::pace::{COARSEST, Drivers, Pace, paces};
 use crate::boards::{MOTORS, each_motor};
 use crate::dda::{STEP, STEP_LOG2, Segment, TICKS_MAX};
+use crate::hal::TICKS;
 use crate::hal::arithmetic::product;
 use minor::{Minor, even, share};
 use ticks::{FINE, bit, coarsen, finer, grain, whole_ticks};
@@ -93,6 +94,9 @@ const ASIDE_LITTLE: (u16, u16) = (1, 16_000);
 
 /// A lockstep segment has at least half as many ticks, if it is shorter than as many steps.
 const LOCKSTEP_TICKS: u16 = 16;
+
+/// If it is longer than so many cycles: a shorter one may not have the time for as many.
+const LOCKSTEP_CYCLES: u32 = LOCKSTEP_TICKS as u32 * TICKS[0].coarsest as u32;
 
 /// The state of the preparation of one block.
 #[derive(Debug)]
@@ -440,13 +444,14 @@ impl Prep {
     /// Most ticks for a stretch.
     #[inline(always)]
     fn limit(&self, cycles: u32, pace: u16) -> u16 {
-        if self.minor == 0 && !self.leads() {
+        let in_lockstep = self.minor == 0 && !self.leads();
+        if in_lockstep && cycles > LOCKSTEP_CYCLES {
             return LOCKSTEP_TICKS;
         }
         let cycles = if cycles > PERIOD_MAX { u16::MAX } else { cycles as u16 };
         // Of 22 bits, 16 are dropped for nothing.
         let limit = (product(cycles, pace) >> 16) as u16 >> 6;
-        limit.clamp(1, LIMIT_MAX)
+        limit.clamp(1, if in_lockstep { LOCKSTEP_TICKS } else { LIMIT_MAX })
     }
 
     /// Cycles from tick to tick when a stretch of so many parts of a tick ([`coarsen`]) takes `cycles`; no less than
@@ -540,5 +545,26 @@ impl Prep {
 impl Default for Prep {
     fn default() -> Self {
         Self::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::block::{Extent, Line};
+    use super::*;
+
+    /// Three steps of 50 us and a half: what is left takes half as long as a step, not sixteen of the shortest ticks.
+    #[test]
+    fn a_little_rest_in_lockstep_takes_its_time() {
+        let (mut prep, mut out) = (Prep::new(), Segment::default());
+        let mut way = [0; MOTORS];
+        way[0] = 3 * 16 + 8;
+        let line = Line { way, extent: Extent::new(1.0, false), ..Line::default() };
+        prep.begin(&line, &mut [0; MOTORS], &mut [0; MOTORS]);
+        assert!(prep.segment(u32::from(STEP / 2), 3 * 800, &mut out));
+        assert_eq!(out.ticks * out.period, 3 * 800);
+        assert!(prep.last(400, false, &mut out));
+        let took = u32::from(out.ticks) * u32::from(out.period);
+        assert!((350..=450).contains(&took), "{out:?}");
     }
 }
