@@ -178,8 +178,10 @@ impl Governor {
         self.follow(span.seconds);
     }
 
-    /// Lays out the ramp for what the last scan has found; the top is `at` so far on.
+    /// Lays out the ramp for what the last scan has found; the top is `at` so far on. It takes as long as a scan: there is none behind it in this
+    /// stretch.
     fn slow_for_clear(&mut self, at: f32) {
+        self.scanned = true;
         let slack = ratio(self.clear.slack(at, self.limits.kappa), scaled(self.limits.accel, 1));
         let Clear { target, closed, .. } = self.clear;
         self.lay(target, slack, closed);
@@ -271,7 +273,12 @@ impl Governor {
     /// next state stays safe.
     #[inline(always)]
     fn look_early(&mut self, next: &Next, span: &Span, ahead: &impl Ahead) {
-        if self.scanned || self.hurry || self.ends_early() || self.margin == 0 || !below(self.clear.top, span.cruise) {
+        if self.scanned
+            || self.hurry
+            || self.ends_early()
+            || self.margin == 0
+            || !below(self.clear.top, span.cruise)
+        {
             return;
         }
         let gain = self.limits.accel * span.seconds;
