@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use anyhow::{Context, Result, bail};
+use kerf::hal::serial::{XOFF, XON};
 use serde_json::Value;
 
 use crate::protocol::{Incoming, Response, classify, control_name, is_idle, state_of};
@@ -40,6 +41,8 @@ pub struct Host {
     queue: VecDeque<(usize, String)>,
     awaiting: VecDeque<Line>,
     partial: Vec<u8>,
+    /// The firmware has said XOFF, and not XON since.
+    is_stopped: bool,
     answered: VecDeque<Answered>,
     reports: Vec<Value>,
     strays: Vec<String>,
@@ -59,6 +62,7 @@ impl Host {
             queue: VecDeque::new(),
             awaiting: VecDeque::new(),
             partial: Vec::new(),
+            is_stopped: false,
             answered: VecDeque::new(),
             reports: Vec::new(),
             strays: Vec::new(),
@@ -220,7 +224,7 @@ impl Host {
     }
 
     fn fill(&mut self, machine: &mut impl Runs) {
-        while self.awaiting.len() < self.limit {
+        while self.awaiting.len() < self.limit && !self.is_stopped {
             let Some((number, text)) = self.queue.pop_front() else { return };
             self.send(machine, number, &text);
         }
@@ -228,7 +232,9 @@ impl Host {
 
     fn listen(&mut self, machine: &mut impl Runs) {
         for byte in machine.receive() {
-            if byte != b'\n' && byte != b'\r' {
+            if matches!(byte, XON | XOFF) {
+                self.is_stopped = byte == XOFF;
+            } else if byte != b'\n' && byte != b'\r' {
                 self.partial.push(byte);
             } else if !self.partial.is_empty() {
                 let line = String::from_utf8_lossy(&self.partial).into_owned();
