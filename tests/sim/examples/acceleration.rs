@@ -20,7 +20,7 @@ fn main() -> Result<()> {
     let mut machine = Machine::load(Path::new(&elf), board)?;
     machine.recorder_mut().keep_log();
     let lines = job::read_lines(Path::new(&path))?;
-    let options = Options { settings: args.collect(), ..Options::default() };
+    let options = Options::with_settings(args);
     let report = job::run(&mut machine, &lines, &options, |_| {})?;
     println!("{:.3} s, {}", report.seconds_moving, if report.ok { "OK" } else { "FAILED" });
     let clock = f64::from(machine.board().clock_hz);

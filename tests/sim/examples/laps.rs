@@ -34,7 +34,7 @@ fn main() -> Result<()> {
         }
     }
     let lines = job::read_lines(Path::new(&path))?;
-    let options = Options { settings: args.collect(), ..Options::default() };
+    let options = Options::with_settings(args);
     let report = job::run(&mut machine, &lines, &options, |_| {})?;
     let cost = machine.stopwatches()[0].cost();
     println!("{} segments, mean {:.0}, longest {}", cost.count, cost.mean(), cost.max);

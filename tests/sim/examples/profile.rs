@@ -20,7 +20,7 @@ fn main() -> Result<()> {
     let report = job::run(&mut machine, &lines, &options, |_| {})?;
     println!("{report}");
     let total = machine.cycle() as f64;
-    for (function, cycles) in machine.profile().into_iter().take(400) {
+    for (function, cycles) in machine.profile().into_iter().take(150) {
         println!("{:6.2} %  {:>12}  {function}", cycles as f64 / total * 100.0, cycles);
     }
     Ok(())
