@@ -71,11 +71,8 @@ pub fn brief_product(a: f32, b: f32) -> f32 {
     let mantissa = |bits: u32| (bits >> 8) as u16 | 0x8000;
     let power = (((a >> 23) as u8).wrapping_add((b >> 23) as u8)).wrapping_sub(127);
     let product = product(mantissa(a), mantissa(b));
-    let (product, power) = if product >> 31 == 0 {
-        (product << 1, power)
-    } else {
-        (product, power.wrapping_add(1))
-    };
+    let (product, power) =
+        if product >> 31 == 0 { (product << 1, power) } else { (product, power.wrapping_add(1)) };
     f32::from_bits(u32::from(power) << 23 | (product >> 8) & 0x7F_FFFF)
 }
 

@@ -53,12 +53,8 @@ impl Planner {
     #[inline(always)]
     pub(super) fn is_worth_a_chain(&mut self) -> bool {
         self.alone = self.alone.checked_add(1).unwrap_or(LONG);
-        let others = match self.alone {
-            ..=ALONE => 0,
-            ..=LONG => ALONE - 1,
-            _ => SELDOM - 1,
-        };
-        self.alone & others == 0
+        let each = if self.alone <= LONG { ALONE } else { SELDOM };
+        self.alone <= ALONE || self.alone & (each - 1) == 0
     }
 
     /// Begins a chain with a line, if it may be merged with those that follow.
