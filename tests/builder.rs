@@ -149,6 +149,37 @@ fn check_override(block: &Move, unit: &PerAxis<f64>, is_feed: bool, config: &Con
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
 
+    /// No motor exceeds its step rate under any override, and a limit that only an override asks for is a seventh below it at most.
+    #[test]
+    fn overrides_keep_step_rates(
+        config in any_config(), x in 0.02f64..300.0, y in -100f64..100.0, feed in 1e2f32..1e6,
+    ) {
+        let mut wide = config.clone();
+        wide.velocity = [1e6; AXES];
+        let dynamics = Dynamics::new(&wide);
+        let (from, to) = (at([0.0]), at([x, y]));
+        let line = Line { from: &from, to: &to, feed: Some(Feed::PerMinute(feed)), curve: None, may_merge: false };
+        let mut block = Move::default();
+        let Built::Line(_) = Builder::default().line(&line, &dynamics, &wide, &mut block) else {
+            return Ok(());
+        };
+        let whole = block.extent.has_whole_steps();
+        let moving = block.way.iter().filter(|way| **way != 0).count();
+        let most = block.way.iter().map(|way| way.unsigned_abs()).max().unwrap();
+        prop_assume!(most >= 8);
+        let steps = f64::from(most) / if whole { 1.0 } else { 16.0 };
+        let rate = f64::from(dynamics.rates[moving - 1]) * if whole { 1.0 } else { 0.625 };
+        let length = f64::from(block.extent.length());
+        let limit = rate * length / steps;
+        let doubled = f64::from(block.velocity(&Factors { feed: 2.0, traverse: 1.0 }));
+        prop_assert!(doubled <= limit * (1.0 + 1e-5), "{doubled} of {limit} mm/s");
+        let asked = (f64::from(feed) / 30.0).min(length / f64::from(BLOCK_S_MIN));
+        prop_assert!(doubled >= 0.85 * asked.min(limit), "{doubled} of {asked}, {limit} mm/s");
+        let cruise = f64::from(block.cruise);
+        let slow = (asked / 2.0).min(limit).min(length / f64::from(BLOCK_S_MIN));
+        prop_assert!(cruise >= slow * 0.999, "{cruise} of {slow} mm/s");
+    }
+
     /// Limits are kept, and steps are the difference of exact positions.
     #[test]
     fn builder_keeps_limits_and_steps(
