@@ -101,7 +101,7 @@ pub struct Governor {
     pub(super) changed: bool,
     /// The ramp is that of a feedhold.
     pub(super) halting: bool,
-    /// What is ahead has been looked at for this stretch, or a ramp has been laid out.
+    /// What is ahead has been looked at for this stretch, or a ramp has been laid out, which takes as long.
     pub(super) scanned: bool,
     /// The velocity is steady, and no ramp begins for a while.
     pub(super) far: bool,

@@ -45,6 +45,9 @@ pub(super) const MARGIN_FIRST: u8 = 4;
 /// Most of them.
 const MARGIN: u8 = 15;
 
+/// A stretch that is not worth a segment, s.
+const LITTLE_S: f32 = SEGMENT_S / 4.0;
+
 /// A state that could be next.
 #[derive(Clone, Copy, Default)]
 struct Next {
@@ -172,16 +175,17 @@ impl Governor {
             self.add(span.seconds, steady.distance, steady.at);
             return;
         }
-        if self.ramp.is_none() {
+        let lays = self.ramp.is_none();
+        if lays {
             self.slow_for_clear(0.0);
         }
         self.follow(span.seconds);
+        // That took as long as a scan: no other one in this stretch, unless it is not worth a segment.
+        self.scanned |= lays && !below(self.rest.seconds, LITTLE_S);
     }
 
-    /// Lays out the ramp for what the last scan has found; the top is `at` so far on. It takes as long as a scan: there is none behind it in this
-    /// stretch.
+    /// Lays out the ramp for what the last scan has found; the top is `at` so far on.
     fn slow_for_clear(&mut self, at: f32) {
-        self.scanned = true;
         let slack = ratio(self.clear.slack(at, self.limits.kappa), scaled(self.limits.accel, 1));
         let Clear { target, closed, .. } = self.clear;
         self.lay(target, slack, closed);
