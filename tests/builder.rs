@@ -158,7 +158,8 @@ proptest! {
         wide.velocity = [1e6; AXES];
         let dynamics = Dynamics::new(&wide);
         let (from, to) = (at([0.0]), at([x, y]));
-        let line = Line { from: &from, to: &to, feed: Some(Feed::PerMinute(feed)), curve: None, may_merge: false };
+        let asked_for = Some(Feed::PerMinute(feed));
+        let line = Line { from: &from, to: &to, feed: asked_for, curve: None, may_merge: false };
         let mut block = Move::default();
         let Built::Line(_) = Builder::default().line(&line, &dynamics, &wide, &mut block) else {
             return Ok(());

@@ -183,7 +183,7 @@ impl Path {
     /// step, within five eighths of that: exec has much more to do there than in a long line. Keeps every block long enough for exec.
     ///
     /// Cost: 300 where logarithms tell; 1,000 for a feed beyond the limit, or just below it. What lies between the feed and the
-    /// top, which only an override asks for, is up to a tenth below what the motors can.
+    /// top, which only an override asks for, is up to a seventh below what the motors can.
     #[inline(never)]
     pub(super) fn limit_steps(&mut self, rates: &[f32; MOTORS], chord: bool) {
         if self.most < HALF_STEP {

@@ -282,7 +282,7 @@ impl Path {
                 }
             }
         } else {
-            // A third of the cycles, where what a motor drives is short.
+            // Without a loop it takes 190 cycles less. With CoreXY it would take 1,000 bytes more.
             each_motor!(M => if !drive(M) {
                 return M as u8;
             });

@@ -266,8 +266,8 @@ impl Governor {
         true
     }
 
-    /// Whether an acceleration that is about to end is not to be drawn out by looks: each gains half as much as the one before, and
-    /// takes half as long as its slice.
+    /// Whether an acceleration that is about to end is to end now, without another look ahead. Each look allows half the gain of the one
+    /// before; at 80,000 steps/s a slice with a look takes longer to work out than it lasts.
     #[inline(always)]
     fn ends_early(&self) -> bool {
         self.tight && self.closing

@@ -31,9 +31,9 @@ const BLOCKS: usize = 3;
 
 /// After so many chains in a row that nothing went on with, only each line of so many begins one. A power of two.
 const ALONE: u8 = 8;
-/// After so many lines of which none went on with another, each of [`SELDOM`]. A multiple of both.
+/// After so many lines in a row that did not become a chain, only one of [`SELDOM`] lines begins one. A multiple of that.
 const LONG: u8 = 64;
-/// See [`LONG`].
+/// See [`LONG`]. A power of two.
 const SELDOM: u8 = 32;
 
 impl Planner {
