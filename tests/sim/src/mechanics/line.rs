@@ -104,6 +104,11 @@ impl Line {
         self.flips.extend(bounces);
     }
 
+    /// When it has bounced for the last time.
+    pub fn settles(&self) -> u64 {
+        self.flips.back().map_or(self.now, |(at, _)| *at)
+    }
+
     /// When its level may change next.
     pub fn due(&self) -> u64 {
         let flip = self.flips.front().map_or(NEVER, |(at, _)| *at);

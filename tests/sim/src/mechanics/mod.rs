@@ -170,6 +170,11 @@ impl Mechanics {
         self.with(input, |line| line.set_bounce(bounce));
     }
 
+    /// When the contacts on the wire of an input have bounced for the last time.
+    pub fn settles(&self, input: usize) -> u64 {
+        self.line_of[input].map_or(0, |line| self.lines[line].settles())
+    }
+
     /// From now on the wire of an input looks worked, or not, whatever happens; `None` mends it.
     pub fn stick(&mut self, input: usize, worked: Option<bool>) {
         self.with(input, |line| line.set_stuck(worked));
