@@ -200,7 +200,8 @@ fn act(links: &Links, port: &Port, characters: u8) {
     } else if cuts {
         signs.lone_percent(millis());
     } else if holds && signs.take_lone_percent(millis()) && busy {
-        flush_here();
+        // At the place of the percent sign, which the reader has passed, mostly: what has come since belongs to what follows.
+        cut(links, port, uart::last_cut(port.number), machine::Event::Cut);
     }
     if characters & RESUME != 0 {
         signs.resume.set(true);
