@@ -368,6 +368,14 @@ impl<T: Copy, const N: usize> Prefilled<T, N> {
         Some(Slot { ring: self.0.0, after, producer: PhantomData })
     }
 
+    /// What that slot holds, which is changed in several steps before it is [published](Slot::publish). `None` if the ring is full.
+    #[inline(always)]
+    pub fn vacant_mut(&mut self) -> Option<&mut T> {
+        let after = self.0.vacant()?;
+        // SAFETY: `Producer::prefilled` has written it, and it is the producer's, which is borrowed, until it is published.
+        Some(unsafe { &mut *self.0.0.slot(after) })
+    }
+
     /// The producer, which can change values that the consumer has not taken yet.
     #[inline(always)]
     pub fn producer(&mut self) -> &mut Producer<T, N> {

@@ -54,6 +54,13 @@ impl Block {
         Self { body, line: [a, b, c] }
     }
 
+    /// It is of the line with this N word.
+    #[inline(always)]
+    pub fn set_line(&mut self, line: u32) {
+        let [a, b, c, _] = line.to_le_bytes();
+        self.line = [a, b, c];
+    }
+
     /// A block that does something other than move.
     pub fn action(action: QueuedAction, line: u32) -> Self {
         Self::new(Body::QueuedAction(action), line)

@@ -37,5 +37,6 @@ pub mod snapshot;
 pub mod source;
 pub mod speed_constraints;
 pub mod steps;
+mod tail;
 pub mod thread;
 mod trapezoid;

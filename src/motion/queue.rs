@@ -8,14 +8,13 @@ use avr_embassy::{InterruptEnd, Shared};
 
 use super::block::{Block, Body, Line};
 use super::factors::Factors;
-use super::float::{OCTAVE, below, greater, least, lesser, log, some};
-use super::short::Short;
+use super::float::{OCTAVE, below, log, some};
 pub use super::source::{BlockSource, Constraint};
-use super::speed_constraints::{self, SpeedConstraints, kappa};
+use super::speed_constraints::SpeedConstraints;
+use super::tail::{Key, Tail};
 use crate::hal::exec;
-use crate::hal::ring::{Ceiling, Index, Producer, Ring};
+use crate::hal::ring::{Ceiling, Index, Prefilled, Ring};
 use crate::hal::{Interrupt, LOOK_AHEAD, Thread};
-use crate::math::sqrt;
 
 /// Blocks the planner can queue, plus one slot that stays empty. Sequence numbers have a bit less than an [`Index`].
 pub const BLOCKS: usize = LOOK_AHEAD + 1;
@@ -29,9 +28,6 @@ pub(super) const SEQ: Index = Index::MAX >> 1;
 
 /// Marks a key that stays even before a lower one.
 pub(super) const FIRM: Index = !SEQ;
-
-/// A corner is worth a key if it is slower than this share of what holds on both sides.
-pub(super) const WORTH: f32 = 0.999;
 
 /// Potentials beyond so many times the square of the velocity are counted anew.
 const COARSE: f32 = 1024.0;
@@ -57,11 +53,10 @@ impl BlockStore {
         exec::lock(thread, |ceiling| self.constraints.with(ceiling, SpeedConstraints::begin));
         Some(BlockQueue {
             thread,
-            ring,
+            ring: ring.prefilled(Block::new(Body::Line(Line::default()), 0)),
             constraints: &self.constraints,
             newest: SEQ,
-            last: None,
-            factors: Factors::ONE,
+            tail: Tail { last: None, factors: Factors::ONE },
         })
     }
 
@@ -118,42 +113,44 @@ pub fn used_here() -> usize {
     store().ring.used()
 }
 
-/// What the planner remembers of the line pushed last.
-#[derive(Clone, Copy)]
-pub(super) struct Last {
-    pub(super) cruise: f32,
-    /// The highest velocity since the last key: many that are a little slower each do need one.
-    pub(super) high: f32,
-    kappa: f32,
-    limits: (Short, Short),
+/// Potential at the end of the queue.
+#[inline(always)]
+fn end(thread: Thread, constraints: &Shared<SpeedConstraints>) -> f32 {
+    exec::lock(thread, |ceiling| constraints.with(ceiling, |constraints| constraints.end))
 }
 
-impl Last {
-    /// Whether `line` brakes otherwise, so that keys before and after it do not compare.
-    fn jerk_limits_change(&self, line: &Line, kappa: f32) -> bool {
-        self.limits != (line.accel, line.jerk) && (some(self.kappa) || some(kappa))
+/// Potential at the end of the queue, counted anew if it has become large for this line. There are so many blocks, up to the `newest`.
+#[inline(never)]
+#[small]
+fn refined(
+    thread: Thread,
+    constraints: &Shared<SpeedConstraints>,
+    line: &Line,
+    (newest, used): (Index, usize),
+) -> f32 {
+    if below(COARSE * line.cruise * line.cruise, line.start) {
+        exec::lock(thread, |ceiling| {
+            let next = newest.wrapping_add(1) & SEQ;
+            constraints.with(ceiling, |constraints| {
+                constraints.count_anew(next);
+                if used == 0 {
+                    constraints.oldest_is(next);
+                }
+            });
+        });
     }
-
-    /// Whether a line has the same velocity, at its start as well.
-    fn as_fast(&self, cruise: f32, entry: f32) -> bool {
-        let cruise = cruise.to_bits();
-        entry.to_bits() >= cruise
-            && self.cruise.to_bits() == cruise
-            && self.high.to_bits() == cruise
-    }
+    end(thread, constraints)
 }
 
 /// The planner's end.
 pub struct BlockQueue {
     pub(super) thread: Thread,
-    pub(super) ring: Producer<Block, BLOCKS>,
+    pub(super) ring: Prefilled<Block, BLOCKS>,
     pub(super) constraints: &'static Shared<SpeedConstraints>,
     /// Sequence number of the block pushed last.
     pub(super) newest: Index,
-    /// The line that the next one may follow without a stop.
-    pub(super) last: Option<Last>,
-    /// The overrides that keys are made for.
-    pub(super) factors: Factors,
+    /// What the next line follows.
+    pub(super) tail: Tail,
 }
 
 impl BlockQueue {
@@ -164,148 +161,73 @@ impl BlockQueue {
 
     /// Exec has dropped all blocks: what comes next begins at rest.
     pub fn restart(&mut self) {
-        self.last = None;
+        self.tail.last = None;
     }
 
     /// Queues a block at whose start the machine stands still. False, and nothing done, when there is
     /// no room.
     pub fn push(&mut self, block: Block) -> bool {
-        self.last = None;
-        self.put(|| block, None, |_| {})
+        self.tail.last = None;
+        self.put(|slot| *slot = block, None, |_| {})
     }
 
     /// Queues a block at which the machine does not stop. False, and nothing done, when there is no room.
     pub fn push_aside(&mut self, block: Block) -> bool {
-        self.put(|| block, None, |_| {})
+        self.put(|slot| *slot = block, None, |_| {})
     }
 
-    /// Queues a move whose corner may be taken at `entry`, mm/s; fills in what depends on the queue. False,
+    /// Where the next move is to be put together, for [`BlockQueue::push_line`]: to copy a block takes time. `None` if there is no room.
+    #[inline(always)]
+    pub fn next_line(&mut self) -> Option<&mut Line> {
+        let body = &mut self.ring.vacant_mut()?.body;
+        if !matches!(body, Body::Line(_)) {
+            *body = Body::Line(Line::default());
+        }
+        match body {
+            Body::Line(line) => Some(line),
+            Body::QueuedAction(_) => None,
+        }
+    }
+
+    /// Queues the move in [`BlockQueue::next_line`], whose corner may be taken at `entry`, mm/s; fills in what depends on the queue. False,
     /// and nothing done, when there is no room.
     ///
-    /// Cost: 1,200 on a curve at a steady feed; 2,000 more for a corner, and 900 for each key that it
+    /// Cost: 1,000 on a curve at a steady feed; 2,000 more for a corner, and 900 for each key that it
     /// makes needless.
     #[inline(never)]
-    pub fn push_line(&mut self, line: &mut Line, entry: f32, number: u32) -> bool {
-        if self.ring.free() == 0 {
+    pub fn push_line(&mut self, entry: f32, number: u32) -> bool {
+        let (thread, constraints, newest) = (self.thread, self.constraints, self.newest);
+        let used = self.ring.used();
+        let Some(Block { body: Body::Line(line), .. }) = self.ring.vacant_mut() else {
             return false;
-        }
-        line.start = self.refined(line);
-        line.entry = Short::new(entry);
-        let cruise = line.velocity(&self.factors);
-        let key =
-            if self.goes_on(line, cruise, entry) { None } else { self.corner(line, cruise, entry) };
-        let end = line.start + line.gain();
-        let make = || Block::new(Body::Line(*line), number);
-        let entry = Short::new(least(line.entry.get(), cruise));
-        self.put(make, key.map(|(key, firm)| (key, firm, entry)), |constraints| {
-            constraints.end = end
-        })
-    }
-
-    /// Potential at the end of the queue.
-    fn end(&self) -> f32 {
-        exec::lock(self.thread, |ceiling| {
-            self.constraints.with(ceiling, |constraints| constraints.end)
-        })
-    }
-
-    /// Whether the line is as fast as the one before, and the corner between them no limit.
-    fn goes_on(&self, line: &Line, cruise: f32, entry: f32) -> bool {
-        self.last.as_ref().is_some_and(|last| {
-            last.limits == (line.accel, line.jerk) && last.as_fast(cruise, entry)
-        })
-    }
-
-    /// The key of a line that does not simply go on, if it needs one.
-    #[inline(never)]
-    fn corner(&mut self, line: &mut Line, cruise: f32, entry: f32) -> Option<(f32, Index)> {
-        let limits = (line.accel, line.jerk);
-        let kappa =
-            if line.jerk == Short::ZERO { 0.0 } else { kappa(line.accel.get(), line.jerk.get()) };
-        if let Some(last) = &mut self.last {
-            // Only the acceleration changes.
-            if !last.jerk_limits_change(line, kappa) && last.as_fast(cruise, entry) {
-                (last.kappa, last.limits) = (kappa, limits);
-                return None;
-            }
-        }
-        let entry = self.entry(line, entry, kappa);
-        line.entry = Short::new(entry);
-        let mut key = None;
-        let mut high = cruise;
-        match &self.last {
-            // What comes before brakes with its own limits.
-            Some(last) if last.jerk_limits_change(line, kappa) => {
-                key = Some((
-                    line.start + speed_constraints::key(line.entry(&self.factors), last.kappa),
-                    FIRM,
-                ));
-            }
-            Some(last) => {
-                let limit = lesser(last.cruise, cruise) * WORTH;
-                if entry < limit || cruise < last.high * WORTH {
-                    key = Some((line.key(&self.factors), 0));
-                } else {
-                    high = greater(last.high, cruise);
-                }
-            }
-            None => key = Some((line.key(&self.factors), 0)),
-        }
-        self.last = Some(Last { cruise, high, kappa, limits });
-        key
-    }
-
-    /// Where limits change and there is a jerk limit, what was braked with before does not go on: the
-    /// new line must be able to stop on its own.
-    fn entry(&self, line: &Line, entry: f32, kappa: f32) -> f32 {
-        match self.last {
-            None => 0.0,
-            Some(last) if !last.jerk_limits_change(line, kappa) => entry,
-            Some(last) => {
-                let k = if kappa < last.kappa { last.kappa } else { kappa };
-                lesser(entry, sqrt(k * k + line.gain()) - k)
-            }
-        }
-    }
-
-    /// Potential at the end of the queue, counted anew if it has become large for this line.
-    fn refined(&mut self, line: &Line) -> f32 {
-        let end = self.end();
+        };
+        line.start = end(thread, constraints);
         // Nothing is there, or it is plainly fine: no need to compare.
-        if !some(end) || log(end) < 2 * log(line.cruise) + FINE {
-            return end;
+        if some(line.start) && log(line.start) >= 2 * log(line.cruise) + FINE {
+            line.start = refined(thread, constraints, line, (newest, used));
         }
-        if below(COARSE * line.cruise * line.cruise, end) {
-            exec::lock(self.thread, |ceiling| {
-                let next = self.newest.wrapping_add(1) & SEQ;
-                let used = self.ring.used();
-                self.constraints.with(ceiling, |constraints| {
-                    constraints.count_anew(next);
-                    if used == 0 {
-                        constraints.oldest_is(next);
-                    }
-                });
-            });
-        }
-        self.end()
+        let key = self.tail.follow(line, entry);
+        let behind = line.start + line.gain();
+        self.put(|slot| slot.set_line(number), key, |constraints| constraints.end = behind)
     }
 
-    /// Puts a block, which `make` makes, into the ring and what follows from it into the speed constraints, all at once for exec.
+    /// Puts a block, which `complete` completes, into the ring and what follows from it into the speed constraints, all at once for exec.
     fn put(
         &mut self,
-        make: impl FnOnce() -> Block,
-        key: Option<(f32, Index, Short)>,
+        complete: impl FnOnce(&mut Block),
+        key: Option<Key>,
         end: impl FnOnce(&mut SpeedConstraints) + Send,
     ) -> bool {
         if self.ring.free() == 0 {
             return false;
         }
         let seq = self.newest.wrapping_add(1) & SEQ;
-        let needless = key.map_or(0, |(key, ..)| self.needless(key));
-        let Some(slot) = self.ring.slot_with(make) else { return false };
+        let needless = key.map_or(0, |key| self.needless(key.key));
+        let Some(mut slot) = self.ring.slot() else { return false };
+        complete(&mut slot);
         exec::lock(self.thread, |ceiling| {
             self.constraints.with(ceiling, |constraints| {
-                if let Some((_, firm, entry)) = key {
+                if let Some(Key { firm, entry, .. }) = key {
                     constraints.drop_last(needless);
                     constraints.add(seq | firm, entry);
                 }
@@ -343,7 +265,7 @@ impl BlockQueue {
     fn key(&self, seq: Index) -> f32 {
         let back = usize::from(self.newest.wrapping_sub(seq) & SEQ);
         match self.ring.pushed(back) {
-            Some(Block { body: Body::Line(line), .. }) => line.key(&self.factors),
+            Some(Block { body: Body::Line(line), .. }) => line.key(&self.tail.factors),
             // Gone already: no limit.
             _ => f32::MAX,
         }

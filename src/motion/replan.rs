@@ -12,9 +12,10 @@
 use super::block::{Block, Body, Line};
 use super::factors::{Factors, Reserve};
 use super::float::{below, least};
-use super::queue::{BlockQueue, FIRM, SEQ, WORTH};
+use super::queue::{BlockQueue, FIRM, SEQ};
 use super::short::Short;
 use super::speed_constraints::{self, Keys, kappa};
+use super::tail::WORTH;
 use crate::hal::exec;
 use crate::hal::ring::Index;
 
@@ -111,16 +112,16 @@ impl BlockQueue {
     pub fn wanted(&self) -> Option<Factors> {
         let wanted =
             exec::lock(self.thread, |ceiling| self.constraints.with(ceiling, |h| h.wanted));
-        (!wanted.same(&self.factors)).then_some(wanted)
+        (!wanted.same(&self.tail.factors)).then_some(wanted)
     }
 
     /// Makes the keys anew, for these overrides.
     #[inline(never)]
     pub fn replan(&mut self, factors: Factors) {
-        self.factors = factors;
+        self.tail.factors = factors;
         let mut keys = Keys::none();
         self.look_back(&mut keys);
-        if let (Some(last), Some(line)) = (&mut self.last, line(self.ring.pushed(0))) {
+        if let (Some(last), Some(line)) = (&mut self.tail.last, line(self.ring.pushed(0))) {
             last.cruise = line.velocity(&factors);
             last.high = last.cruise;
         }
@@ -144,7 +145,7 @@ impl BlockQueue {
             let before = line(block);
             if let Some((back, this)) = last {
                 behind.count_from(older.of(back as Index));
-                if let Some((entry, firm)) = behind.key(this, before, &self.factors) {
+                if let Some((entry, firm)) = behind.key(this, before, &self.tail.factors) {
                     let seq = self.newest.wrapping_sub(back as Index) & SEQ;
                     keys.add_before(seq | firm, entry);
                 }
@@ -157,7 +158,7 @@ impl BlockQueue {
     #[inline(never)]
     fn install(&self, keys: &Keys) {
         exec::lock(self.thread, |ceiling| {
-            let (used, factors) = (self.ring.used() as Index, self.factors);
+            let (used, factors) = (self.ring.used() as Index, self.tail.factors);
             let oldest = self.newest.wrapping_sub(used).wrapping_add(1) & SEQ;
             self.constraints.with(ceiling, |constraints| {
                 // What has begun has no key any more, nor what has been run meanwhile.

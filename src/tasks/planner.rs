@@ -49,7 +49,7 @@ use crate::jobs::Job;
 use crate::machine::{self, Cycle};
 #[cfg(feature = "printer")]
 use crate::motion::advance::Lead;
-use crate::motion::block::{Block, Line as Move, Outputs, QueuedAction};
+use crate::motion::block::{Block, Outputs, QueuedAction};
 use crate::motion::chain::Chain;
 use crate::motion::dynamics::{Dynamics, MachineLimits};
 use crate::motion::line::{Builder, Built, Line};
@@ -515,15 +515,15 @@ impl Planner {
         #[cfg(feature = "bed-plane")]
         let may_merge = may_merge && (lifted.is_none() || bed::is_near(&self.position, target));
         let line = Line { from, to, feed, curve, may_merge };
-        let mut block = Move::default();
-        let built = self.builder.line(&line, &self.dynamics, &*settings, &mut block);
+        let Some(block) = self.queue.next_line() else { return Built::Nothing };
+        let built = self.builder.line(&line, &self.dynamics, &*settings, block);
         if let Built::Line(entry) = built {
             #[cfg(feature = "printer")]
-            self.refine(&mut block, from, to);
+            heat::refine_by(&self.lead, &settings, block, from, to);
             if let Ongoing::Arc(arc) = &mut self.walk {
                 arc.curve.go_on();
             }
-            self.queue.push_line(&mut block, entry, self.line);
+            self.queue.push_line(entry, self.line);
         }
         built
     }

@@ -9,7 +9,7 @@ use kerf::gcode::overrides::Change;
 use kerf::hal::ring::{Consumer, Producer, Ring};
 use kerf::kinematics::{self, DIFFERENCE, SUM};
 use kerf::motion::advance;
-use kerf::motion::block::{Block, Line as Move};
+use kerf::motion::block::Block;
 use kerf::motion::dynamics::{Dynamics, MachineLimits};
 use kerf::motion::exec::{Exec, Step, take_heat, take_override};
 use kerf::motion::factors::Factors;
@@ -212,8 +212,8 @@ impl Rig {
 
     fn go(&mut self, to: PerAxis<Length>, feed: Option<Feed>, number: u32) {
         let line = Line { from: &self.position, to: &to, feed, curve: None, may_merge: false };
-        let mut block = Move::default();
-        match self.builder.line(&line, &self.dynamics, &self.config, &mut block) {
+        let block = self.queue.next_line().expect("room");
+        match self.builder.line(&line, &self.dynamics, &self.config, block) {
             Built::Nothing => {}
             Built::Parts(_) => panic!("too long for a test"),
             Built::Merge => unreachable!("it may not"),
@@ -221,9 +221,9 @@ impl Rig {
                 if let Some(motor) = self.leads {
                     let axis = usize::from(self.config.drives[motor]);
                     let travel = to[axis].0 - self.position[axis].0;
-                    advance::refine(&mut block, motor, self.config.ratio[motor], travel);
+                    advance::refine(block, motor, self.config.ratio[motor], travel);
                 }
-                assert!(self.queue.push_line(&mut block, entry, number));
+                assert!(self.queue.push_line(entry, number));
             }
         }
         self.position = to;

@@ -7,6 +7,7 @@ use kerf_macros::small;
 
 use super::Planner;
 use crate::boards::MOTORS;
+use crate::config::Settings;
 use crate::gcode::command::Motion;
 use crate::gcode::heating::{Heat, Wait};
 use crate::gcode::printing::EXTRUDER;
@@ -78,18 +79,6 @@ impl Planner {
         }
     }
 
-    /// A line from here to there says how much filament it pushes, as exactly as a lead needs it.
-    #[inline(always)]
-    pub(super) fn refine(&self, line: &mut Line, from: &PerAxis<Length>, to: &PerAxis<Length>) {
-        if self.lead.time != 0
-            && let (Some(from), Some(to)) = (from.get(EXTRUDER), to.get(EXTRUDER))
-        {
-            let motor = usize::from(self.lead.motor);
-            let ratio = self.links.settings.borrow().step_ratio(motor);
-            refine(line, motor, ratio, to.0.wrapping_sub(from.0));
-        }
-    }
-
     /// Waits until the heaters that the line names are as hot as it asks for, or somebody ends that.
     pub(super) async fn await_heat(&self) {
         let links = self.links;
@@ -105,5 +94,22 @@ impl Planner {
         })
         .await;
         links.heat.end_wait();
+    }
+}
+
+/// A line from here to there says how much filament it pushes, as exactly as the lead needs it.
+#[inline(always)]
+pub(super) fn refine_by(
+    lead: &Lead,
+    settings: &Settings,
+    line: &mut Line,
+    from: &PerAxis<Length>,
+    to: &PerAxis<Length>,
+) {
+    if lead.time != 0
+        && let (Some(from), Some(to)) = (from.get(EXTRUDER), to.get(EXTRUDER))
+    {
+        let motor = usize::from(lead.motor);
+        refine(line, motor, settings.step_ratio(motor), to.0.wrapping_sub(from.0));
     }
 }
