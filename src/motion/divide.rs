@@ -3,7 +3,7 @@
 //!
 //! Called by exec's preparation of segments and by the line builder, a few times each. No units.
 
-use crate::hal::arithmetic;
+use crate::hal::arithmetic::{self, inverse_root, product};
 
 /// `a / b`, rounded down, if that fits 16 bits: `a >> 16 < b`. Else something, without a panic.
 /// Cost: 170, 100 if it fits eight bits; 200 and 120 if `b` has 16 bits.
@@ -24,6 +24,37 @@ pub fn root(x: u32) -> u16 {
     arithmetic::root(x)
 }
 
+/// The length of a vector, from its square.
+#[derive(Clone, Copy, Debug)]
+pub struct Size {
+    /// From 2^15 on: twice the length if `is_twice`.
+    pub length: u16,
+    /// See `length`.
+    pub is_twice: bool,
+    /// 2^30 over the length.
+    pub reciprocal: u16,
+}
+
+impl Size {
+    /// Of a vector whose longest part is at least 2^14, 0.01 % exact. Cost: 190, where a root and a division take 490.
+    #[inline(always)]
+    pub fn of_square(square: u32) -> Self {
+        // In 16 bits: a shift of all 32 takes a loop.
+        let [_, next, ..] = square.to_le_bytes();
+        let mut upper = (square >> 16) as u16;
+        let is_twice = upper < 0x4000;
+        if is_twice {
+            upper = upper << 2 | u16::from(next >> 6);
+        }
+        let root = inverse_root(upper);
+        Self {
+            length: (product(upper, root) >> 15) as u16,
+            is_twice,
+            reciprocal: if is_twice { root } else { root >> 1 },
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -36,7 +67,26 @@ mod tests {
         }
     }
 
+    #[test]
+    fn inverse_roots() {
+        for x in 1 << 14..=u16::MAX {
+            let exact = f64::from(1 << 23) / f64::from(x).sqrt();
+            let off = f64::from(inverse_root(x)) / exact - 1.0;
+            assert!(off.abs() < 6e-5, "{x}: {off}");
+        }
+    }
+
     proptest! {
+        #[test]
+        fn sizes(square in 1u32 << 28..) {
+            let exact = f64::from(square).sqrt();
+            let size = Size::of_square(square);
+            let length = f64::from(size.length) / if size.is_twice { 2.0 } else { 1.0 };
+            prop_assert!((length / exact - 1.0).abs() < 1e-4, "{size:?}");
+            prop_assert!((f64::from(size.reciprocal) * exact / f64::from(1 << 30) - 1.0).abs() < 1e-4, "{size:?}");
+            prop_assert!(size.length >= 1 << 15);
+        }
+
         #[test]
         fn is_division(b in 1u16.., a in 0u32..) {
             let a = a % (u32::from(b) << 16);

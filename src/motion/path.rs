@@ -5,13 +5,18 @@
 //!
 //! Units: those of [`Length`] on the way in, mm (or degrees) on the way out.
 
-use super::divide::{quotient, root};
+use kerf_macros::small;
+
+use super::divide::Size;
 use super::float::{below, brief_product};
 use super::junction::{Heading, ONE};
 use super::short::Short;
 use crate::hal::arithmetic::product;
 use crate::math::sqrt;
 use crate::units::{FIRST_ROTARY, Length, PerAxis};
+
+/// The longest part of a way is to have at least as many units.
+const MOST: u32 = 1 << 14;
 
 /// Whether there is a way.
 pub(super) enum Way {
@@ -47,6 +52,8 @@ pub(super) struct Path {
     pub(super) jerk: Short,
     /// The least acceleration and jerk of the axes that move, 0 for none.
     pub(super) slowest: (Short, Short),
+    /// They may not be those of all axes that move.
+    pub(super) mixed: bool,
 }
 
 impl Path {
@@ -74,28 +81,28 @@ impl Path {
         }
         let shift = normalize(&mut self.heading.unit, &self.travel, all);
         let (linear, rotary) = self.heading.unit.split_at(FIRST_ROTARY);
-        let mut length = norm(linear);
+        let mut square = square(linear);
         if self.moved >> FIRST_ROTARY != 0 {
-            let turn = norm(rotary);
-            if turn > length {
-                length = turn;
+            let turn = self::square(rotary);
+            if turn > square {
+                square = turn;
                 if self.moved & ((1 << FIRST_ROTARY) - 1) != 0 {
                     self.stretch = stretch(&self.travel);
                 }
             }
         }
-        // No shorter than its longest part, of 15 bits.
-        let reciprocal = quotient((1 << 30) - 1, length);
+        let size = Size::of_square(square);
         for u in &mut self.heading.unit {
             if *u != 0 {
-                *u = share(*u, reciprocal);
+                *u = share(*u, size.reciprocal);
             }
         }
         // Long moves have the time to be measured exactly, and their steps come evenly.
         self.length = if shift > 0 {
             length_of(&self.travel)
         } else {
-            brief_product(composed(length, 127 + 15 + i16::from(shift)), 1e-4)
+            let power = if size.is_twice { 127 + 14 } else { 127 + 15 };
+            brief_product(composed(size.length, power + i16::from(shift)), 1e-4)
         };
         Way::Near
     }
@@ -120,27 +127,32 @@ impl Path {
 /// the sizes.
 #[inline(never)]
 fn normalize(unit: &mut PerAxis<i16>, travel: &PerAxis<i32>, bits: u32) -> i8 {
-    const MOST: u32 = 1 << 14;
-    let mut shift = 0i8;
-    if bits < 2 * MOST {
-        // All 16 bits wide.
-        let mut bits = bits as u16;
-        while bits < MOST as u16 {
-            bits <<= 1;
-            shift += 1;
-        }
-        for (unit, &way) in unit.iter_mut().zip(travel) {
-            let mut way = way as i16;
-            if way != 0 {
-                for _ in 0..shift {
-                    way <<= 1;
-                }
-            }
-            *unit = way;
-        }
-        return -shift;
+    if bits >= 2 * MOST {
+        return normalize_far(unit, travel, bits);
     }
-    let mut bits = bits;
+    // All 16 bits wide.
+    let (mut bits, mut shift) = (bits as u16, 0i8);
+    while bits < MOST as u16 {
+        bits <<= 1;
+        shift += 1;
+    }
+    for (unit, &way) in unit.iter_mut().zip(travel) {
+        let mut way = way as i16;
+        if way != 0 {
+            for _ in 0..shift {
+                way <<= 1;
+            }
+        }
+        *unit = way;
+    }
+    -shift
+}
+
+/// [`normalize`] for travel of more than 15 bits: there is time.
+#[inline(never)]
+#[small]
+fn normalize_far(unit: &mut PerAxis<i16>, travel: &PerAxis<i32>, mut bits: u32) -> i8 {
+    let mut shift = 0i8;
     while bits >= 2 * MOST {
         bits >>= 1;
         shift += 1;
@@ -151,9 +163,9 @@ fn normalize(unit: &mut PerAxis<i16>, travel: &PerAxis<i32>, bits: u32) -> i8 {
     shift
 }
 
-/// The length of a vector.
+/// The square of a vector's length.
 #[inline(never)]
-fn norm(vector: &[i16]) -> u16 {
+fn square(vector: &[i16]) -> u32 {
     let mut sum = 0u32;
     for &term in vector {
         let size = term.unsigned_abs();
@@ -161,7 +173,7 @@ fn norm(vector: &[i16]) -> u16 {
             sum += product(size, size);
         }
     }
-    root(sum)
+    sum
 }
 
 /// The length of a move, mm: that of the linear axes or of the rotary ones, whichever is longer.
@@ -189,8 +201,8 @@ fn exact_norm(travel: &[i32]) -> f32 {
 }
 
 /// A part of the whole, given by that one's reciprocal in 2^-30, in the units of a heading; rounded down, by less than 2.
-/// Cost: 40.
-#[inline(always)]
+/// Cost: 45.
+#[inline(never)]
 fn share(part: i16, reciprocal: u16) -> i16 {
     let share = (product(part.unsigned_abs(), reciprocal) >> 16) as i16;
     if part < 0 { -share } else { share }

@@ -15,7 +15,7 @@ mod image {
     /// Marks and values that [`arithmetic::passed_over`] may look at.
     const PAIRS: usize = 8;
     /// Words that come out.
-    const WORDS: usize = 16;
+    const WORDS: usize = 17;
 
     // All of them are bytes, the lowest first. LLVM 22 may load an atomic word into the registers that hold its address (`ld r30, Z`, `ldd r31, Z+1`): the second
     // byte comes from somewhere else.
@@ -84,6 +84,7 @@ mod image {
             arithmetic::passed_over(marks, values, b as u16).into(),
             // What an inlined division makes of it, in other registers.
             arithmetic::divide(a, b as u16).0,
+            arithmetic::inverse_root(a as u16),
         ]
     }
 

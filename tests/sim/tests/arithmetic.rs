@@ -44,6 +44,7 @@ struct Results {
     times: u32,
     high_product: u8,
     root: u16,
+    inverse_root: u16,
     /// Its bits; those of one NaN for all.
     ratio: u32,
     whole: u32,
@@ -88,6 +89,7 @@ impl Case {
             times: arithmetic::times(a, b as u8),
             high_product: arithmetic::high_product(a as u8, b as u8),
             root: divide::root(a),
+            inverse_root: arithmetic::inverse_root(a as u16),
             ratio: bits(arithmetic::ratio(f32::from_bits(a), f32::from_bits(b))),
             whole: arithmetic::whole(f32::from_bits(a)),
             passed_over: arithmetic::passed_over(marks, values, b as u16),
@@ -156,6 +158,7 @@ impl Chip {
             times: two(6),
             high_product: word(8) as u8,
             root: word(9),
+            inverse_root: word(16),
             ratio: bits(f32::from_bits(two(10))),
             whole: two(12),
             passed_over: word(14) as u8,
