@@ -340,7 +340,9 @@ fn junction_velocities() {
         let corner = |angle: f64| {
             let (a, b) = (heading(start), heading(start + angle));
             let velocities = Velocities { cruise: 1e9, top: 1e9 };
-            60.0 * junction::limit(&a, &b, 1e5 / 3600.0, velocities)
+            let turned = junction::turn(&a.unit, &b.unit);
+            let deviations = (a.deviation, b.deviation);
+            60.0 * junction::limit(turned, deviations, 1e5 / 3600.0, &velocities)
         };
         for (angle, velocity) in [
             (10.0, 1144.10),

@@ -11,7 +11,7 @@ use kerf_macros::small;
 use super::dynamics::{Axis, Dynamics};
 use super::float::{cube_root, greater, least, some};
 use super::governor::effective_jerk;
-use super::junction::{Heading, ONE};
+use super::junction::{Heading, ONE, turn};
 use super::limits::Slowest;
 use super::path::Path;
 use super::short::{Log, OCTAVE, Short};
@@ -30,8 +30,10 @@ const TURNING_JERK: f32 = 0.65;
 const CORNER_S: f32 = 0.01;
 /// 0.5 um, in 2^-14 mm.
 const NOISE: Log = Log(3 * OCTAVE);
-/// The square root of three, as a logarithm.
-const THREE: i16 = OCTAVE * 4 / 5;
+/// A curve is plain if it turns by so many times as much as positions may be rounded by, as a logarithm.
+const PLAIN: i16 = 7 * OCTAVE / 2;
+/// More than what the logarithm of a velocity is off.
+const SPARE: i16 = 8;
 /// What a velocity rounded up may take of the jerk, as a logarithm: a tenth.
 const JERK_SPARE: i16 = 39;
 /// No arc is smaller, mm.
@@ -72,7 +74,7 @@ impl Curve {
         let mut slowest = Slowest::default();
         for axis in axes {
             if let Some(axis) = dynamics.axes.get(usize::from(axis)) {
-                slowest.look_at(ONE as u16, axis.accel, axis.jerk);
+                slowest.look(ONE as u16, axis.accel, axis.jerk);
             }
         }
         let (accel, jerk) = (slowest.least.get(), slowest.jerk.get());
@@ -130,47 +132,63 @@ impl Bend {
     }
 
     /// The path goes on with a line, from heading `from`. Slows it down if the last two corners are those of a
-    /// curve that cannot be taken as fast.
+    /// curve that cannot be taken as fast. Returns what [`turn`] says of this corner.
     ///
-    /// Cost: 350 where it is no curve, 750 on a curve that is plainly no limit, else 1,400.
+    /// Cost: 400 where it is no curve, 800 on a curve that is plainly no limit, else 1,000 to 1,400.
     #[inline(never)]
-    pub(super) fn line(&mut self, from: &Heading, path: &mut Path, dynamics: &Dynamics) {
+    pub(super) fn line(&mut self, from: &Heading, path: &mut Path, dynamics: &Dynamics) -> u32 {
         let (last, before) = (self.last, self.before);
         self.last = Short::new(path.length);
         self.before = last;
-        let (mut most, mut sum, mut difference) = (0, 0, 0);
+        let (mut most, mut sum, mut difference, mut halves) = (0, 0, 0, 0);
+        let mut square = 0u32;
         let mut both = [0; FIRST_ROTARY];
         let ends = from.unit.iter().zip(&path.heading.unit);
         for ((turned, both), (a, b)) in self.turned.iter_mut().zip(&mut both).zip(ends) {
             let turns = b.wrapping_sub(*a);
             let before = core::mem::replace(turned, turns);
             if turns | before != 0 {
+                let size = turns.unsigned_abs();
+                square = square.wrapping_add(product(size, size));
                 *both = turns.wrapping_add(before).unsigned_abs();
-                most = turns.unsigned_abs().max(most);
+                most = size.max(most);
                 sum = (*both).max(sum);
+                halves = (*both / 2).wrapping_add(halves);
                 difference = turns.wrapping_sub(before).unsigned_abs().max(difference);
             }
         }
+        let (_, from) = from.unit.split_at(FIRST_ROTARY);
+        if path.moved >> FIRST_ROTARY != 0 || from.iter().any(|u| *u != 0) {
+            let (_, to) = path.heading.unit.split_at(FIRST_ROTARY);
+            square = square.wrapping_add(turn(from, to));
+        }
+        if self.is_curve(most, sum, difference)
+            && let Some(span) = span(before, last, self.last)
+        {
+            path.keep_to_bend(&mut both, sum / 2 + halves, span, dynamics);
+        }
+        square
+    }
+
+    /// Whether the last corners are those of a curve: the greatest change of direction of an axis, that of two corners together, and
+    /// by how much the two differ.
+    #[inline(always)]
+    fn is_curve(&mut self, most: u16, sum: u16, difference: u16) -> bool {
         if !(STRAIGHT..=CORNER).contains(&most) {
             self.turned = [0; FIRST_ROTARY];
             self.corners = 0;
-            return;
+            return false;
         }
         // The two turn the same way, and one no more than three times as much as the other.
         if difference > sum / 2 {
             self.corners = 0;
-            return;
+            return false;
         }
-        if self.corners < CORNERS {
+        let follows = self.corners >= CORNERS;
+        if !follows {
             self.corners += 1;
-            return;
         }
-        if let Some(span) = span(before, last, self.last) {
-            let plain = Log(Log::of(sum).0 + THREE);
-            if path.bends_too_much(plain, span, path.slowest) {
-                path.bend(&mut both, span, dynamics);
-            }
-        }
+        follows
     }
 }
 
@@ -252,7 +270,7 @@ impl Sharp {
 /// much as the one that does most now.
 #[inline(never)]
 #[small]
-fn acceleration(both: &[u16; FIRST_ROTARY], dynamics: &Dynamics) -> i16 {
+fn acceleration(both: &[u16; FIRST_ROTARY], dynamics: &Dynamics) -> Log {
     let most = both.iter().fold(0, |most, size| most.max(*size));
     let mut least = i16::MAX;
     for (&size, axis) in both.iter().zip(&dynamics.axes) {
@@ -262,19 +280,56 @@ fn acceleration(both: &[u16; FIRST_ROTARY], dynamics: &Dynamics) -> i16 {
             least = least.min(along);
         }
     }
-    least
+    Log(least)
+}
+
+/// The curvature of a path whose direction changes by `both`, in 2^-14, within `span` mm: its logarithm.
+#[inline(always)]
+fn curvature(both: Log, span: Log) -> i16 {
+    both.0 - 14 * OCTAVE - span.0
+}
+
+/// How fast a path of this curvature may be for an acceleration, v^2 / r, and a jerk, v^3 / r^2, 0 for none: all in logarithms.
+#[inline(never)]
+fn fastest(curvature: i16, accel: Short, jerk: Short) -> i16 {
+    let mut velocity = i16::MAX;
+    if accel != Short::ZERO {
+        velocity = (accel.log().0 - curvature) / 2;
+    }
+    if jerk != Short::ZERO {
+        velocity = velocity.min(third(jerk.log().0 - JERK_SPARE - 2 * curvature));
+    }
+    velocity
+}
+
+/// One of eight values in an octave, so that lines of a curve have one velocity in spite of what is rounded: 2 % up or 6 % down.
+#[inline(always)]
+fn even(velocity: i16) -> i16 {
+    (velocity + OCTAVE / 32) & !(OCTAVE / 8 - 1)
 }
 
 impl Path {
-    /// Whether it is too fast for an acceleration and a jerk, 0 for none, on a path whose direction changes by `both`, in
-    /// 2^-14, within `span` mm.
+    /// Keeps to what axes can on a path whose direction changes by `both`, of which `length` is no less than the length, in 2^-14,
+    /// within `span` mm. What only an override asks for may be up to a quarter below that.
     #[inline(never)]
-    fn bends_too_much(&self, both: Log, span: Log, (accel, jerk): (Short, Short)) -> bool {
-        let top = Log::of_float(self.top).0;
-        // v^2 / r and v^3 / r^2.
-        let once = top + both.0 - 14 * OCTAVE - span.0 + top;
-        accel != Short::ZERO && once > accel.log().0
-            || jerk != Short::ZERO && once + once - top > jerk.log().0
+    fn keep_to_bend(
+        &mut self,
+        both: &mut [u16; FIRST_ROTARY],
+        length: u16,
+        span: Log,
+        dynamics: &Dynamics,
+    ) {
+        let length = Log::of(length);
+        let limit = fastest(curvature(length, span), self.slowest.0, self.slowest.1);
+        if limit >= Log::of_float(self.top).0 {
+            return;
+        }
+        let is_plain = !self.mixed && length.0 + span.0 >= NOISE.0 + PLAIN;
+        if is_plain && Log::of_float(self.cruise).0 < even(limit) - SPARE {
+            self.top = Log(even(limit)).power().get();
+        } else {
+            self.bend(both, span, dynamics);
+        }
     }
 
     /// Keeps to what axes can on a path whose direction changes by `both`, in 2^-14, within `span` mm.
@@ -293,21 +348,12 @@ impl Path {
         if squares == 0 {
             return;
         }
-        let curvature = Log::of_wide(squares).0 / 2 - 14 * OCTAVE - span.0;
-        let mut velocity = i16::MAX;
-        if slowest.mixed {
-            velocity = (acceleration(both, dynamics) - curvature) / 2;
-        } else if slowest.accel != Short::ZERO {
-            velocity = (slowest.accel.log().0 - curvature) / 2;
-        }
-        if slowest.jerk != Short::ZERO {
-            let log = slowest.jerk.log().0 - JERK_SPARE - 2 * curvature;
-            velocity = velocity.min(third(log));
-        }
+        let curvature = curvature(Log(Log::of_wide(squares).0 / 2), span);
+        let accel =
+            if slowest.mixed { acceleration(both, dynamics).power() } else { slowest.accel };
+        let velocity = fastest(curvature, accel, slowest.jerk);
         if velocity < Log::of_float(self.top).0 {
-            // To one of eight values in an octave, so that lines of a curve have one velocity in spite of what is
-            // rounded: 2 % up or 6 % down.
-            self.slow_down(Log((velocity + OCTAVE / 32) & !(OCTAVE / 8 - 1)).power().get());
+            self.slow_down(Log(even(velocity)).power().get());
         }
     }
 
@@ -343,6 +389,24 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn what_overrides_ask_for_on_a_bend_is_up_to_a_quarter_less(
+            turns in [0u16..3_000, 0u16..3_000, 0u16..3_000],
+            span in 0.02f32..20.0, accel in 20f32..5e3, jerk in prop_oneof![Just(0.0), 50f32..1e6],
+        ) {
+            let limits = dynamics(accel, jerk);
+            let top_from = |cruise: f32| {
+                let slowest = (Short::new(accel), Short::new(jerk));
+                let mut path = Path { cruise, top: 1e6, slowest, ..Path::default() };
+                let length = turns.iter().max().unwrap() / 2 + turns.iter().map(|turn| turn / 2).sum::<u16>();
+                path.keep_to_bend(&mut turns.clone(), length, Short::new(span).log(), &limits);
+                path.top
+            };
+            prop_assume!(turns.iter().max().unwrap() >= &STRAIGHT);
+            let (rough, exact) = (top_from(1e-6), top_from(1e6));
+            prop_assert!(rough > 0.75 * exact && rough < 1.1 * exact, "{rough} of {exact}");
+        }
+
         #[test]
         fn arcs_keep_to_acceleration_and_jerk(
             radius in 0.2f32..30.0, accel in 20f32..5e3, jerk in prop_oneof![Just(0.0), 50f32..1e6],

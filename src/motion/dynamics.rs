@@ -59,6 +59,12 @@ pub struct Axis {
 }
 
 impl Axis {
+    /// Whether it has all limits but those of velocity that another one has.
+    #[inline(always)]
+    pub(super) fn is_like(&self, other: &Self) -> bool {
+        (self.accel, self.jerk, self.deviation) == (other.accel, other.jerk, other.deviation)
+    }
+
     /// Takes acceleration and jerk over, mm/s^2 and mm/s^3; 0 or less for none. The velocities are known. Cost: 3,000.
     ///
     /// An acceleration far beyond what any ramp reaches under the jerk limit would make the potentials of `speed_constraints` coarse. Between 0

@@ -39,8 +39,10 @@ pub struct Heading {
 /// 1 in the units of a heading.
 pub const ONE: i16 = 1 << 14;
 
-/// The junction deviation along `unit`. Cost: 150 where all axes that move have the same, else
+/// The junction deviation along `unit`. Cost: 200 where all axes that move have the same, else
 /// 1,000 + 900 for each axis that moves.
+#[inline(never)]
+#[small]
 pub fn deviation(unit: &PerAxis<i16>, dynamics: &Dynamics) -> Short {
     let mut same = None;
     for (&u, axis) in unit.iter().zip(&dynamics.axes) {
@@ -75,23 +77,24 @@ pub struct Velocities {
     pub top: f32,
 }
 
-/// The highest velocity from heading `a` into heading `b`, mm/s, with the junction `acceleration`,
-/// mm/s^2: 0 for a reversal, [`f32::MAX`] straight on, or where it is above the top. Where it is above the cruise velocity, so
+/// The highest velocity at a corner, mm/s, which has [turned](turn) by so much between lines of these junction deviations, with the junction
+/// `acceleration`, mm/s^2: 0 for a reversal, [`f32::MAX`] straight on, or where it is above the top. Where it is above the cruise velocity, so
 /// that only an override asks for it, it is up to a tenth too low.
 ///
-/// The axes' velocities change by `(b.unit - a.unit) * velocity`, also where the two paths are
-/// measured differently (linear, rotary, both), so that it is this difference that counts.
-///
-/// Cost: 400 + 50 for each axis that moves; 2,000 more for one that limits the cruise velocity.
+/// Cost: 300; 2,000 more for one that limits the cruise velocity.
 #[inline(never)]
-pub fn limit(a: &Heading, b: &Heading, acceleration: f32, velocities: Velocities) -> f32 {
-    let sum = turn(&a.unit, &b.unit);
-    if sum < STRAIGHT {
+pub fn limit(
+    turned: u32,
+    (a, b): (Short, Short),
+    acceleration: f32,
+    velocities: &Velocities,
+) -> f32 {
+    if turned < STRAIGHT {
         return f32::MAX;
     }
-    let same = a.deviation == b.deviation;
-    if same && sum < WIDE {
-        let rough = rough(sum, a.deviation, acceleration);
+    let same = a == b;
+    if same && turned < WIDE {
+        let rough = rough(turned, a, acceleration);
         if rough >= Short::above(velocities.top) {
             return f32::MAX;
         }
@@ -99,10 +102,9 @@ pub fn limit(a: &Heading, b: &Heading, acceleration: f32, velocities: Velocities
             return rough.get();
         }
     }
-    let (a, b) = (a.deviation.get(), b.deviation.get());
-    let deviation = if same { a } else { mean(a, b) };
+    let deviation = if same { a.get() } else { mean(a.get(), b.get()) };
     // The square of the sine of half the angle.
-    let sine = scaled(sum as f32, -30);
+    let sine = scaled(turned as f32, -30);
     arc(sine, deviation * acceleration, velocities.top)
 }
 
@@ -117,9 +119,12 @@ fn rough(sum: u32, deviation: Short, acceleration: f32) -> Short {
     Log((product + STRAIGHT_ON - Log::of_wide(sum).0) / 2).power()
 }
 
-/// The square of the change of direction, in 2^-28.
+/// The square of the change of direction, in 2^-28. Cost: 60 + 30 for each axis whose direction changes.
+///
+/// The axes' velocities change by `(b - a) * velocity`, also where the two paths are measured differently (linear, rotary, both), so that it is
+/// this difference that counts.
 #[inline(never)]
-fn turn(a: &PerAxis<i16>, b: &PerAxis<i16>) -> u32 {
+pub fn turn(a: &[i16], b: &[i16]) -> u32 {
     // |b - a| = 2 sin(angle / 2): precise for small angles, which 1 - cos(angle) is not.
     let mut sum = 0u32;
     for (from, to) in a.iter().zip(b) {
@@ -172,7 +177,10 @@ mod tests {
                 Heading { unit, deviation }
             };
             let (a, b) = (heading(start), heading(start + angle));
-            let at = |cruise, top| limit(&a, &b, acceleration, Velocities { cruise, top });
+            let at = |cruise, top| {
+                let velocities = Velocities { cruise, top };
+                limit(turn(&a.unit, &b.unit), (a.deviation, b.deviation), acceleration, &velocities)
+            };
             let exact = at(1e20, 1e20);
             prop_assume!(exact != f32::MAX);
             let rough = at(0.0, 1e20);

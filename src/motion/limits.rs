@@ -10,7 +10,7 @@ use super::dynamics::{Axis, Dynamics};
 use super::exec::BLOCK_S_MIN;
 use super::float::{below, least, scaled, some};
 use super::governor::{ACCEL_MOST, effective_jerk};
-use super::junction::ONE;
+use super::junction::{self, ONE};
 use super::path::Path;
 use super::short::{self, Log, Short};
 use crate::boards::MOTORS;
@@ -119,25 +119,18 @@ impl Path {
         })
     }
 
-    /// Acceleration and jerk.
+    /// Acceleration and jerk, and the junction deviation. Cost: 350 where all axes that move have the same limits.
     #[inline(never)]
     pub(super) fn limit_change(&mut self, dynamics: &Dynamics) {
-        let mut slowest = Slowest::default();
-        if some(self.stretch) {
-            self.look_along(&mut slowest, dynamics);
-        } else {
-            let mut left = self.moved;
-            for (u, axis) in self.heading.unit.iter().zip(&dynamics.axes) {
-                if left & 1 != 0 {
-                    slowest.look(part(*u), axis.accel, axis.jerk);
-                }
-                left >>= 1;
-                if left == 0 {
-                    break;
-                }
+        let slowest = match self.like_one(dynamics) {
+            Some((unit, &Axis { accel, jerk, deviation, .. })) if !some(self.stretch) => {
+                self.heading.deviation = deviation;
+                Slowest { unit, least: accel, accel, jerk, mixed: false }
             }
-        }
+            _ => self.look_at_all(dynamics),
+        };
         self.slowest = (slowest.least, slowest.jerk);
+        self.mixed = slowest.mixed;
         if slowest.least != Short::ZERO {
             let jerk = slowest.effective_jerk();
             let accel =
@@ -155,14 +148,37 @@ impl Path {
         }
     }
 
-    /// Limits a move of lengths and angles together: each limit is measured along the way.
+    /// The axis whose limits are those of all that move, and the greatest part of the heading; `None` if they have different ones.
+    #[inline(always)]
+    fn like_one<'a>(&'a self, dynamics: &'a Dynamics) -> Option<(u16, &'a Axis)> {
+        let (mut most, mut first) = (0, None);
+        for (u, axis) in self.axes(dynamics) {
+            most = u.max(most);
+            let like: &Axis = first.get_or_insert(axis);
+            if !axis.is_like(like) {
+                return None;
+            }
+        }
+        first.map(|axis| (most, axis))
+    }
+
+    /// What limits a move of axes with different limits.
     #[inline(never)]
     #[small]
-    fn look_along(&self, slowest: &mut Slowest, dynamics: &Dynamics) {
+    fn look_at_all(&mut self, dynamics: &Dynamics) -> Slowest {
+        let mut slowest = Slowest::default();
+        let stretches = some(self.stretch);
         for (u, axis) in self.axes(dynamics) {
+            // Each limit of a move of lengths and angles together is measured along the way.
             let along = |limit| if limit == Short::ZERO { limit } else { over(limit, u) };
-            slowest.look_at(ONE as u16, along(axis.accel), along(axis.jerk));
+            if stretches {
+                slowest.look(ONE as u16, along(axis.accel), along(axis.jerk));
+            } else {
+                slowest.look(u, axis.accel, axis.jerk);
+            }
         }
+        self.heading.deviation = junction::deviation(&self.heading.unit, dynamics);
+        slowest
     }
 
     /// Whether no motor goes half a step and no axis 3 mm, and the move is over before exec can prepare the next one. Cost: 10; 400 if
@@ -192,7 +208,8 @@ impl Path {
         let rate = rates[usize::from(self.moving) - 1];
         let short = chord || !self.whole_steps;
         let octaves = if self.whole_steps { 0 } else { i16::from(PARTS_LOG2) };
-        let log = |x| Log::of_float(x).0;
+        // Inlined: that saves 20 cycles each.
+        let log = |x| Short::new(x).log().0;
         let (top, length) = (log(self.top), log(self.length));
         let share = if short { SHORT_SHARE_LOG } else { 0 };
         let most = Log::of(self.most).0 - octaves * short::OCTAVE;
@@ -293,15 +310,11 @@ pub(super) struct Slowest {
     pub(super) unit: u16,
     pub(super) least: Short,
     pub(super) jerk: Short,
+    /// Not all axes have these limits, or one has no acceleration limit.
+    pub(super) mixed: bool,
 }
 
 impl Slowest {
-    /// Looks as [`Slowest::look`] does, without being inlined: for callers that are not hot. Cost: 130.
-    #[inline(never)]
-    pub(super) fn look_at(&mut self, u: u16, accel: Short, jerk: Short) {
-        self.look(u, accel, jerk);
-    }
-
     /// The jerk limit, if it has an effect.
     #[inline(always)]
     fn effective_jerk(&self) -> Short {
@@ -313,26 +326,33 @@ impl Slowest {
         Short::new(effective_jerk(self.jerk.get(), self.least.get()))
     }
 
-    #[inline(always)]
-    fn look(&mut self, u: u16, accel: Short, jerk: Short) {
-        if accel != Short::ZERO {
-            if self.least == Short::ZERO || accel < self.least {
-                self.least = accel;
-            }
-            let slower = if self.accel == Short::ZERO {
-                true
-            } else if accel == self.accel {
-                self.unit < u
-            } else {
-                is_slower(accel, self.unit, self.accel, u)
-            };
-            if slower {
-                self.accel = accel;
-                self.unit = u;
+    /// Looks at an axis with such a part of the heading. Cost: 130.
+    #[inline(never)]
+    pub(super) fn look(&mut self, u: u16, accel: Short, jerk: Short) {
+        if jerk != self.jerk {
+            self.mixed |= self.unit != 0;
+            if jerk != Short::ZERO && (self.jerk == Short::ZERO || jerk < self.jerk) {
+                self.jerk = jerk;
             }
         }
-        if jerk != Short::ZERO && (self.jerk == Short::ZERO || jerk < self.jerk) {
-            self.jerk = jerk;
+        if accel == Short::ZERO {
+            self.mixed = true;
+            return;
+        }
+        if self.least == Short::ZERO || accel < self.least {
+            self.least = accel;
+        }
+        let slower = if self.accel == Short::ZERO {
+            true
+        } else if accel == self.accel {
+            self.unit < u
+        } else {
+            self.mixed = true;
+            is_slower(accel, self.unit, self.accel, u)
+        };
+        if slower {
+            self.accel = accel;
+            self.unit = u;
         }
     }
 }

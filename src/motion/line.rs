@@ -122,19 +122,25 @@ impl Builder {
             return Built::Merge;
         }
         path.limit_change(dynamics);
-        match line.curve {
-            Some(curve) => self.bend.chord(&mut path, curve),
-            None if some(self.top) => self.bend.line(&self.heading, &mut path, dynamics),
-            None => self.bend = Bend::default(),
-        }
-        path.limit_steps(&dynamics.rates, line.curve.is_some());
-        path.heading.deviation = junction::deviation(&path.heading.unit, dynamics);
-        let mut entry = least(path.top, self.top);
         // The chords of an arc have its limits, and no corners between them.
         let goes_on = matches!(line.curve, Some(curve) if curve.goes_on);
+        let turned = match line.curve {
+            Some(curve) => {
+                self.bend.chord(&mut path, curve);
+                if goes_on { 0 } else { junction::turn(&self.heading.unit, &path.heading.unit) }
+            }
+            None if some(self.top) => self.bend.line(&self.heading, &mut path, dynamics),
+            None => {
+                self.bend = Bend::default();
+                0
+            }
+        };
+        path.limit_steps(&dynamics.rates, line.curve.is_some());
+        let mut entry = least(path.top, self.top);
         if some(entry) && !goes_on {
+            let deviations = (self.heading.deviation, path.heading.deviation);
             let velocities = Velocities { cruise: path.cruise, top: entry };
-            entry = junction::limit(&self.heading, &path.heading, dynamics.junction, velocities);
+            entry = junction::limit(turned, deviations, dynamics.junction, &velocities);
         }
         self.heading = path.heading;
         self.top = path.top;

@@ -298,7 +298,7 @@ pub const ROWS: [Row; 49] = [
         better: Higher,
         peers: NONE,
         target: Some(700.0),
-        floor: Some(590.0),
+        floor: Some(690.0),
         measure: spirals::curve_lines,
     },
     Row {
