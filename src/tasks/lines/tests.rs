@@ -150,9 +150,16 @@ fn dropped_lines_keep_their_place_and_control_lines_are_none_of_them() {
     pool.terminate_partial(Status::Terminated);
     feed(&mut pool, b"n}\n");
     let dropped = Class::Fault(Status::Terminated);
-    let classes = [Class::Control, Class::Control, dropped, dropped, dropped, Class::Data];
-    for class in classes {
-        assert_eq!(take(&mut pool, true).map(|line| line.1), Some(class));
+    for (text, class) in [
+        ("{a:n}", Class::Control),
+        ("{b:n}", Class::Control),
+        ("g1x1", dropped),
+        ("g1x2", dropped),
+        // What had come of it.
+        ("g1x", dropped),
+        ("g1x4", Class::Data),
+    ] {
+        assert_eq!(take(&mut pool, true), Some((text.into(), class)));
     }
     assert!(!pool.has_data());
     // Between two lines there is none to drop.
