@@ -32,7 +32,7 @@ pub const SLOTS: usize = LINES;
 pub const LINE_MAX: usize = 254;
 /// Asks for a status report. Senders of other firmwares say it without a line end, and then go on with their job.
 const ASKS: u8 = b'?';
-/// What is kept of a longer one, and of one that is dropped while it comes in.
+/// What is kept of a longer one, and in order of one that is dropped while it comes in.
 const REST_MAX: u8 = 32;
 
 /// What to do with a line.
@@ -417,8 +417,8 @@ impl LinePool {
     pub fn spoil(&mut self, status: Status) {
         // In a small pool less, to leave room for control lines.
         let most = REST_MAX.min(self.longest / 4);
-        // The beginning tells what has been dropped: grbl's senders are told that a jog is over, and that G-code is refused.
-        let tells = matches!(status, Status::InputTooLong | Status::Terminated);
+        // Where all lines are answered in their order the beginning tells what has been dropped: a jog is over, G-code is refused.
+        let tells = status == Status::InputTooLong || self.in_order && status == Status::Terminated;
         let kept = if tells { self.partial.min(most) } else { 0 };
         self.pass(self.partial - kept);
         self.partial = kept;

@@ -155,13 +155,19 @@ fn dropped_lines_keep_their_place_and_control_lines_are_none_of_them() {
         ("{b:n}", Class::Control),
         ("g1x1", dropped),
         ("g1x2", dropped),
-        // What had come of it.
-        ("g1x", dropped),
+        ("", dropped),
         ("g1x4", Class::Data),
     ] {
         assert_eq!(take(&mut pool, true), Some((text.into(), class)));
     }
     assert!(!pool.has_data());
+    // In order what had come of it is kept.
+    pool.keep_order(true);
+    feed(&mut pool, b"g1x");
+    pool.terminate_partial(Status::Terminated);
+    feed(&mut pool, b"3\n");
+    assert_eq!(take(&mut pool, true), Some((b"g1x".to_vec(), dropped)));
+    pool.keep_order(false);
     // Between two lines there is none to drop.
     pool.terminate_partial(Status::Terminated);
     feed(&mut pool, b"\n");
