@@ -114,7 +114,7 @@ impl Tail {
     }
 }
 
-/// The velocity, at most `entry`, from which a line comes to rest on its way if half of `kappa` is lost at either end of the deceleration.
+/// The velocity, at most `entry`, from which a line can come to rest on its own way, for limits with this [`kappa`].
 #[inline(never)]
 #[small]
 fn able_to_stop(line: &Line, entry: f32, kappa: f32) -> f32 {
