@@ -39,23 +39,10 @@ pub struct Heading {
 /// 1 in the units of a heading.
 pub const ONE: i16 = 1 << 14;
 
-/// The junction deviation along `unit`. Cost: 200 where all axes that move have the same, else
-/// 1,000 + 900 for each axis that moves.
+/// The junction deviation along `unit` of axes that have different ones. Cost: 1,000, and 900 for each axis that moves.
 #[inline(never)]
 #[small]
-pub fn deviation(unit: &PerAxis<i16>, dynamics: &Dynamics) -> Short {
-    let mut same = None;
-    for (&u, axis) in unit.iter().zip(&dynamics.axes) {
-        if u != 0 && *same.get_or_insert(axis.deviation) != axis.deviation {
-            return mean_deviation(unit, dynamics);
-        }
-    }
-    same.unwrap_or_default()
-}
-
-#[inline(never)]
-#[small]
-fn mean_deviation(unit: &PerAxis<i16>, dynamics: &Dynamics) -> Short {
+pub(super) fn mean_deviation(unit: &PerAxis<i16>, dynamics: &Dynamics) -> Short {
     let (mut norm, mut sum) = (0.0, 0.0);
     for (&u, axis) in unit.iter().zip(&dynamics.axes) {
         if u != 0 {

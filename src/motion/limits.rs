@@ -15,6 +15,7 @@ use super::path::Path;
 use super::short::{self, Log, Short};
 use crate::boards::MOTORS;
 use crate::gcode::command::Feed;
+use crate::hal::arithmetic::product;
 use crate::math::sqrt;
 
 /// Velocities beyond all machines, mm/s.
@@ -164,11 +165,12 @@ impl Path {
 
     /// What limits a move of axes with different limits.
     #[inline(never)]
-    #[small]
     fn look_at_all(&mut self, dynamics: &Dynamics) -> Slowest {
         let mut slowest = Slowest::default();
         let stretches = some(self.stretch);
+        let (mut deviation, mut differ) = (None, false);
         for (u, axis) in self.axes(dynamics) {
+            differ |= *deviation.get_or_insert(axis.deviation) != axis.deviation;
             // Each limit of a move of lengths and angles together is measured along the way.
             let along = |limit| if limit == Short::ZERO { limit } else { over(limit, u) };
             if stretches {
@@ -177,7 +179,11 @@ impl Path {
                 slowest.look(u, axis.accel, axis.jerk);
             }
         }
-        self.heading.deviation = junction::deviation(&self.heading.unit, dynamics);
+        self.heading.deviation = if differ {
+            junction::mean_deviation(&self.heading.unit, dynamics)
+        } else {
+            deviation.unwrap_or_default()
+        };
         slowest
     }
 
@@ -357,10 +363,24 @@ impl Slowest {
     }
 }
 
-/// Whether `a / u` is below `b / v`, given crosswise.
+/// Whether `a / u` is below `b / v`, given crosswise; none is 0. Exact. Cost: 90, and 10 for each power of two between `a` and `b`.
 #[inline(never)]
 fn is_slower(a: Short, v: u16, b: Short, u: u16) -> bool {
-    below(a.get() * f32::from(v), b.get() * f32::from(u))
+    let whole = |(mantissa, _): (u8, u8), by| product(u16::from(mantissa) | 0x100, by);
+    let (a, b) = (a.parts(), b.parts());
+    let (left, right) = (whole(a, v), whole(b, u));
+    if a.1 >= b.1 {
+        // `left << n < right`, with nothing lost above.
+        shifted(right.wrapping_sub(1), a.1 - b.1) >= left
+    } else {
+        shifted(left, b.1 - a.1) < right
+    }
+}
+
+/// `n`, which has 24 bits, without its lowest bits.
+#[inline(always)]
+fn shifted(n: u32, bits: u8) -> u32 {
+    if bits < 24 { n >> bits } else { 0 }
 }
 
 /// The power of two that is not below `x`, as blocks of nearly the same velocity are to have the same
@@ -381,6 +401,19 @@ mod tests {
             let limit = Short::new(limit);
             let exact = limit.get() / float(u);
             prop_assert_eq!(over(limit, u), Short::new(exact));
+        }
+
+        #[test]
+        fn the_slower_axis_is_told_exactly(
+            a in 1e-3f32..1e7,
+            times in prop_oneof![Just(1.0f32), 0.5f32..2.0, 1e-7f32..1e7],
+            v in 1..=ONE as u16,
+            u in 1..=ONE as u16,
+        ) {
+            let (a, b) = (Short::new(a), Short::new(a * times));
+            let exact = |limit: Short, by: u16| f64::from(limit.get()) * f64::from(by);
+            prop_assert_eq!(is_slower(a, v, b, u), exact(a, v) < exact(b, u));
+            prop_assert!(!is_slower(a, v, a, v));
         }
     }
 }

@@ -169,7 +169,6 @@ const COLD: &[&str] = &[
     "kerf::motion::line::",
     "kerf::motion::pace::paces",
     "kerf::motion::path::Path>::limit_rate",
-    "kerf::motion::path::Path>::look_at_all",
     "kerf::motion::path::Path>::unusual_velocity",
     "kerf::motion::path::normalize_far",
     "kerf::motion::path::stretch",
