@@ -10,6 +10,7 @@ use kerf::motion::factors::Factors;
 use kerf::motion::junction::{self, Heading, ONE, Velocities};
 use kerf::motion::line::STEPS_MAX;
 use kerf::motion::line::{Builder, Built, Line};
+use kerf::motion::short::Short;
 use kerf::units::{AXES, FIRST_ROTARY, Length, PerAxis};
 use proptest::prelude::*;
 use proptest::sample::select;
@@ -330,11 +331,10 @@ proptest! {
 fn junction_velocities() {
     let mut config = Config::new(1e4, 500.0, 0.0);
     config.deviation = 0.05;
-    let dynamics = Dynamics::new(&config);
     let heading = |degrees: f64| {
         let (y, x) = degrees.to_radians().sin_cos();
         let unit = [x, y, 0.0, 0.0, 0.0, 0.0].map(|u| (u * f64::from(ONE)).round() as i16);
-        Heading { unit, deviation: junction::deviation(&unit, &dynamics) }
+        Heading { unit, deviation: Short::new(config.deviation) }
     };
     for start in [0.0, 30.0, 200.0] {
         let corner = |angle: f64| {

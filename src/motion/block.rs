@@ -50,15 +50,13 @@ impl Block {
     /// A block of the line with this N word, 0 for none; at most [`N_MAX`](crate::gcode::command::N_MAX).
     #[inline(always)]
     pub fn new(body: Body, line: u32) -> Self {
-        let [a, b, c, _] = line.to_le_bytes();
-        Self { body, line: [a, b, c] }
+        Self { body, line: number(line) }
     }
 
     /// It is of the line with this N word.
     #[inline(always)]
     pub fn set_line(&mut self, line: u32) {
-        let [a, b, c, _] = line.to_le_bytes();
-        self.line = [a, b, c];
+        self.line = number(line);
     }
 
     /// A block that does something other than move.
@@ -72,6 +70,13 @@ impl Block {
         let [a, b, c] = self.line;
         u32::from_le_bytes([a, b, c, 0])
     }
+}
+
+/// The bytes of an N word that a block keeps.
+#[inline(always)]
+fn number(line: u32) -> [u8; 3] {
+    let [a, b, c, _] = line.to_le_bytes();
+    [a, b, c]
 }
 
 /// What a block does. Not one enum with [`QueuedAction`]: there is one value that a line cannot have.

@@ -2,7 +2,7 @@
 //! two axes at high step rates, with holds and overrides at random times; and many lines shorter than a step between fast ones. None
 //! has a pause, and each ends exactly.
 //!
-//! `KERF_SEED` and `KERF_CASES` choose the jobs: `KERF_CASES=1000` for a thousand.
+//! `KERF_SEED` and `KERF_CASES` choose the jobs: `KERF_CASES=1000` for a thousand; `KERF_TOLD=1000` tells of all that fail.
 
 use std::fmt::Write;
 
