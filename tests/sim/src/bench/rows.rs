@@ -130,7 +130,7 @@ pub const ROWS: [Row; 49] = [
         decimals: 3,
         better: Lower,
         peers: ["3.18", "-", "7.97"],
-        target: Some(1.6),
+        target: Some(1.65),
         floor: Some(1.69),
         measure: spirals::tenth,
     },
