@@ -4,8 +4,8 @@
 use proptest::prelude::*;
 
 use crate::cases::cases;
-use crate::jobs::{Planned, any_job, plan, run};
-use crate::keeps::{STRETCH, check_limits};
+use crate::jobs::{Planned, Pressed, any_job, plan, plan_pressed, run};
+use crate::keeps::{STRETCH, check_changes, check_corners, check_limits};
 use crate::optimum::rest_to_rest;
 
 /// The time is no longer than with a stop at every corner.
@@ -20,6 +20,30 @@ fn check_time(planned: &[Planned]) {
         "{total} s; {stops} s if it stopped at each of {} corners",
         blocks.len()
     );
+}
+
+/// So many stretches each, one after the other and from the first again, with so little of the CPU.
+fn any_pressed() -> impl Strategy<Value = Vec<(usize, Pressed)>> {
+    let flags = (any::<bool>(), any::<bool>(), any::<bool>());
+    let pressed = flags.prop_map(|(coarse, hurry, tight)| Pressed { coarse, hurry, tight });
+    let runs = prop::collection::vec((1..30usize, pressed), 1..8);
+    // In a hurry velocities are kept, however low: it has an end.
+    (runs, 20..60usize).prop_map(|(mut runs, last)| {
+        runs.push((last, Pressed::default()));
+        runs
+    })
+}
+
+fn pressed_at(runs: &[(usize, Pressed)], stretch: usize) -> Pressed {
+    let all: usize = runs.iter().map(|(length, _)| length).sum();
+    let mut left = stretch % all;
+    for (length, pressed) in runs {
+        if left < *length {
+            return *pressed;
+        }
+        left -= length;
+    }
+    unreachable!()
 }
 
 proptest! {
@@ -37,5 +61,13 @@ proptest! {
         let planned = plan(&job);
         check_limits(&planned);
         check_time(&planned);
+    }
+
+    /// However little of the CPU there is, velocity and acceleration keep to their limits.
+    #[test]
+    fn a_pressed_cpu_keeps_the_limits(job in any_job(), runs in any_pressed()) {
+        let planned = plan_pressed(&job, |stretch| pressed_at(&runs, stretch));
+        check_corners(&planned, 1e-3);
+        check_changes(&planned, 1e-3, 1.0, 1.0, true);
     }
 }

@@ -1,24 +1,23 @@
 //! Exec: runs blocks, a few milliseconds at a time.
 //!
-//! Owned by the exec task (level 2), which asks [`Exec::step`] for a segment whenever the segment ring
-//! wants one. The [`Governor`] says how far the next stretch goes and how long it takes, [`Prep`] makes a
-//! segment of it. A stretch ends where its block ends: a block that takes less than [`SEGMENT_S`] is one
-//! segment. Times are seconds, distances mm.
+//! Owned by the exec task (level 2), which asks [`Exec::step`] for a segment whenever the segment ring has room for
+//! one. The [`Governor`] decides how far the next stretch goes and how long it takes; [`Prep`] turns the stretch into
+//! a segment. A stretch ends where its block ends: a block that takes less than [`SEGMENT_S`] is one segment. Times
+//! are seconds, distances mm.
 //!
-//! Nothing is planned ahead but what the [speed constraints](super::speed_constraints) know: how fast the machine is, and how
-//! fast it may be at the end of the block, settle each stretch. More blocks in the queue tell at the
-//! next one.
+//! No velocity profile is planned ahead. Each stretch follows from how fast the machine is, and from how fast it may
+//! be at the end of the block, which the [speed constraints](super::speed_constraints) know. Blocks that are added to
+//! the queue take effect at the next stretch.
 //!
-//! A move without steps (shorter than a step, or of axes without motors) takes its time all the same:
-//! many of them in a row are no faster than a long one.
+//! A move without steps (shorter than a step, or of axes without motors) takes its time all the same. So many of them
+//! in a row are no faster than one long move.
 //!
-//! In a feedhold the governor comes to rest instead ([`Governor::halt`]), over any number of lines, and then
-//! nothing begins: no line, dwell, output or stop. When the hold ends, the line goes on from where it is, and
-//! a dwell takes what is left of its time; or [`Exec::drop_all`] forgets all that is queued, and the last
-//! steps made are the position.
+//! In a feedhold the governor comes to rest ([`Governor::halt`]), over any number of lines, and then no line, dwell,
+//! output or stop begins. When the hold ends, the line goes on from where it is, and a dwell takes what is left of
+//! its time. Or [`Exec::drop_all`] forgets everything that is queued, and the last steps made are the position.
 //!
-//! Cost on AVR: 6,300 cycles for a short block without a jerk limit, with [`Prep`], the task and its
-//! interrupt; a third of them are the governor's floats.
+//! Cost on AVR: 6,300 cycles for a short block without a jerk limit, including [`Prep`], the task and its interrupt.
+//! A third of them are the governor's floats.
 
 mod spindle;
 
@@ -42,28 +41,28 @@ use spindle::Follows;
 /// Half CPU cycles in a second.
 const HALVES_PER_S: f32 = 2.0 * TIMER_HZ as f32;
 
-/// The ticks of a pause: how many a millisecond has, as few as periods allow, and their period.
+/// The ticks of a pause of 1 ms: their number, as few as periods allow, and their period.
 const PAUSE: (u16, u16) = pause(TIMER_HZ);
 
-/// Nominal time of a segment: as short as leaves two thirds of the CPU to others.
+/// Nominal time of a segment: the shortest that leaves two thirds of the CPU to others.
 pub const SEGMENT_S: f32 = 0.002;
 
-/// Blocks that take less than 1/32 s are short: that power of two.
+/// Blocks that take less than 1/32 s are short. This is the exponent of that time, as a power of two.
 const SHORT_LOG2: i8 = -5;
 
 /// CPU cycles in [`SEGMENT_S`].
 const SEGMENT_CYCLES: u32 = (TIMER_HZ as f32 * SEGMENT_S) as u32;
 
-/// Faster than this no line ends but at another one, mm/s.
+/// Above this velocity, mm/s, every line has another line behind it.
 const SLOW: f32 = 5.0;
 
 /// How long a pause is, s.
 const PAUSE_S: f32 = 0.001;
 
-/// A dwell's segment lasts so many milliseconds.
+/// Length of the segments of a dwell, ms.
 const DWELL_MS: u16 = 2;
 
-/// See [`PAUSE`].
+/// Returns the number of ticks and their period for [`PAUSE`].
 const fn pause(timer_hz: u32) -> (u16, u16) {
     let counts = timer_hz / 1_000;
     let ticks = counts.div_ceil(u16::MAX as u32);
@@ -81,34 +80,36 @@ pub enum Step {
     Segment,
     /// Nothing is to be queued, but something was done: ask again.
     Again,
-    /// The outputs or the speed of the spindle are others, at a standstill: ask again.
+    /// The outputs or the speed of the spindle have changed, at a standstill: ask again.
     Switched,
-    /// X is to leave the cut, in what is queued already too ([`Exec::lead`]): ask again.
+    /// X is to leave the cut, also in segments that are already queued ([`Exec::lead`]): ask again.
     Leaves,
-    /// An override is to change, as [`take_override`] says, and nothing is to be queued: ask again then.
+    /// An override is to change; [`take_override`] returns the change. No segment is to be queued: ask again
+    /// afterwards.
     Override,
-    /// Heaters and the fan are to change, as [`take_heat`] says, and nothing is to be queued: ask again then.
+    /// Heaters and the fan are to change; [`take_heat`] returns the change. No segment is to be queued: ask again
+    /// afterwards.
     Heat,
     /// A program stop, end or change of outputs is due: ask again when the steppers stand still.
     Standstill,
-    /// No block.
+    /// The block queue is empty.
     Idle,
     /// A feedhold is on, and the steppers stand still.
     Held,
 }
 
-/// Releases the oldest block, for which [`Step::Override`] was told: the change it asks for.
+/// Releases the oldest block, for which [`Step::Override`] was returned, and returns the change that it asks for.
 #[inline(never)]
 #[small]
 pub fn take_override(blocks: &mut BlockSource) -> Change {
     match take_action(blocks) {
         Some(QueuedAction::Override(change)) => change,
-        // The program has ended.
+        // The end of a program switches all overrides on again.
         _ => Change::ALL_ON,
     }
 }
 
-/// Releases the oldest block, for which [`Step::Heat`] was told: what it asks for.
+/// Releases the oldest block, for which [`Step::Heat`] was returned, and returns what it asks for.
 #[inline(never)]
 #[small]
 pub fn take_heat(blocks: &mut BlockSource) -> Option<Heat> {
@@ -131,25 +132,25 @@ fn take_action(blocks: &mut BlockSource) -> Option<QueuedAction> {
 /// The line that exec is running.
 #[derive(Clone, Copy, Debug, Default)]
 struct Running {
-    /// There is one.
+    /// Whether a line is running.
     active: bool,
-    /// The line takes long enough for fine ticks.
+    /// Whether the line takes long enough for fine ticks.
     long: bool,
-    /// Without a jerk limit: another one follows soon.
+    /// Whether the line has no jerk limit and is short, so that another one follows soon.
     short: bool,
-    /// Way to go, mm.
+    /// Distance to go, mm.
     left: f32,
     /// Velocity limit, mm/s.
     cruise: f32,
-    /// Phase units of the dominant motor in a mm, unless `fresh`.
+    /// Phase units of the dominant motor in a mm. Not valid while `fresh`.
     scale: f32,
-    /// Without a jerk limit: the square of the velocity that may be left at the end.
+    /// Without a jerk limit: the square of the velocity that is allowed at the end of the line.
     headroom: f32,
-    /// What of the queue `headroom` knows.
+    /// The version of the queue that `headroom` belongs to.
     version: u8,
-    /// No stretch of it has been prepared.
+    /// Whether no stretch of the line has been prepared yet.
     fresh: bool,
-    /// All is planned; `Prep` has some left.
+    /// Whether the governor has handed out the whole line; `Prep` still has some of it.
     done: bool,
     jerk: bool,
 }
@@ -158,20 +159,20 @@ struct Running {
 #[derive(Debug, Default)]
 #[repr(C)]
 pub struct Exec {
-    // The largest is last: the CPU reaches 64 bytes from a pointer.
+    // The largest fields are last: the CPU reaches 64 bytes from a pointer.
     running: Running,
-    /// A feedhold is on.
+    /// Whether a feedhold is on.
     hold: bool,
-    /// Stretches are twice as long, but in long lines without a jerk limit.
+    /// Whether stretches are to be twice as long, except in long lines without a jerk limit.
     coarse: bool,
-    /// There is room for longer stretches.
+    /// Whether the segment ring has room for longer stretches.
     long: bool,
-    /// A pass in step with the spindle is to end at once.
+    /// Whether a pass in step with the spindle is to end at once.
     breaks_off: bool,
     dwell_ms: u32,
     governor: Governor,
     prep: Prep,
-    // But for what few lines need.
+    // Even behind the largest fields, because few lines need it.
     follows: Follows,
 }
 
@@ -194,7 +195,7 @@ impl Ahead for QueueView<'_> {
 }
 
 impl Exec {
-    /// At rest.
+    /// Exec at rest, without a line.
     pub const fn new() -> Self {
         let running = Running {
             active: false,
@@ -222,8 +223,8 @@ impl Exec {
         }
     }
 
-    /// Does the next thing there is to do; puts a segment into `segment` if it says so. `standstill` says
-    /// that the steppers have stopped.
+    /// Does the next thing there is to do, and returns what it was. Writes `segment` if that is [`Step::Segment`].
+    /// `standstill`: the steppers have stopped.
     pub fn step(
         &mut self,
         blocks: &mut BlockSource,
@@ -272,21 +273,21 @@ impl Exec {
         self.run(blocks, out, segment)
     }
 
-    /// Makes stretches twice as long, or not: their mathematics take half as much of the CPU then. In a `hurry` they are twice as
-    /// long too, and the governor looks at nothing that may wait.
+    /// Sets whether stretches are twice as long, which halves the CPU time of their mathematics. In a `hurry` they
+    /// are twice as long too, and the governor makes no look ahead that may wait.
     #[inline(always)]
     pub fn set_coarse(&mut self, coarse: bool, hurry: bool) {
         self.coarse = coarse || hurry;
         self.governor.set_hurry(hurry);
     }
 
-    /// No time is left for looks at the end of an acceleration.
+    /// Sets whether no time is left for looks ahead at the end of an acceleration.
     #[inline(always)]
     pub fn set_tight(&mut self, tight: bool) {
-        self.governor.tight = tight;
+        self.governor.set_tight(tight);
     }
 
-    /// Whether there is room for stretches that are twice as long.
+    /// Sets whether the segment ring has room for stretches that are twice as long.
     #[inline(always)]
     pub fn set_long(&mut self, long: bool) {
         self.long = long;
@@ -307,7 +308,8 @@ impl Exec {
         }
     }
 
-    /// Stands still for so many milliseconds, before anything else: at a standstill, perhaps in the midst of a line.
+    /// Adds a pause of `ms` milliseconds, which comes before anything else. The machine is at a standstill, perhaps
+    /// in the midst of a line.
     pub fn wait(&mut self, ms: u16, out: &mut Snapshot) {
         if ms > 0 {
             self.dwell_ms += u32::from(ms);
@@ -315,7 +317,7 @@ impl Exec {
         }
     }
 
-    /// In a hold: whether there is nothing more to prepare.
+    /// In a hold: whether everything up to the standstill has been prepared.
     #[inline(never)]
     fn rests(&mut self, blocks: &BlockSource, out: &mut Snapshot) -> bool {
         let running = &self.running;
@@ -323,7 +325,7 @@ impl Exec {
         let must_go_on = match &self.follows {
             _ if !Capability::Lathe.is_built_in() => false,
             Follows::Retreats(retreat) => !retreat.is_done(),
-            // The spindle does not wait.
+            // A tapping pass must follow the spindle, which does not wait.
             Follows::Angle(thread) => {
                 let ends = self.breaks_off || thread.fault().is_some() || thread.has_turned();
                 thread.is_tapping() && !ends
@@ -333,7 +335,7 @@ impl Exec {
         let goes_on = if must_go_on {
             true
         } else if running.active {
-            // What the end of a block has been planned as is handed out.
+            // Once the end of a line has been planned, all of that line is handed out.
             running.done || !self.governor.is_at_rest()
         } else {
             !self.governor.is_at_rest() && blocks.look(is_line) == Some(true)
@@ -345,10 +347,13 @@ impl Exec {
         !goes_on
     }
 
-    /// Forgets all that is queued. The steppers stand still: held, or stopped in the midst of it. The target is
-    /// then where the segments that they have got end, and the one that is returned, which they have not;
-    /// [`Dda::settle`](crate::dda::Dda::settle) makes their last steps the position. What has been said of
-    /// positions before anything moves, and of drivers, holds.
+    /// Forgets everything that is queued. The steppers stand still: held, or stopped in the midst of a segment.
+    /// Returns the segment that [`Prep`] held back, which has not been queued. `out.target` is then where the queued
+    /// segments and the returned one end; [`Dda::settle`](crate::dda::Dda::settle) makes the last steps made the
+    /// position.
+    ///
+    /// Dropped blocks that set drivers, pressure advance or G95 still take effect, as do those that set the position
+    /// before anything moves.
     ///
     /// Cost: 600 a block.
     #[inline(never)]
@@ -406,7 +411,7 @@ impl Exec {
         held
     }
 
-    /// Does what the oldest block asks for, which is no line.
+    /// Carries out the oldest block, which is an action and not a line.
     #[inline(never)]
     fn take_up(
         &mut self,
@@ -476,7 +481,8 @@ impl Exec {
                     thread.set_lead(*lead);
                 }
             }
-            // Nothing more to do; and what an image without a lathe is never asked for.
+            // Actions that need nothing more, and those that are never queued because the image lacks their
+            // capability.
             _ => {}
         }
         blocks.release();
@@ -507,8 +513,8 @@ impl Exec {
         self.prep.pause(ms * ticks, period, segment);
     }
 
-    /// Takes up the oldest block if it is a line. It stays in the ring until its last segment, so that
-    /// the planner counts it as work in hand.
+    /// Takes up the oldest block if it is a line, and returns whether it is. The line stays in the ring until its
+    /// last segment, so that the planner counts it as work in hand.
     #[inline(never)]
     fn begin(&mut self, blocks: &mut BlockSource, out: &mut Snapshot) -> bool {
         blocks.enter();
@@ -529,7 +535,7 @@ impl Exec {
         let short = line.jerk == Short::ZERO && below(length, scaled(line.cruise, SHORT_LOG2));
         out.length = length;
         out.running = true;
-        // Field by field: in place. The others are set before they are read.
+        // Field by field, to write in place. The remaining fields are set before they are read.
         let running = &mut self.running;
         running.active = true;
         (running.long, running.short) = (long, short);
@@ -542,8 +548,8 @@ impl Exec {
         self.prep.begin(line, &mut out.steps, &mut out.target);
     }
 
-    /// Prepares the next stretch of the line being run. In place: copying its state would cost as
-    /// much as the mathematics.
+    /// Prepares the next stretch of the running line. Works in place: copying the line's state would cost as much as
+    /// the mathematics.
     #[inline(never)]
     fn run(&mut self, blocks: &mut BlockSource, out: &mut Snapshot, segment: &mut Segment) -> Step {
         let running = &mut self.running;
@@ -599,8 +605,8 @@ impl Exec {
         })
     }
 
-    /// Makes a segment of a stretch of the line being run. `ticks` says whether it may have fine ticks, and whether coarse ones
-    /// ([`Prep::refine`]).
+    /// Turns a stretch of the running line into a segment. `ticks` returns whether the segment may have fine ticks,
+    /// and whether coarse ones ([`Prep::refine`]).
     #[inline(always)]
     fn hand_out(
         &mut self,
@@ -634,7 +640,8 @@ impl Exec {
         step(self.prep.segment(left, cycles, segment))
     }
 
-    /// Makes a segment of a stretch of a pass. Its ticks are coarse: the CPU's time goes to exec, which asks the spindle for each stretch.
+    /// Turns a stretch of a pass into a segment. Its ticks are coarse, to leave the CPU's time to exec, which asks
+    /// the spindle for each stretch.
     #[inline(never)]
     #[small]
     fn hand_out_coarsely(
@@ -647,12 +654,12 @@ impl Exec {
         self.hand_out(stretch, blocks, out, segment, |_| (false, true))
     }
 
-    /// Along the path at the end of what is queued, mm/s.
+    /// The velocity along the path at the end of what is queued, mm/s.
     pub fn velocity(&self) -> f32 {
         self.governor.velocity()
     }
 
-    /// Hands out what is left of the line being run.
+    /// Hands out what is left of the running line.
     fn end(
         &mut self,
         cycles: u32,
@@ -660,7 +667,8 @@ impl Exec {
         blocks: &mut BlockSource,
         segment: &mut Segment,
     ) -> Step {
-        // What the planner has been asked for ends at rest, or the governor nearly so.
+        // The end is exact where motion ends: the governor is at rest, or is slow at a line that no other line
+        // follows.
         let exact = below(self.governor.velocity(), SLOW)
             && (self.governor.is_at_rest() || !blocks.goes_on());
         let some = if whole {
@@ -680,7 +688,7 @@ fn step(segment: bool) -> Step {
     if segment { Step::Segment } else { Step::Again }
 }
 
-/// CPU cycles in `seconds`; at least 1, at most what [`Prep`] takes. Cost: 250, 25 for a usual stretch.
+/// Returns the CPU cycles in `seconds`: at least 1, at most [`CYCLES_MAX`]. Cost: 250, 25 for a usual stretch.
 #[inline(never)]
 fn cycles_of(seconds: f32) -> u32 {
     if same(seconds, SEGMENT_S) {

@@ -1,18 +1,19 @@
-//! The governor, which generates velocities: how fast the machine goes in the next few milliseconds.
+//! The governor, which generates velocities: it decides how fast the machine goes in the next few milliseconds.
 //!
-//! Owned by exec, which asks [`Governor::stretch`] for one stretch after the other: with the distance left in
-//! the block, its velocity limit, and what is ahead ([`Ahead`]). It goes as fast as it may, always able
-//! to slow down in time for all that is queued. It does not care where blocks begin and end, so a ramp goes on over any number
-//! of them, and a limit that changes (more blocks, a lower feed) is taken up from where it is.
+//! Owned by exec, which asks [`Governor::stretch`] for one stretch after the other. Exec passes the distance left in
+//! the block, its velocity limit, and what is ahead ([`Ahead`]). The governor goes as fast as it may, and is always
+//! able to slow down in time for all that is queued. It does not care where blocks begin and end: a ramp goes on over
+//! any number of blocks. A limit that changes (more blocks, a lower feed) applies from the present velocity on.
 //!
 //! Units: mm, s (degrees for a rotary-only move).
 //!
-//! Without a jerk limit its velocities are those of trapezoids (`trapezoid`). With one it works in slices
-//! (`slice`, `rise`), with ramps that are laid out once (`ramp`), and looks at what is ahead at most once for a stretch
-//! (`constraint`). The work for a stretch has a bound in every state.
+//! Without a jerk limit its velocities are those of trapezoids (`trapezoid`). With a jerk limit it works in slices
+//! (`slice`, `rise`), with ramps that are laid out once (`ramp`), and looks at what is ahead at most once for a
+//! stretch (`constraint`). The work for a stretch has a bound in every state.
 //!
-//! Cost on AVR: 1,500 to 2,500 cycles a stretch without a jerk limit. With one 500 for a block that is over within the slice,
-//! 1,200 at the feed, 3,500 in a ramp; at worst some 19,000, with a scan and a ramp that is laid out.
+//! Cost on AVR: 1,500 to 2,500 cycles a stretch without a jerk limit. With a jerk limit 500 for a block that ends
+//! within the slice, 1,200 at the feed, 3,500 in a ramp; at worst some 19,000, when there is a scan and a ramp is
+//! laid out.
 
 pub use super::constraint::Ahead;
 use super::constraint::Clear;
@@ -24,29 +25,31 @@ use super::slice::Rest;
 use super::speed_constraints::kappa;
 use crate::math::sqrt;
 
-/// A part of a block, all of it that is left or less.
+/// A part of a block: all that is left of it, or less.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stretch {
     /// How long it takes, s.
     pub seconds: f32,
     /// How far it goes, mm; to the end of the block if `ends`.
     pub distance: f32,
-    /// The stretch is the last of the block.
+    /// Whether the stretch is the last of the block.
     pub ends: bool,
 }
 
-/// An acceleration limit no machine has: stands for none, and keeps floats in range.
+/// An acceleration limit that no machine has. It stands for no limit, and keeps floats in range.
 pub const ACCEL_MOST: f32 = 1e6;
 
-/// A jerk limit that takes the acceleration to its limit in less is none: stretches are no shorter.
+/// A jerk limit that lets the acceleration reach its limit in less than this, s, counts as none: stretches are no
+/// shorter.
 pub(super) const JERK_TIME_MIN: f32 = 0.001;
 
-/// The jerk to put into a block, 0 for none; `accel` is its acceleration. Neither is negative. Cost: 160.
+/// Returns the jerk limit to put into a block, 0 for none; `accel` is the block's acceleration. Neither is negative.
+/// Cost: 160.
 pub fn effective_jerk(jerk: f32, accel: f32) -> f32 {
     if some(jerk) && below(jerk * JERK_TIME_MIN, accel) { jerk } else { 0.0 }
 }
 
-/// Whether two limits are equal, or one velocity is the other. Cost: 15.
+/// Whether two limits, or two velocities, are equal. Cost: 15.
 pub(super) fn same(a: f32, b: f32) -> bool {
     a.to_bits() == b.to_bits()
 }
@@ -61,16 +64,16 @@ pub(super) struct Limits {
     pub jerk: f32,
     /// `accel^2 / 2 jerk`, mm/s.
     pub kappa: f32,
-    /// `jerk / accel`: how much alpha may change in a second.
+    /// `jerk / accel`: by how much [`Governor::alpha`] may change in a second.
     pub pace: f32,
-    /// `accel / jerk`: the seconds that takes from 0 to 1.
+    /// `accel / jerk`: the seconds in which [`Governor::alpha`] goes from 0 to 1.
     pub build: f32,
     /// `sqrt(8 kappa)`.
     pub root: f32,
 }
 
 impl Limits {
-    /// In floats what follows from the two limits; only they without a jerk limit. Cost: 2,700 with one.
+    /// Returns the limits, with what follows from them; without a jerk limit nothing does. Cost: 2,700 with one.
     pub fn new(accel: f32, jerk: f32) -> Self {
         let mut limits = Self { accel, jerk, ..Self::NONE };
         if some(jerk) {
@@ -85,48 +88,50 @@ impl Limits {
     const NONE: Self = Self { accel: 0.0, jerk: 0.0, kappa: 0.0, pace: 0.0, build: 0.0, root: 0.0 };
 }
 
-/// Velocity and acceleration along the path, at the end of what has been worked out.
+/// The velocity generator: velocity and acceleration along the path, at the end of what has been worked out.
 #[derive(Debug, Default)]
 #[repr(C)]
 pub struct Governor {
-    // What is used most comes first: the CPU reaches 64 bytes from a pointer.
+    // The most used fields come first: the CPU reaches 64 bytes from a pointer.
     /// mm/s.
     pub(super) velocity: f32,
     pub(super) limits: Limits,
-    /// What of the last slice has not been handed out.
+    /// What has not been handed out of the last slice.
     pub(super) rest: Rest,
-    /// The acceleration as a share of its limit, with a jerk limit. From 0 to 1 unless a ramp runs, which knows it.
+    /// With a jerk limit: the acceleration as a share of its limit, from 0 to 1. A ramp that runs knows its own
+    /// acceleration.
     pub(super) alpha: f32,
-    /// Something ahead has changed that a ramp does not know.
+    /// Whether something ahead has changed that the ramp does not take into account.
     pub(super) changed: bool,
-    /// The ramp is that of a feedhold.
+    /// Whether the ramp is that of a feedhold.
     pub(super) halting: bool,
-    /// What is ahead has been looked at for this stretch, or a ramp has been laid out, which takes as long.
+    /// Whether this stretch has had a scan already, or the layout of a ramp, which takes as long.
     pub(super) scanned: bool,
-    /// The velocity is steady, and no ramp begins for a while.
+    /// Whether the velocity is steady, and no ramp begins for a while.
     pub(super) far: bool,
-    /// Without a jerk limit: a velocity, and its square.
+    /// Without a jerk limit: a velocity; `square` is its square.
     pub(super) squared: f32,
     pub(super) square: f32,
-    /// Without a jerk limit: stretches are twice as long, and a velocity that would soon be lost again is not gained.
+    /// Without a jerk limit: stretches are twice as long, and the machine does not gain a velocity that it would soon
+    /// lose.
     pub(super) spares: bool,
-    /// No time for looks ahead.
+    /// Whether no time is left for scans that may wait.
     pub(super) hurry: bool,
-    /// No time for looks at the end of an acceleration.
+    /// Whether no time is left for scans at the end of an acceleration.
     pub(super) tight: bool,
-    /// Slices until it is worth another try to go faster.
+    /// Slices until another attempt to go faster is worthwhile.
     pub(super) wait: u8,
-    /// Slices until it is worth while to go faster by little.
+    /// Slices until going faster by little is worthwhile.
     pub(super) calm: u8,
-    /// Slices by which the next scan looks further than it has to.
+    /// By how many slices the next scan looks further than it has to.
     pub(super) margin: u8,
-    /// A scan has not found what it asked for: the acceleration is about to end.
+    /// Whether a scan has refused the velocity that it was asked for: the acceleration is about to end.
     pub(super) closing: bool,
     /// Counts slices of a ramp.
     pub(super) turn: u8,
-    /// An override has changed feeds, ever: a limit that a feed makes may be too near to be kept.
+    /// Whether an override has ever changed feeds: a limit that comes from a feed may then be too near to be kept.
     pub(super) late: bool,
-    /// What is known of what is ahead.
+    /// What is known of the constraints ahead.
     pub(super) clear: Clear,
     pub(super) ramp: Option<Ramp>,
 }
@@ -164,7 +169,8 @@ impl Governor {
         self.velocity
     }
 
-    /// Time (s) and distance (mm) that have been worked out and not been handed out: [`Governor::velocity`] is that so much later.
+    /// Returns the time (s) and distance (mm) that have been worked out but not handed out. [`Governor::velocity`] is
+    /// that of the end of both.
     pub fn pending(&self) -> (f32, f32) {
         (self.rest.seconds, self.rest.distance)
     }
@@ -179,7 +185,7 @@ impl Governor {
         !some(self.velocity) && !some(self.rest.seconds)
     }
 
-    /// The machine stands still.
+    /// Puts the machine at a standstill.
     #[inline(never)]
     #[small]
     pub fn stop(&mut self) {
@@ -191,8 +197,8 @@ impl Governor {
         (self.wait, self.margin, self.closing) = (0, MARGIN_FIRST, false);
     }
 
-    /// A block with these limits begins, mm/s^2 and mm/s^3. If they are others than before, it goes on with
-    /// as much of its deceleration as may be ended in time; acceleration ends at once.
+    /// Begins a block with these limits, mm/s^2 and mm/s^3. If they differ from the limits before, as much of a
+    /// deceleration goes on as can be ended in time; an acceleration ends at once.
     #[inline(always)]
     pub fn begin(&mut self, accel: f32, jerk: f32) {
         if !some(jerk) && !some(self.limits.jerk) {
@@ -219,7 +225,7 @@ impl Governor {
         self.limits = Limits::new(accel, jerk);
     }
 
-    /// An override has changed feeds, of what runs and of what is ahead.
+    /// Takes into account that an override has changed feeds, of what runs and of what is ahead.
     pub fn change_feed(&mut self) {
         (self.late, self.changed) = (true, true);
         self.clear.forget();
@@ -229,10 +235,16 @@ impl Governor {
         }
     }
 
-    /// The CPU has no time left: no looks ahead but those that it takes to go on. Or it has.
+    /// Sets whether the CPU has no time left: then the governor makes no scans but those that it needs to go on.
     #[inline(always)]
     pub fn set_hurry(&mut self, hurry: bool) {
         self.hurry = hurry;
+    }
+
+    /// If it is `tight`, the CPU has no time for another scan at the end of an acceleration. Exec level.
+    #[inline(always)]
+    pub fn set_tight(&mut self, tight: bool) {
+        self.tight = tight;
     }
 
     /// Whether the velocity is steady, with a jerk limit, and no ramp begins in the next stretches.
@@ -240,18 +252,19 @@ impl Governor {
         self.far
     }
 
-    /// What is ahead has changed.
+    /// Takes into account that what is ahead has changed.
     pub fn look_again(&mut self) {
         self.changed = true;
     }
 
-    /// The next stretch of [`SEGMENT_S`] without a jerk limit, as `trapezoid`; nothing is left of another.
+    /// Returns the next stretch, of [`SEGMENT_S`], without a jerk limit, as `trapezoid` does. Nothing is left of
+    /// another one.
     pub(super) fn sharply(&mut self, left: f32, cruise: f32, headroom: f32) -> Stretch {
         self.spares = false;
         self.trapezoid(left, cruise, headroom)
     }
 
-    /// The next stretch, of about `seconds`, in a block with `left` mm to go at up to `cruise` mm/s.
+    /// Returns the next stretch, of about `seconds`, in a block with `left` mm to go at up to `cruise` mm/s.
     #[inline(always)]
     pub fn stretch(&mut self, left: f32, cruise: f32, ahead: &impl Ahead, seconds: f32) -> Stretch {
         if some(self.limits.jerk) {

@@ -1,27 +1,29 @@
-//! A slice under a jerk limit: as fast as may be, with work that has a bound.
+//! A slice under a jerk limit: as fast as the limits allow, with work that has a bound.
 //!
 //! Called for each slice (`slice`), exec level. The state is a velocity and an acceleration, alpha times its limit A.
 //!
-//! **Safe.** An acceleration takes time to end, so what counts is the *top*: the velocity `v + k alpha^2` at which it is ended when
-//! that begins now, and how far on that is. A state is safe if its top may be steady where it is reached
-//! ([`Clear`]). It stays safe while the acceleration ends, and at the top for as long as `Clear` says; then a ramp that is laid
-//! out at once, as hard as the limits allow, is in time for all that is ahead. So there is always an answer without a search:
-//! no scan is needed to go on.
+//! **Safe.** An acceleration takes time to end. So what counts is the *top*: the velocity `v + k alpha^2` that is
+//! reached if the acceleration begins to end now, and the place where it is reached. A state is safe if its top may
+//! be steady there ([`Clear`]). It stays safe while the acceleration ends, and at the top for as long as `Clear`
+//! says; a ramp that is laid out then, as hard as the limits allow, is in time for all that is ahead. So there is
+//! always an answer without a search: no scan is needed to go on.
 //!
-//! **Faster.** In each slice alpha is raised, or kept, or ended at the feed, if the top of that is safe. A scan asks for a
-//! top that is some slices further, before it is needed, so that the next slices need not ask. If it is not safe, what has been known of
-//! a lower top stays known; the next slice asks for half as much more, and the acceleration ends when nothing more is safe. A scan is for
-//! one top, and there is one in a stretch (a second one at rest, and where limits or feeds have changed).
+//! **Faster.** In each slice alpha is raised, or kept, or ended at the feed, if the top that follows is safe. A scan
+//! asks for a top that is some slices further, before it is needed, so that the next slices need not ask. If that top
+//! is not safe, the answer for a lower top stays valid; the next slice asks for half as much more, and the
+//! acceleration ends when nothing more is safe. A scan is for one top, and there is one scan in a stretch (a second
+//! one at rest, and where limits or feeds have changed).
 //!
-//! **In a hurry**, while the CPU has no time left, velocities are kept, ramps followed, and accelerations ended, without a scan as long as
-//! what is known allows it.
+//! **In a hurry**, while the CPU has no time left, velocities are kept, ramps followed, and accelerations ended,
+//! without a scan as long as the last answer allows it.
 //!
-//! **Slower.** A ramp is followed to its end. In every fourth slice of it, if something ahead has changed, it asks whether the
-//! machine may go on at the velocity at which the deceleration is ended when that begins now, or, if it has not begun, go faster.
-//! If not, the ramp goes on.
+//! **Slower.** A ramp is followed to its end. In every fourth slice of it, if something ahead has changed, a scan
+//! asks for something better: to end the deceleration now and go on at the velocity that is left, or, if the
+//! deceleration has not begun, to go faster. If that is not safe, the ramp goes on.
 //!
-//! What the length of slices makes unavoidable: alpha changes in steps of a slice while it rises. A velocity that is less than `J t^2`
-//! away (t the time of a slice) is gone to at once, as is the end of a move that is shorter than `2 J t^3`.
+//! The length of slices has consequences. Alpha changes in steps of a slice while it rises. A velocity that is less
+//! than `J t^2` away (t is the time of a slice) is reached at once, and so is the end of a move that is shorter than
+//! `2 J t^3`.
 //!
 //! Units: mm, s; distances to what is ahead are brake potential (`constraint`). Cost on AVR: 800 cycles at a steady velocity, 2,400
 //! in a ramp, 3,000 while alpha rises; a scan 3,500 to 7,500 more, a ramp that is laid out 2,000 to 4,000.
@@ -29,23 +31,25 @@
 use super::constraint::{Ahead, Ask, Clear, needed};
 use super::exec::SEGMENT_S;
 use super::float::{below, greater, least, less, lesser, ratio, scaled, some};
-use super::governor::{Governor, same};
+use super::governor::{Governor, Limits, same};
 use super::ramp::Phase;
 use super::slice::Span;
 
-/// Slices before it tries again to go faster, when it could not.
+/// Slices before another attempt to go faster, after one that has failed.
 const WAIT: u8 = 8;
 
-/// Slices at a steady velocity before it goes faster by little.
+/// Slices at a steady velocity before the machine goes faster by little.
 const CALM: u8 = 32;
 
 /// Slices by which the first scan of an acceleration looks further than it has to.
 pub(super) const MARGIN_FIRST: u8 = 4;
 
-/// Most of them.
+/// Most slices by which a scan looks further than it has to.
 const MARGIN: u8 = 15;
 
-/// A stretch that is not worth a segment, s.
+/// See [`Governor::crawled`].
+const CRAWL_LOG2: i8 = 3;
+/// A stretch that is shorter than this is not worth a segment, s.
 const LITTLE_S: f32 = SEGMENT_S / 4.0;
 
 /// A state that could be next.
@@ -55,7 +59,7 @@ struct Next {
     alpha: f32,
     distance: f32,
     top: f32,
-    /// The distance, and that to the top, brake potential.
+    /// The distance of the slice; `at` is the distance to the top. Brake potential.
     far: f32,
     at: f32,
 }
@@ -77,13 +81,13 @@ struct Steady {
     distance: f32,
     /// The distance, brake potential.
     at: f32,
-    /// The velocity is known to be safe for the slice and as long again. If it is not known, this is the first thing to find out:
-    /// whatever is faster is safe for a shorter time.
+    /// Whether the velocity is known to be safe for the slice and as long again. If it is not, that is the first
+    /// thing to find out: whatever is faster is safe for a shorter time.
     known: bool,
 }
 
 impl Governor {
-    /// Works a slice out. False, and nothing done, if it would have to look ahead a second time in this stretch.
+    /// Works a slice out. Returns false, with nothing done, if that takes a second scan in this stretch.
     #[inline(never)]
     pub(super) fn slice(&mut self, span: &Span, ahead: &impl Ahead) -> bool {
         if let Some(ramp) = &self.ramp {
@@ -103,7 +107,7 @@ impl Governor {
         self.free(span, ahead)
     }
 
-    /// A slice without a ramp, or of something better than the ramp.
+    /// Works out a slice without a ramp, or of something better than the ramp.
     #[inline(never)]
     fn free(&mut self, span: &Span, ahead: &impl Ahead) -> bool {
         let velocity = self.velocity;
@@ -123,8 +127,9 @@ impl Governor {
         self.climb(span, ahead)
     }
 
-    /// Whether it has the feed, or all but a part in 64, and has been steady for a short time only: where the feed is another for
-    /// each block, as on a spiral, going after each of them would cost more than it is worth.
+    /// Whether the machine has the feed, or lacks less than a part in 64 and has been steady for a short time only.
+    /// Where each block has another feed, as on a spiral, following each of these feeds would cost more than it is
+    /// worth.
     fn is_calm(&mut self, cruise: f32) -> bool {
         let velocity = self.velocity;
         if same(velocity, cruise) {
@@ -135,14 +140,14 @@ impl Governor {
         calm
     }
 
-    /// Whether it is too early to try to go faster: it could not a moment ago.
+    /// Whether it is too early for another attempt to go faster, after one that has failed.
     fn waits(&mut self) -> bool {
         let waits = self.wait > 0;
         self.wait = self.wait.saturating_sub(1);
         waits
     }
 
-    /// A slice at the velocity that there is. Cost: 300.
+    /// Returns a slice at the present velocity. Cost: 300.
     #[inline(never)]
     fn steady_slice(&self, span: &Span) -> Steady {
         let velocity = self.velocity;
@@ -151,14 +156,17 @@ impl Governor {
         Steady { distance, at, known: self.is_clear(velocity, scaled(at, 1)) }
     }
 
-    /// A slice at a steady velocity.
+    /// Works out a slice at a steady velocity. Returns false, with nothing done, if that takes a second scan in this
+    /// stretch.
     #[inline(never)]
     fn keep(&mut self, steady: &Steady, span: &Span, ahead: &impl Ahead) -> bool {
         let velocity = self.velocity;
         let may_wait =
             steady.known || (self.hurry || self.scanned) && self.is_clear(velocity, steady.at);
-        // What the slice before has found out holds still: to look again and to lay a ramp out is too much for one slice.
-        if !may_wait && (self.clear.age > 1 || below(self.clear.top, velocity)) {
+        // The last scan is still good enough to lay a ramp out: a scan and a ramp are too much for one slice. A ramp to a velocity
+        // that is no lower would end at once, and another one would have to be laid out behind it.
+        let lower = below(self.clear.target, velocity);
+        if !may_wait && (self.clear.age > 1 || below(self.clear.top, velocity) || !lower) {
             if self.scanned {
                 return false;
             }
@@ -168,7 +176,7 @@ impl Governor {
         true
     }
 
-    /// After a scan for the steady velocity: goes on, or slows down where it has to.
+    /// After a scan for the steady velocity: goes on, or slows down where necessary.
     fn keep_or_slow(&mut self, steady: &Steady, span: &Span) {
         if self.is_clear(self.velocity, steady.at) {
             self.ramp = None;
@@ -180,11 +188,11 @@ impl Governor {
             self.slow_for_clear(0.0);
         }
         self.follow(span.seconds);
-        // That took as long as a scan: no other one in this stretch, unless it is not worth a segment.
+        // The ramp took as long as a scan: no other scan in this stretch, unless the stretch is not worth a segment.
         self.scanned |= lays && !below(self.rest.seconds, LITTLE_S);
     }
 
-    /// Lays out the ramp for what the last scan has found; the top is `at` so far on.
+    /// Lays out the ramp for what the last scan has found; the top is reached `at`.
     fn slow_for_clear(&mut self, at: f32) {
         let slack = ratio(self.clear.slack(at, self.limits.kappa), scaled(self.limits.accel, 1));
         let Clear { target, closed, .. } = self.clear;
@@ -192,12 +200,13 @@ impl Governor {
         self.changed = false;
     }
 
-    /// Distance from the state to the end of the block, brake potential; negative if it is beyond.
+    /// Returns the distance from the state to the end of the block, brake potential; negative if the state is beyond
+    /// it.
     fn here(&self, span: &Span) -> f32 {
         self.potential(span.left)
     }
 
-    /// The state after a slice in which alpha goes to `alpha`, but for distances.
+    /// Fills in the state after a slice in which alpha goes to `alpha`, without the distances.
     #[inline(never)]
     fn next(&self, alpha: f32, seconds: f32, out: &mut Next) {
         let half = scaled(seconds, -1);
@@ -215,13 +224,14 @@ impl Governor {
         next.at = next.far + self.rising(next.alpha, next.velocity, next.top);
     }
 
-    /// Distance in which an acceleration ends, or a deceleration, then less than 0; brake potential.
+    /// Returns the distance in which an acceleration ends, brake potential; negative for a deceleration.
     fn rising(&self, alpha: f32, velocity: f32, top: f32) -> f32 {
-        // Velocity plus two thirds of what is to come.
+        // The mean velocity: two thirds of what is still gained, and the velocity.
         scaled(self.limits.kappa, 2) * alpha * (top - (top - velocity) * (1.0 / 3.0))
     }
 
-    /// A slice of acceleration, if that is safe.
+    /// Works out a slice of acceleration, if that is safe, else one without. Returns false, with nothing done, if
+    /// that takes a second scan in this stretch.
     #[inline(never)]
     fn climb(&mut self, span: &Span, ahead: &impl Ahead) -> bool {
         let (alpha, seconds) = (self.alpha, span.seconds);
@@ -229,7 +239,7 @@ impl Governor {
         self.next(least(alpha + self.limits.pace * seconds, 1.0), seconds, &mut next);
         if below(span.cruise, next.top) {
             if !some(alpha) {
-                // So near that the acceleration need not build up.
+                // So near to the feed that the acceleration need not build up.
                 next = Next { velocity: span.cruise, top: span.cruise, ..Next::default() };
             } else {
                 if !same(next.alpha, alpha) {
@@ -266,15 +276,15 @@ impl Governor {
         true
     }
 
-    /// Whether an acceleration that is about to end is to end now, without another look ahead. Each look allows half the gain of the one
-    /// before; at 80,000 steps/s a slice with a look takes longer to work out than it lasts.
+    /// Whether an acceleration that is about to end is ended now, without another scan. Each scan allows half the
+    /// gain of the one before; at 80,000 steps/s a slice with a scan takes longer to work out than it lasts.
     #[inline(always)]
     fn ends_early(&self) -> bool {
         self.tight && self.closing
     }
 
-    /// While it is known that the next state is safe: looks further, if it is not for those that follow. Whatever the answer, the
-    /// next state stays safe.
+    /// Looks further ahead while the next state is known to be safe, if the states after it are not. Whatever the
+    /// answer, the next state stays safe.
     #[inline(always)]
     fn look_early(&mut self, next: &Next, span: &Span, ahead: &impl Ahead) {
         if self.scanned
@@ -291,7 +301,7 @@ impl Governor {
         }
     }
 
-    /// Asks for a top that is some slices further. Returns whether that is safe.
+    /// Asks for a top that is some slices further. Returns whether this top is safe.
     #[inline(never)]
     fn look_further(&mut self, next: &Next, span: &Span, ahead: &impl Ahead) -> bool {
         let gain = self.limits.accel * span.seconds * f32::from(self.margin);
@@ -301,26 +311,27 @@ impl Governor {
         found
     }
 
-    /// How long a velocity may be kept that is reached `at` in any case, after others up to `fastest`.
+    /// Finds out how long the velocity `top` may be kept. It is reached `at` in any case, after others up to
+    /// `fastest`.
     fn look_about(&mut self, top: f32, at: f32, fastest: f32, span: &Span, ahead: &impl Ahead) {
         let ask = Ask { top, at, fastest, level: 0.0, here: self.here(span), taken: true };
         self.scan(&ask, ahead);
     }
 
-    /// Whether the top is safe that is reached `at`.
+    /// Whether `top`, which is reached `at`, is safe.
     fn ask(&mut self, top: f32, at: f32, span: &Span, ahead: &impl Ahead) -> bool {
         self.changed = false;
         let ask = Ask { top, at, fastest: top, level: 0.0, here: self.here(span), taken: false };
         self.scan(&ask, ahead)
     }
 
-    /// Whether the next state is safe, which is not known: from a steady velocity it asks for more than the next slice takes, as long
-    /// as there are smaller gains to be tried.
+    /// Whether the next state is safe, of which nothing is known. From a steady velocity it asks for more than the
+    /// next slice takes, as long as there are smaller gains to be tried.
     #[inline(never)]
     fn look_ahead(&mut self, next: &Next, span: &Span, ahead: &impl Ahead) -> bool {
         if !some(self.alpha) && self.margin > 0 {
             let found = self.look_further(next, span, ahead);
-            // At rest there is time for another look.
+            // At rest there is time for another scan.
             if found || some(self.velocity) {
                 return found;
             }
@@ -330,7 +341,8 @@ impl Governor {
         found
     }
 
-    /// How far the next look goes: further and further, until it does not find what it asks for; then half as far each time.
+    /// Sets how far the next scan looks: further and further, until a scan refuses what it is asked for; then half as
+    /// far each time.
     fn adjust_margin(&mut self, found: bool) {
         if found && !self.closing {
             self.margin = (2 * self.margin + 1).min(MARGIN);
@@ -340,7 +352,7 @@ impl Governor {
         }
     }
 
-    /// Goes no faster: a slice of the ramp that there is, or of the one that begins now.
+    /// Goes no faster: works out a slice of the present ramp, or of one that begins now.
     fn go_on(&mut self, span: &Span, ahead: &impl Ahead) {
         if self.ramp.is_some() {
             self.follow(span.seconds);
@@ -349,7 +361,8 @@ impl Governor {
         }
     }
 
-    /// Without a ramp: the acceleration ends, and if it is time, a ramp goes down. `clear` is for the state, or for a faster one.
+    /// Ends the acceleration without a ramp, and lays out a ramp down if it is time. `clear` is for the present
+    /// state, or for a faster one.
     #[inline(never)]
     fn end_climb(&mut self, span: &Span, ahead: &impl Ahead) {
         if !self.tries_less() {
@@ -364,13 +377,16 @@ impl Governor {
             self.look_about(top, at, top, span, ahead);
         }
         self.clear.narrow(top);
-        let crawl = scaled(self.limits.jerk, 1) * span.seconds * span.seconds;
-        if !below(crawl, self.velocity) && !less(self.here(span) + crawl, self.clear.place()) {
+        let near = self.crawled(span);
+        if !less(near, span.left)
+            && !below(near, self.velocity * scaled(span.seconds, CRAWL_LOG2))
+            && !less(self.here(span) + near, self.clear.place())
+        {
             // A stop is so near that it is not worth a ramp.
             return self.creep(span);
         }
         if some(self.alpha) {
-            // What is known is enough to get to the top. There it is seen what comes then.
+            // The last answer is enough to get to the top. What comes then is decided there.
             if below(self.clear.distance, at) {
                 self.slow_for_clear(at);
             } else {
@@ -385,20 +401,20 @@ impl Governor {
         }
     }
 
-    /// Whether a steady velocity is so low that it is worth while to look again for a gain that is less. Where the queue is short, a
-    /// velocity that is kept is better than one that goes up and down by little.
+    /// Whether a steady velocity is so low that another scan for a smaller gain is worthwhile. Where the queue is
+    /// short, a velocity that is kept is better than one that goes up and down by little.
     fn tries_less(&self) -> bool {
         let gain = self.limits.accel * SEGMENT_S * f32::from(self.margin + 1);
         !some(self.alpha) && self.closing && below(self.velocity, scaled(gain, 3))
     }
 
-    /// Whether an override has lowered the feed: the acceleration, in which the velocity grows by `climb` until it has ended, cannot end
-    /// at it any more.
+    /// Whether an override has lowered the feed so far that the acceleration cannot end at it any more. Until the
+    /// acceleration has ended, the velocity grows by `climb`.
     fn is_lowered(&self, climb: f32, cruise: f32) -> bool {
         below(cruise - self.velocity, climb - scaled(climb, -6))
     }
 
-    /// The acceleration ends at the feed, if that is safe.
+    /// Ends the acceleration at the feed, if that is safe.
     #[inline(never)]
     fn arrive(&mut self, span: &Span, ahead: &impl Ahead) -> Arrives {
         let cruise = span.cruise;
@@ -417,7 +433,7 @@ impl Governor {
         Arrives::Safely
     }
 
-    /// Slows down, for the velocity is above the feed or will be.
+    /// Slows down, because the velocity is above the feed or will be.
     #[inline(never)]
     fn slow_down(&mut self, span: &Span, ahead: &impl Ahead) -> bool {
         let (cruise, seconds) = (span.cruise, span.seconds);
@@ -435,7 +451,7 @@ impl Governor {
         true
     }
 
-    /// Lays out a ramp down to `velocity`, or, if that is not safe, one to a standstill.
+    /// Lays out a ramp down to `velocity`, or to a standstill if that is not safe.
     #[inline(never)]
     fn go_down_to(&mut self, velocity: f32, span: &Span, ahead: &impl Ahead) {
         let top = self.velocity + self.limits.kappa * self.alpha * self.alpha;
@@ -481,20 +497,20 @@ impl Governor {
         self.lay(if fits { target } else { 0.0 }, 0.0, closed && fits);
     }
 
-    /// Something ahead has changed: a slice of the ramp, or of something better.
+    /// Something ahead has changed: works out a slice of the ramp, or of something better.
     #[inline(never)]
     fn reconsider(&mut self, span: &Span, ahead: &impl Ahead) -> bool {
         self.changed = false;
         if self.ramp.as_ref().is_some_and(|ramp| !ramp.ends_at(span.cruise)) {
             self.take_alpha();
             if !self.alpha.is_sign_negative() || !some(self.alpha) {
-                // It has not begun to slow down.
+                // The machine has not begun to slow down.
                 (self.alpha, self.wait) = (greater(self.alpha, 0.0), 0);
                 return self.free(span, ahead);
             }
             let bottom = self.bottom();
             if !below(span.cruise, bottom) {
-                // The ramp stays, if that is not safe.
+                // The ramp stays, if the bottom is not safe.
                 self.try_bottom(bottom, span, ahead);
             }
         }
@@ -502,17 +518,17 @@ impl Governor {
         true
     }
 
-    /// The velocity at which the deceleration is ended, if that begins now; none if it is hardly any.
+    /// Returns the velocity that is left if the deceleration begins to end now; 0 if it is hardly any.
     #[inline(never)]
     fn bottom(&self) -> f32 {
         let bottom = self.velocity - self.limits.kappa * self.alpha * self.alpha;
         if below(0.2 * SEGMENT_S * SEGMENT_S * self.limits.jerk, bottom) { bottom } else { 0.0 }
     }
 
-    /// Ends the deceleration, at the velocity `bottom`, if that is safe.
+    /// Ends the deceleration, at the velocity `bottom`, if that is safe. Returns whether it is.
     #[inline(never)]
     fn try_bottom(&mut self, bottom: f32, span: &Span, ahead: &impl Ahead) -> bool {
-        // Less than 0 is from the bottom back to the state.
+        // `rising` is negative here: the distance from the bottom back to the state.
         let at = -self.rising(self.alpha, self.velocity, bottom);
         let level = self.velocity;
         let ask =
@@ -524,17 +540,26 @@ impl Governor {
         safe
     }
 
-    /// From rest to rest over what is too short to get going: a fraction of a step, most likely.
+    /// Moves from rest to rest over what is too short to get going: a fraction of a step, most likely.
     #[inline(never)]
     fn creep(&mut self, span: &Span) {
         (self.velocity, self.alpha, self.wait) = (0.0, 0.0, 0);
-        let left = greater(span.left, 0.0);
+        let left = least(greater(span.left, 0.0), self.crawled(span));
         // Four jerk phases: left = J T^3 / 32.
         let seconds = greater(rough_cube_root(32.0 * left / self.limits.jerk), span.seconds);
         self.add(greater(seconds, left / span.cruise), left, self.potential(left));
     }
 
-    /// A feedhold begins: the ramp down to a standstill, as hard as the limits allow.
+    /// How far a slice goes at most that makes no ramp, from rest to rest. It takes up to `2^CRAWL_LOG2` times as long as others then, and
+    /// its mean velocity is what two of those build up: so little may begin and end at once.
+    #[inline(never)]
+    fn crawled(&self, span: &Span) -> f32 {
+        let Limits { accel, jerk, .. } = self.limits;
+        let crawl = least(scaled(jerk, 1) * span.seconds, accel) * span.seconds;
+        least(crawl, span.cruise) * scaled(span.seconds, CRAWL_LOG2)
+    }
+
+    /// Begins a feedhold: lays out the ramp down to a standstill, as hard as the limits allow.
     #[inline(never)]
     pub(super) fn halt_ramp(&mut self) {
         self.leave_ramp();
@@ -546,7 +571,8 @@ impl Governor {
     }
 }
 
-/// Up to 5 % more than the cube root of a positive number, where `float::cube_root` would cost 2,700 cycles: the bits of a float are nearly its logarithm.
+/// Returns up to 5 % more than the cube root of a positive number: the bits of a float are nearly its logarithm.
+/// `float::cube_root` would cost 2,700 cycles.
 fn rough_cube_root(x: f32) -> f32 {
     f32::from_bits(x.to_bits() / 3 + 0x2A51_19F2) * 1.05
 }

@@ -1,4 +1,4 @@
-//! Random jobs, and what becomes of them.
+//! Random jobs, and the result of running them.
 
 use kerf::motion::block::{Body, Line};
 use kerf::motion::exec::{SEGMENT_S, Step};
@@ -19,12 +19,12 @@ pub struct Job {
 
 #[derive(Clone, Copy, Debug)]
 pub struct Move {
-    /// Travel, units of 0.1 um.
+    /// Distance along each axis, units of 0.1 um.
     pub way: [i32; 4],
     pub velocity: f32,
-    /// It begins at rest.
+    /// Whether the move begins at rest.
     pub stop: bool,
-    /// Turns of exec after it has been queued.
+    /// How often exec runs after the move has been queued.
     pub turns: u8,
 }
 
@@ -69,7 +69,7 @@ pub fn any_move(size: f32) -> impl Strategy<Value = Move> {
     )
 }
 
-/// Sharp corners, and curves of short moves.
+/// Moves with sharp corners, and curves of short moves.
 pub fn any_moves() -> impl Strategy<Value = Vec<Move>> {
     let rough = prop_oneof![Just(0.05f32), Just(1.0), Just(30.0)]
         .prop_flat_map(|size| prop::collection::vec(any_move(size), 1..40));
@@ -90,7 +90,7 @@ pub fn any_job() -> impl Strategy<Value = Job> {
     (any_config(), any_moves()).prop_map(|(config, moves)| Job { config, moves })
 }
 
-/// Runs a job; the moves as (target, number) for those that were queued.
+/// Runs a job and returns its rig.
 pub fn run(job: &Job) -> Rig {
     let mut rig = Rig::new(job.config.clone());
     for (n, step) in job.moves.iter().enumerate() {
@@ -118,27 +118,28 @@ pub fn run(job: &Job) -> Rig {
     rig
 }
 
-/// What the governor makes of a job: one after the other, with the block each belongs to.
+/// A stretch of motion that the governor has planned, with the data of its block.
 #[derive(Clone, Copy, Debug)]
 pub struct Planned {
     /// The number of its block, from 1.
     pub line: u32,
     pub length: f64,
-    /// Under the override in force.
+    /// Cruise velocity under the override in force.
     pub cruise: f64,
-    /// Under the highest there may be.
+    /// Cruise velocity under the highest possible override.
     pub top: f64,
-    /// What the corner at its start allows.
+    /// The velocity that the corner at its start allows.
     pub corner: f64,
     pub accel: f64,
     pub jerk: f64,
     pub stretch: Stretch,
     pub before: f64,
     pub after: f64,
-    /// When the stretch ends, and how far on the path that is, from the beginning of the job.
+    /// Time at the end of the stretch, and the distance along the path by then, both from the beginning of the job.
     pub clock: f64,
     pub place: f64,
-    /// When and where the velocity is `after`: later than the stretch ends if a part of a slice is left.
+    /// Time and distance at which the velocity is `after`. They are later than the end of the stretch if a part of a
+    /// slice remains.
     pub after_clock: f64,
     pub after_place: f64,
 }
@@ -148,17 +149,43 @@ pub fn plan(job: &Job) -> Vec<Planned> {
     plan_held(job, |_, _| false)
 }
 
-/// Runs a job with feedholds through queue and governor alone: `held` tells before each stretch whether there is one, asked
-/// with the number of stretches so far and whether the machine stands still. At rest it is asked until there is none.
+/// Runs a job with feedholds through queue and governor alone. Before each stretch `held` says whether there is a
+/// feedhold; it gets the number of stretches so far and whether the machine stands still. At rest it is asked again
+/// until it says no.
 pub fn plan_held(job: &Job, held: impl FnMut(usize, bool) -> bool) -> Vec<Planned> {
     plan_changed(job, held, |_, _| {})
 }
 
-/// Runs a job with feedholds through queue and governor alone; `change` is called before each stretch, with its number.
+/// As [`plan_held`]. In addition `change` is called before each stretch, with the number of stretches so far.
 pub fn plan_changed(
+    job: &Job,
+    held: impl FnMut(usize, bool) -> bool,
+    change: impl FnMut(usize, &mut Rig),
+) -> Vec<Planned> {
+    plan_with(job, held, change, |_| Pressed::default())
+}
+
+/// How little of the CPU there is.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Pressed {
+    /// Slices are twice as long.
+    pub coarse: bool,
+    /// Slices are twice as long, and the governor looks at nothing that may wait.
+    pub hurry: bool,
+    /// Accelerations that are about to end do so without another scan.
+    pub tight: bool,
+}
+
+/// Runs a job through queue and governor alone; `pressed` tells before each stretch how little of the CPU there is.
+pub fn plan_pressed(job: &Job, pressed: impl FnMut(usize) -> Pressed) -> Vec<Planned> {
+    plan_with(job, |_, _| false, |_, _| {}, pressed)
+}
+
+fn plan_with(
     job: &Job,
     mut held: impl FnMut(usize, bool) -> bool,
     mut change: impl FnMut(usize, &mut Rig),
+    mut pressed: impl FnMut(usize) -> Pressed,
 ) -> Vec<Planned> {
     let mut rig = Rig::new(job.config.clone());
     let mut governor = Governor::new();
@@ -168,7 +195,7 @@ pub fn plan_changed(
     let mut step = |rig: &mut Rig| -> bool {
         let Some(block) = rig.source.oldest() else {
             assert!(running.is_none());
-            // What may be gone at once.
+            // The velocity that may change to zero at once.
             let jump = |p: &Planned| {
                 if p.jerk > 0.0 { 2.0 * p.jerk as f32 * SEGMENT_S } else { p.accel as f32 }
             };
@@ -212,10 +239,14 @@ pub fn plan_changed(
         while hold && governor.is_at_rest() {
             hold = held(planned.len(), true);
         }
+        let Pressed { coarse, hurry, tight } = pressed(planned.len());
+        governor.set_hurry(hurry);
+        governor.set_tight(tight);
+        let nominal = if coarse || hurry { 2.0 * SEGMENT_S } else { SEGMENT_S };
         let stretch = if hold {
             governor.halt(left, &view, SEGMENT_S)
         } else {
-            governor.stretch(left, cruise, &view, SEGMENT_S)
+            governor.stretch(left, cruise, &view, nominal)
         };
         let (clock, place) = planned.last().map_or((0.0, 0.0), |p| (p.clock, p.place));
         let clock = clock + f64::from(stretch.seconds);

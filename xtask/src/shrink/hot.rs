@@ -1,25 +1,27 @@
-//! Which code is hot: how much of it may be shared.
+//! Which code is hot, and therefore how much of it may be shared.
 //!
-//! A row is the beginning of names, up to the end of a word: a folder, a module, a type or a function. Of the rows that a name begins with the
-//! longest says how hot it is; what no row names is cold.
+//! A row is the beginning of names, up to the end of a word: a folder, a module, a type or a function. Of the rows
+//! that match the beginning of a name, the longest decides how hot the function is. A function that no row matches is
+//! cold.
 //!
-//! The rows come from counts: `KERF_COUNTS=FOLDER cargo xtask bench` writes how often each instruction ran. To share all that repeats costs
-//! 25 cycles each time a function is called and 6 % of what it takes itself; to share its end costs 3. Where that is more than 3 millionths of
-//! the time of a job of the bench for each byte that it saves, the function is warm or hot; in what prepares segments, where it is more than
-//! one millionth. What finds keys for the queue is hot. `cargo xtask size` fails when a row names nothing any more.
+//! The rows are derived from counts: `KERF_COUNTS=FOLDER cargo xtask bench` writes how often each instruction ran.
+//! Sharing all repeated code costs 25 cycles for each call of a function, plus 6 % of its own time. Sharing its end
+//! costs 3 cycles. If that is more than 3 millionths of the time of a job of the bench for each byte that it saves,
+//! the function is warm or hot. In the code that prepares segments the limit is one millionth. The code that computes
+//! keys for the queue is hot. `cargo xtask size` fails when a row no longer matches any function.
 
 /// How much of a function may be shared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Heat {
-    /// All that repeats.
+    /// All code that repeats.
     Cold,
-    /// What it ends with.
+    /// Its end only.
     Warm,
     /// Nothing.
     Hot,
 }
 
-/// Beginnings of the names of functions that stay as they are.
+/// Beginnings of the names of functions that stay unchanged.
 const HOT: &[&str] = &[
     // Every interrupt, the executors and their tick.
     "__vector_",
@@ -29,11 +31,11 @@ const HOT: &[&str] = &[
     "embassy_time::",
     "kerf::image::",
     "kerf::dda::",
-    // Small, and called from everywhere.
+    // Small functions that are called from everywhere.
     "memcpy",
     "memset",
     "core::",
-    // What runs many times for each segment, block, line or report.
+    // Functions that run many times for each segment, block, line or report.
     "kerf::config::setting::Setting>::owner",
     "kerf::gcode::axes::value::",
     "kerf::gcode::command::Commands>::is_motion_alone",
@@ -82,7 +84,8 @@ const HOT: &[&str] = &[
     "kerf::tasks::wake::Wake>::",
 ];
 
-/// What runs as often as a segment, a block or a line: ends are shared, two or three cycles each.
+/// Functions that run as often as a segment, a block or a line. Their ends are shared, at a cost of two or three
+/// cycles each.
 pub const WARM: &[&str] = &[
     "kerf::gcode::lexer::comment",
     "kerf::gcode::interpreter::Interpreter",
@@ -140,7 +143,7 @@ pub const WARM: &[&str] = &[
     "kerf::tasks::view::View>::seen",
 ];
 
-/// Of these, what seldom runs.
+/// Functions among the hot and warm ones that seldom run.
 const COLD: &[&str] = &[
     "embassy_executor::raw::Executor>::spawn",
     "kerf::dda::Dda>::settle::",
@@ -161,6 +164,7 @@ const COLD: &[&str] = &[
     "kerf::motion::curve::acceleration",
     "kerf::motion::dynamics::",
     "kerf::motion::exec::Exec>::take_up",
+    "kerf::motion::governor::Governor>::crawled",
     "kerf::motion::governor::Governor>::creep",
     "kerf::motion::junction::arc",
     "kerf::motion::junction::mean",
@@ -190,7 +194,7 @@ const COLD: &[&str] = &[
     "kerf::tasks::parser::answer::ran",
 ];
 
-/// How hot a function of this name is.
+/// Returns how hot a function of this name is.
 pub fn heat(name: &str) -> Heat {
     let longest = |rows: &[&str]| {
         rows.iter().filter(|row| begins(name, row)).map(|row| row.len()).max().unwrap_or(0)
@@ -203,20 +207,21 @@ pub fn heat(name: &str) -> Heat {
     }
 }
 
-/// The rows that no function is named by, but for those of a dialect that the image lacks.
+/// Returns the rows that match no function, except rows of a dialect that the image lacks.
 pub fn stale<'a>(names: impl Iterator<Item = &'a str> + Clone) -> Vec<&'static str> {
     let names_nothing = |row: &str| !names.clone().any(|name| begins(name, row));
     let stale = |row: &&&str| names_nothing(row) && !dialect(row).is_some_and(names_nothing);
     [HOT, WARM, COLD].into_iter().flatten().filter(stale).copied().collect()
 }
 
-/// The module of `kerf::protocol` that a row is in, as a row: `kerf::protocol::tinyg::`.
+/// Returns the module of `kerf::protocol` that a row is in, as a row: `kerf::protocol::tinyg::`.
 fn dialect(row: &str) -> Option<&str> {
     let (name, _) = row.strip_prefix("kerf::protocol::")?.split_once("::")?;
     row.find(name).and_then(|at| row.get(..at + name.len() + 2))
 }
 
-/// `<kerf::motion::exec::Exec>::run` begins with `kerf::motion::`, and its poll with what the task is called.
+/// Whether a name begins with a row. `<kerf::motion::exec::Exec>::run` begins with `kerf::motion::`; the poll of a
+/// task begins with the task's name.
 fn begins(name: &str, row: &str) -> bool {
     const POLL: &str = "<embassy_executor::raw::TaskStorage<";
     let name = name.strip_prefix(POLL).unwrap_or(name).trim_start_matches(['<', '&']);
