@@ -1,8 +1,8 @@
 //! How fast a curve may be taken, so that its axes keep to their acceleration and jerk.
 //!
-//! On a curve of radius r the path turns with an acceleration of v^2 / r, and that changes with a jerk of
-//! v^3 / r^2. An arc's radius is known ([`Curve`]). Lines that are short against a curve tell it by how they turn
-//! ([`Bend`]): what the junction deviation says holds for a corner with room enough around it.
+//! On a curve of radius r the path turns with an acceleration of v^2 / r, which changes with a jerk of v^3 / r^2. The
+//! radius of an arc is known ([`Curve`]). Lines that are short compared with a curve show it by how they turn
+//! ([`Bend`]). The junction deviation does not cover them: it holds for a corner with room enough around it.
 //!
 //! Called by the planner and its line builder. Units: mm, s. Costs are AVR cycles.
 
@@ -19,31 +19,31 @@ use crate::hal::arithmetic::product;
 use crate::math::sqrt;
 use crate::units::FIRST_ROTARY;
 
-/// The part of the acceleration that turning on an arc may take; and with slowing down on the arc, which is at right
-/// angles to it. The rest is for the corners of the chords, at which the path turns at once.
+/// The share of the acceleration that turning on an arc may take.
 const TURNING: f32 = 0.75;
-/// See [`TURNING`].
+/// The share that turning and slowing down may take together: on an arc they are at right angles. The rest is for the
+/// corners of the chords, at which the path turns at once.
 const BOTH: f32 = 0.95;
-/// [`TURNING`] under a jerk limit, where slowing down may take all of the acceleration.
+/// Takes the place of [`TURNING`] under a jerk limit, where slowing down may take all of the acceleration.
 const TURNING_JERK: f32 = 0.65;
 /// A corner between two chords changes the velocity by no more than the acceleration does in this time, s.
 const CORNER_S: f32 = 0.01;
-/// 0.5 um, in 2^-14 mm.
+/// How far rounding moves a position, as a logarithm: 0.5 um, in 2^-14 mm.
 const NOISE: Log = Log(3 * OCTAVE);
-/// A curve is plain if it turns by so many times as much as positions may be rounded by, as a logarithm.
+/// A curve is plain if it turns by this many times as much as rounding of positions may turn it, as a logarithm.
 const PLAIN: i16 = 7 * OCTAVE / 2;
-/// More than what the logarithm of a velocity is off.
+/// More than the error of the logarithm of a velocity.
 const SPARE: i16 = 8;
-/// What a velocity rounded up may take of the jerk, as a logarithm: a tenth.
+/// The share of the jerk that rounding a velocity up may take, as a logarithm: a tenth.
 const JERK_SPARE: i16 = 39;
-/// No arc is smaller, mm.
+/// The least radius of an arc, mm.
 const RADIUS_LEAST: f32 = 1e-3;
 /// Changes of direction below this count as none, as in `junction`. In 2^-14.
 const STRAIGHT: u16 = 31;
-/// A curve has this many corners, each like the one before it, before the one that slows it down: rounding of
+/// How many corners in a row must be like the one before them until a further one is slowed down: rounding of
 /// positions makes few such rows.
 const CORNERS: u8 = 1;
-/// Changes of direction beyond this, some 40 degrees, are no part of a curve. In 2^-14.
+/// Changes of direction beyond this, some 40 degrees, do not belong to a curve. In 2^-14.
 const CORNER: u16 = 11_000;
 
 /// The limits of an arc.
@@ -51,15 +51,16 @@ const CORNER: u16 = 11_000;
 pub struct Curve {
     /// Highest velocity on the path, mm/s.
     velocity: f32,
-    /// Highest acceleration along the path where there is no jerk limit; 0 for what axes allow.
+    /// Highest acceleration along the path if there is no jerk limit; 0 for what axes allow.
     accel: Short,
-    /// A chord of it has been made: the next one follows without a corner.
+    /// Whether a chord of the arc has been made: the next one follows without a corner.
     pub(super) goes_on: bool,
 }
 
 impl Curve {
-    /// The limits of an arc of this radius in the plane of `axes` at `feed`, mm/min, and how long its chords may be,
-    /// mm. `slope` is the length of its path over that in the plane, more than 1 for a helix.
+    /// Returns the limits of an arc, and how long its chords may be, mm. The arc has this radius in the plane of
+    /// `axes`, and a `feed` in mm/min. `slope` is the length of its path over its length in the plane, more than 1
+    /// for a helix.
     ///
     /// Cost: 8,000.
     #[inline(never)]
@@ -89,12 +90,12 @@ impl Curve {
             let turning = if ramps { TURNING_JERK } else { TURNING };
             curve.velocity = least(curve.velocity, sqrt(turning * accel * radius));
             let feed = feed * (1.0 / 60.0);
-            // An override may double it.
+            // An override may double the feed.
             let top = least(curve.velocity, feed + feed);
             let turns = top * top / radius;
             let both = BOTH * accel;
             curve.accel = Short::new(sqrt(both * both - turns * turns));
-            // A turn takes as long as its chord: that much of its acceleration is left to slow down.
+            // At a corner the velocity then changes by what the turning acceleration does in [`CORNER_S`].
             longest = CORNER_S * turning * accel * radius / least(curve.velocity, feed);
         }
         // The radius of curvature of a helix is that of its arc times the square of the slope.
@@ -102,7 +103,7 @@ impl Curve {
         (curve, longest)
     }
 
-    /// A chord has been made.
+    /// Notes that a chord has been made.
     pub fn go_on(&mut self) {
         self.goes_on = true;
     }
@@ -111,9 +112,9 @@ impl Curve {
 /// How the path turned at the last corner.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Bend {
-    /// The change of direction, in 2^-14.
+    /// The change of direction of each axis, in 2^-14.
     turned: [i16; FIRST_ROTARY],
-    /// Length of the last line and of the one before, mm.
+    /// Length of the last line and of the line before it, mm.
     last: Short,
     before: Short,
     /// How many corners in a row were like the one before them, up to [`CORNERS`].
@@ -121,20 +122,26 @@ pub(super) struct Bend {
 }
 
 impl Bend {
-    /// The path goes on with a chord of an arc.
+    /// Goes on with a chord of an arc, which gets the limits of the arc.
     #[inline(never)]
     pub(super) fn chord(&mut self, path: &mut Path, curve: &Curve) {
         *self = Self { last: Short::new(path.length), ..Self::default() };
-        path.slow_down(curve.velocity);
-        if path.jerk == Short::ZERO && curve.accel != Short::ZERO && curve.accel < path.accel {
-            path.accel = curve.accel;
+        let (mut velocity, mut accel) = (curve.velocity, curve.accel);
+        if some(path.stretch) {
+            // The limits of the arc are in mm, and the path of this chord is measured in degrees.
+            velocity *= path.stretch;
+            accel = Short::new(accel.get() * path.stretch);
+        }
+        path.slow_down(velocity);
+        if path.jerk == Short::ZERO && accel != Short::ZERO && accel < path.accel {
+            path.accel = accel;
         }
     }
 
-    /// The path goes on with a line, from heading `from`. Slows it down if the last two corners are those of a
-    /// curve that cannot be taken as fast. Returns what [`turn`] says of this corner.
+    /// Goes on with a line, from heading `from`. Slows the line down if the last two corners are those of a curve
+    /// that cannot be taken as fast. Returns what [`turn`] returns for this corner.
     ///
-    /// Cost: 400 where it is no curve, 800 on a curve that is plainly no limit, else 1,000 to 1,400.
+    /// Cost: 400 at a corner that belongs to no curve, 800 on a curve that plainly sets no limit, else 1,000 to 1,400.
     #[inline(never)]
     pub(super) fn line(&mut self, from: &Heading, path: &mut Path, dynamics: &Dynamics) -> u32 {
         let (last, before) = (self.last, self.before);
@@ -170,8 +177,8 @@ impl Bend {
         square
     }
 
-    /// Whether the last corners are those of a curve: the greatest change of direction of an axis, that of two corners together, and
-    /// by how much the two differ.
+    /// Whether the last corners are those of a curve. `most` is the greatest change of direction of an axis, `sum`
+    /// that of two corners together, and `difference` the greatest by which the two corners differ.
     #[inline(always)]
     fn is_curve(&mut self, most: u16, sum: u16, difference: u16) -> bool {
         if !(STRAIGHT..=CORNER).contains(&most) {
@@ -179,7 +186,7 @@ impl Bend {
             self.corners = 0;
             return false;
         }
-        // The two turn the same way, and one no more than three times as much as the other.
+        // On a curve both corners turn the same way, and neither turns more than three times as much as the other.
         if difference > sum / 2 {
             self.corners = 0;
             return false;
@@ -192,8 +199,8 @@ impl Bend {
     }
 }
 
-/// The length of a line and of half of both around it, mm; or `None` if it is short against these, as a chamfer between
-/// long lines is, or the end of a long one. Cost: 150.
+/// Returns the length of a line and of half of both lines around it, mm. `None` if the line is short compared with
+/// them, as a chamfer between long lines is, or the end of a long line. Cost: 150.
 #[inline(never)]
 fn span(before: Short, line: Short, after: Short) -> Option<Log> {
     let (mantissa, power) = line.parts();
@@ -220,8 +227,8 @@ fn span(before: Short, line: Short, after: Short) -> Option<Log> {
     (twice <= 8 * mantissa).then(|| Log(Log::of(twice << 4).0 + octaves))
 }
 
-/// How much of a change of direction within `span` mm may be what positions of three decimals have been rounded by,
-/// in 2^-14. Cost: 100.
+/// Returns how much of a change of direction within `span` mm may come from rounding positions to three decimals, in
+/// 2^-14. Cost: 100.
 #[inline(never)]
 fn noise(span: Log) -> u16 {
     let (mantissa, power) = Log(NOISE.0 - span.0).power().parts();
@@ -238,13 +245,14 @@ fn noise(span: Log) -> u16 {
     noise
 }
 
-/// A third of a logarithm, which is at least that of 2^-48. Cost: 40.
+/// Returns a third of a logarithm, which is at least that of 2^-48. Cost: 40.
 fn third(log: i16) -> i16 {
     const UP: u16 = 3 << 12;
     (product((log as u16).wrapping_add(UP), 0x5556) >> 16) as i16 - UP as i16 / 3
 }
 
-/// The limits of the axes that take part in a curve: the least jerk, and the acceleration if it is that of all.
+/// The limits of the axes that take part in a curve: the least jerk, and the acceleration, which is that of all axes
+/// unless `mixed`.
 #[derive(Default)]
 struct Sharp {
     accel: Short,
@@ -266,8 +274,8 @@ impl Sharp {
     }
 }
 
-/// What the curve may take altogether, as axes have different limits: it turns on, so that each will take part in it as
-/// much as the one that does most now.
+/// Returns the acceleration that the curve may take where axes have different limits. The curve turns on, so that
+/// each axis will take part in it as much as the one that does most now.
 #[inline(never)]
 #[small]
 fn acceleration(both: &[u16; FIRST_ROTARY], dynamics: &Dynamics) -> Log {
@@ -283,13 +291,14 @@ fn acceleration(both: &[u16; FIRST_ROTARY], dynamics: &Dynamics) -> Log {
     Log(least)
 }
 
-/// The curvature of a path whose direction changes by `both`, in 2^-14, within `span` mm: its logarithm.
+/// Returns the curvature of a path whose direction changes by `both`, in 2^-14, within `span` mm: its logarithm.
 #[inline(always)]
 fn curvature(both: Log, span: Log) -> i16 {
     both.0 - 14 * OCTAVE - span.0
 }
 
-/// How fast a path of this curvature may be for an acceleration, v^2 / r, and a jerk, v^3 / r^2, 0 for none: all in logarithms.
+/// Returns how fast a path of this curvature may be for an acceleration, v^2 / r, and a jerk, v^3 / r^2; 0 stands
+/// for no limit. The curvature and the result are logarithms.
 #[inline(never)]
 fn fastest(curvature: i16, accel: Short, jerk: Short) -> i16 {
     let mut velocity = i16::MAX;
@@ -302,15 +311,17 @@ fn fastest(curvature: i16, accel: Short, jerk: Short) -> i16 {
     velocity
 }
 
-/// One of eight values in an octave, so that lines of a curve have one velocity in spite of what is rounded: 2 % up or 6 % down.
+/// Rounds a velocity to one of eight values in an octave: 2 % up or 6 % down. So the lines of a curve have one
+/// velocity in spite of rounding.
 #[inline(always)]
 fn even(velocity: i16) -> i16 {
     (velocity + OCTAVE / 32) & !(OCTAVE / 8 - 1)
 }
 
 impl Path {
-    /// Keeps to what axes can on a path whose direction changes by `both`, of which `length` is no less than the length, in 2^-14,
-    /// within `span` mm. What only an override asks for may be up to a quarter below that.
+    /// Keeps to what the axes can do on a path whose direction changes by `both` within `span` mm, in 2^-14. `length`
+    /// is an upper bound of the length of `both`. What only an override asks for may be limited to up to a quarter
+    /// less.
     #[inline(never)]
     fn keep_to_bend(
         &mut self,
@@ -332,7 +343,7 @@ impl Path {
         }
     }
 
-    /// Keeps to what axes can on a path whose direction changes by `both`, in 2^-14, within `span` mm.
+    /// Keeps to what the axes can do on a path whose direction changes by `both`, in 2^-14, within `span` mm.
     #[inline(never)]
     fn bend(&mut self, both: &mut [u16; FIRST_ROTARY], span: Log, dynamics: &Dynamics) {
         let noise = noise(span);
@@ -357,7 +368,7 @@ impl Path {
         }
     }
 
-    /// Keeps to a velocity, mm/s.
+    /// Keeps the path to a velocity, mm/s.
     fn slow_down(&mut self, velocity: f32) {
         self.top = least(self.top, velocity);
         self.cruise = least(self.cruise, self.top);
@@ -386,6 +397,15 @@ mod tests {
         for log in -48 * OCTAVE..=i16::MAX {
             assert!((3 * i32::from(third(log)) - i32::from(log)).abs() <= 3, "{log}");
         }
+    }
+
+    #[test]
+    fn an_arc_on_which_a_rotary_axis_goes_farther_is_limited_in_degrees() {
+        let curve = Curve { velocity: 20.0, accel: Short::new(64.0), goes_on: false };
+        let mut path = Path { length: 8.0, stretch: 4.0, ..Path::default() };
+        (path.cruise, path.top, path.accel) = (500.0, 1_000.0, Short::new(1_000.0));
+        Bend::default().chord(&mut path, &curve);
+        assert_eq!((path.cruise, path.top, path.accel.get()), (80.0, 80.0, 256.0));
     }
 
     proptest! {
