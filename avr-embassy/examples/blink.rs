@@ -1,4 +1,5 @@
-//! Two tasks that blink: PB7, the LED of an Arduino Mega 2560 (pin 13), four times a second, PB6 (pin 12) ten times.
+//! Two tasks that blink: PB7, the LED of an Arduino Mega 2560 (pin 13), four times a second, and PB6 (pin 12) ten
+//! times a second.
 //!
 //! The clock is 16 MHz; with the feature `uneven-clock` it is 20 MHz.
 #![no_std]
@@ -18,7 +19,7 @@ async fn blink(pin: u8, half_period: Duration) {
     let mut ticker = Ticker::every(half_period);
     loop {
         ticker.next().await;
-        // SAFETY: a 1 written to PINB turns that pin over and leaves the others alone.
+        // SAFETY: a 1 written to PINB toggles that pin and leaves the others alone.
         unsafe { Peripherals::steal().PORTB.pinb().write(|w| w.bits(1 << pin)) };
     }
 }

@@ -1,6 +1,6 @@
 //! What the runtime costs, in cycles, measured with timer 1: the numbers of the README.
 //!
-//! They are in `COSTS` when `FINISHED` is 1, in the order of the constants below.
+//! The numbers are in `COSTS` when `FINISHED` is 1, in the order of the constants below.
 #![no_std]
 #![no_main]
 #![feature(abi_avr_interrupt)]
@@ -42,7 +42,7 @@ static ANSWERED_AT: AtomicU16 = AtomicU16::new(0);
 static BYTES: Ring<u8, 64> = Ring::new();
 
 fn timer() -> TC1 {
-    // SAFETY: its count is read from everywhere, its registers are written where nothing else runs.
+    // SAFETY: the timer's count is read from everywhere; its registers are written only where nothing else runs.
     unsafe { Peripherals::steal().TC1 }
 }
 
@@ -84,7 +84,7 @@ async fn called(thread: Thread) {
     }
 }
 
-/// The cycles of something done at once.
+/// Returns how many cycles something takes that is done at once.
 #[inline(always)]
 fn cycles(act: impl FnOnce()) -> u16 {
     let began = now();

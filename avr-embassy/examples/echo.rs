@@ -1,7 +1,7 @@
 //! Sends back what comes over USART0, the serial port of an Arduino Mega 2560, at 115,200 baud, 8 bits, no parity.
 //!
-//! Handlers move bytes and set events; the task is woken by these. Up to 63 bytes wait; what comes then is lost, and PB7 (the LED
-//! on pin 13) says so.
+//! Handlers move bytes and set events, which wake the task. Up to 63 bytes can wait; a byte that comes when 63 wait
+//! is lost, and PB7 (the LED on pin 13) shows it.
 #![no_std]
 #![no_main]
 #![feature(abi_avr_interrupt)]
@@ -19,7 +19,7 @@ const RECEIVED: Event = Event::new::<0>();
 const SENT: Event = Event::new::<1>();
 
 fn peripherals() -> Peripherals {
-    // SAFETY: handlers own UDR0's reading and clear UDRIE0; the task does the rest.
+    // SAFETY: handlers alone read UDR0 and clear UDRIE0; the task does the rest.
     unsafe { Peripherals::steal() }
 }
 
@@ -60,7 +60,7 @@ fn main() -> ! {
     let Peripherals { USART0: usart, PORTB: port, .. } = peripherals();
     port.ddrb().write(|w| w.pb7().set_bit());
     // 16 MHz / 8 / 17 is 2.1 % above 115,200.
-    // SAFETY: a divisor of 12 bits.
+    // SAFETY: the divisor fits 12 bits.
     unsafe { usart.ubrr0().write(|w| w.bits(16)) };
     usart.ucsr0a().write(|w| w.u2x0().set_bit());
     usart.ucsr0b().write(|w| w.rxen0().set_bit().txen0().set_bit().rxcie0().set_bit());

@@ -1,8 +1,8 @@
 //! A task of interrupt mode that preempts a task of thread mode.
 //!
-//! `work` computes without a pause, 20 ms a poll, and turns pin 12 (PB6) over after each. Meanwhile `pulse` turns the LED (pin 13,
-//! PB7) over each millisecond: a handler of timer 1 pends it. Each hundredth time it signals `tell`, a task of thread mode, which
-//! turns pin 11 (PB5) over.
+//! `work` computes without a pause, 20 ms a poll, and toggles pin 12 (PB6) after each poll. Meanwhile `pulse` toggles
+//! the LED (pin 13, PB7) each millisecond: a handler of timer 1 pends it. Every hundredth time it signals `tell`, a
+//! task of thread mode, which toggles pin 11 (PB5).
 #![no_std]
 #![no_main]
 #![feature(abi_avr_interrupt)]
@@ -20,7 +20,7 @@ use static_cell::StaticCell;
 static HUNDRED: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 
 fn peripherals() -> Peripherals {
-    // SAFETY: a 1 written to PINB turns that pin over; `main` alone writes other registers.
+    // SAFETY: a 1 written to PINB toggles that pin; `main` alone writes other registers.
     unsafe { Peripherals::steal() }
 }
 
@@ -74,7 +74,7 @@ fn main() -> ! {
             spawner.spawn(task);
         }
     });
-    // CTC, the clock itself, 16,000 cycles.
+    // CTC mode, clock not divided, 16,000 cycles a millisecond.
     timer.ocr1a().write(|w| w.set(15_999));
     timer.tccr1b().write(|w| w.wgm1().set(1).cs1().direct());
     timer.timsk1().write(|w| w.ocie1a().set_bit());

@@ -1,15 +1,15 @@
-//! A value that handlers and tasks of both levels have in turn: a byte, its stage, says whose turn it is.
+//! A value that handlers and tasks of both levels use in turn. A byte, the stage of the value, says whose turn it is.
 //!
-//! No level waits for another, and nothing is masked. Who finds another stage than its own, or the value in use, gets
-//! `None`.
+//! No level waits for another, and nothing is masked. A caller that finds a stage other than its own, or the value in
+//! use, gets `None`.
 
 use crate::byte::SharedByte;
 use crate::value::Value;
 
-/// Somebody has the value.
+/// The stage while somebody uses the value.
 const IN_USE: u8 = u8::MAX;
 
-/// A value, and its stage: 0 at first, at most 254. What stages mean is the program's.
+/// A value and its stage: 0 at first, at most 254. The program decides what each stage means.
 ///
 /// ```
 /// use avr_embassy::Baton;
@@ -29,18 +29,18 @@ pub struct Baton<T> {
 }
 
 impl<T> Baton<T> {
-    /// In stage 0.
+    /// Makes it in stage 0.
     pub const fn new(value: T) -> Self {
         Self { stage: SharedByte::new(0), value: Value::new(value) }
     }
 
-    /// The stage; 255 while somebody has the value. Any level.
+    /// Returns the stage; 255 while somebody uses the value. Any level.
     #[inline(always)]
     pub fn stage(&self) -> u8 {
         self.stage.get()
     }
 
-    /// Sets the stage, whatever it was. Nothing happens while somebody has the value. Any level. Cost: 6 cycles.
+    /// Sets the stage, whatever it was. Does nothing while somebody uses the value. Any level. Cost: 6 cycles.
     #[inline(always)]
     pub fn set_stage(&self, to: u8) {
         if self.stage.get() != IN_USE {
@@ -48,15 +48,16 @@ impl<T> Baton<T> {
         }
     }
 
-    /// Has `act` use the value if the stage is `from`; then the stage is `to`. Any level. Cost: 12 cycles and `act`.
+    /// Lets `act` use the value if the stage is `from`, then sets the stage to `to`. `None` if the stage is another.
+    /// Any level. Cost: 12 cycles and `act`.
     #[inline(always)]
     pub fn pass<R>(&self, from: u8, to: u8, act: impl FnOnce(&mut T) -> R) -> Option<R> {
         if from == IN_USE || self.stage.get() != from {
             return None;
         }
-        // Who comes in between has gone before this goes on: levels preempt one another like calls.
+        // A level that preempts here has ended before this level goes on: levels nest like calls.
         self.stage.set(IN_USE);
-        // SAFETY: whoever has the value has set the stage to `IN_USE`, and nobody takes it in that stage.
+        // SAFETY: whoever uses the value has set the stage to `IN_USE`, and in that stage nobody else takes it.
         let result = unsafe { self.value.with(act) };
         self.stage.set(to);
         Some(result)

@@ -1,9 +1,8 @@
 //! A byte that two levels share.
 //!
-//! An 8-bit CPU loads or stores a byte in one instruction, so a plain volatile access cannot be torn.
-//! `AtomicU8` would do the same with interrupts masked around it, which costs three cycles more in the
-//! hottest interrupts. The fences keep the compiler from moving other accesses across; the CPU itself
-//! never reorders. On the host it is an atomic.
+//! An 8-bit CPU loads or stores a byte in one instruction, so a plain volatile access cannot be torn. `AtomicU8`
+//! would mask interrupts around the access, which costs three cycles more in the hottest interrupts. The fences keep
+//! the compiler from moving other accesses across; the CPU itself never reorders. On other targets it is an atomic.
 
 #[cfg(target_arch = "avr")]
 mod imp {
@@ -17,12 +16,12 @@ mod imp {
     unsafe impl Sync for SharedByte {}
 
     impl SharedByte {
-        /// With a value.
+        /// Makes it with a value.
         pub const fn new(value: u8) -> Self {
             Self(UnsafeCell::new(value))
         }
 
-        /// The value; what was written before it was set is visible.
+        /// Returns the value. Everything written before the value was set is visible.
         #[inline(always)]
         pub fn get(&self) -> u8 {
             // SAFETY: a single load.
@@ -31,7 +30,7 @@ mod imp {
             value
         }
 
-        /// Sets the value, after everything written before.
+        /// Sets the value. Everything written before becomes visible with it.
         #[inline(always)]
         pub fn set(&self, value: u8) {
             compiler_fence(Ordering::SeqCst);
@@ -49,17 +48,17 @@ mod imp {
     pub struct SharedByte(AtomicU8);
 
     impl SharedByte {
-        /// With a value.
+        /// Makes it with a value.
         pub const fn new(value: u8) -> Self {
             Self(AtomicU8::new(value))
         }
 
-        /// The value; what was written before it was set is visible.
+        /// Returns the value. Everything written before the value was set is visible.
         pub fn get(&self) -> u8 {
             self.0.load(Ordering::Acquire)
         }
 
-        /// Sets the value, after everything written before.
+        /// Sets the value. Everything written before becomes visible with it.
         pub fn set(&self, value: u8) {
             self.0.store(value, Ordering::Release);
         }
@@ -68,10 +67,11 @@ mod imp {
 
 pub use imp::SharedByte;
 
-/// The number of a slot of a [ring](crate::ring): of as many bits as the CPU reads and writes in one instruction, up to 16.
+/// The number of a slot of a [ring](crate::ring), as wide as the CPU reads and writes in one instruction, at most 16
+/// bits.
 #[cfg(not(all(target_arch = "arm", target_os = "none")))]
 pub type Index = u8;
-/// See the other.
+/// The number of a slot of a [ring](crate::ring): 16 bits on Cortex-M.
 #[cfg(all(target_arch = "arm", target_os = "none"))]
 pub type Index = u16;
 
@@ -85,21 +85,21 @@ pub use wide::SharedIndex;
 mod wide {
     use core::sync::atomic::{AtomicU16, Ordering};
 
-    /// An index of a ring that two levels share, as [`SharedByte`](super::SharedByte) of 16 bits.
+    /// An index of a ring that two levels share: like [`SharedByte`](super::SharedByte), with 16 bits.
     pub struct SharedIndex(AtomicU16);
 
     impl SharedIndex {
-        /// With a value.
+        /// Makes it with a value.
         pub const fn new(value: u16) -> Self {
             Self(AtomicU16::new(value))
         }
 
-        /// The value; what was written before it was set is visible.
+        /// Returns the value. Everything written before the value was set is visible.
         pub fn get(&self) -> u16 {
             self.0.load(Ordering::Acquire)
         }
 
-        /// Sets the value, after everything written before.
+        /// Sets the value. Everything written before becomes visible with it.
         pub fn set(&self, value: u16) {
             self.0.store(value, Ordering::Release);
         }

@@ -1,11 +1,12 @@
 //! Event bits: how interrupts and interrupt-mode tasks tell thread-mode tasks that something happened.
 //!
-//! A handler never calls a [`Waker`]: it sets one bit, in one instruction of two cycles. The main loop turns bits into
-//! wake-ups between polls. A bit stays set until then, so no event is lost; events that repeat before the loop looks
-//! merge into one. So an event says "look again", and what there is to be seen lies elsewhere, in a [`Ring`](crate::ring::Ring)
+//! A handler never calls a [`Waker`]: it sets one bit, in one instruction of two cycles. The main loop turns bits
+//! into wake-ups between polls. A bit stays set until then, so no event is lost; events that repeat before the loop
+//! looks merge into one. An event only says "look again". The data lies elsewhere, in a [`Ring`](crate::ring::Ring)
 //! for example.
 //!
-//! Of events in one turn of the main loop the one with the highest bit is seen to first, timers last.
+//! Of the events that the main loop finds in one turn, the one with the highest bit is served first. Timers come
+//! last.
 //!
 //! ```
 //! use avr_embassy::{Event, Thread};
@@ -26,11 +27,11 @@ use embassy_executor::raw::{TaskRef, task_from_waker, wake_task};
 
 use crate::Thread;
 
-/// Bits that are the program's own: 0 to 3.
+/// The bits 0 to 3 belong to the program.
 pub const OWN: usize = 4;
 /// Events that tasks can wait for.
 const WAITABLE: usize = OWN + 1;
-// The runtime has the others: see `assembly` and `POLL`.
+// The runtime uses the other bits: see `assembly` and `POLL`.
 const _: () = assert!(
     WAITABLE <= 5,
     "bits 5, 6 and 7 are HOLD, HELD and POLL: an event needs another register"
@@ -43,10 +44,10 @@ pub(crate) const POLL: u8 = 7;
 pub struct Event(u8);
 
 impl Event {
-    /// A millisecond has passed: the time driver's event. Others may wait for it, too.
+    /// A millisecond has passed: the event of the time driver. Tasks may wait for it, too.
     pub const TICK: Event = Event(OWN as u8);
 
-    /// The program's event on a bit, 0 to 3. Another bit does not compile:
+    /// Returns the program's event for a bit, 0 to 3. Another bit does not compile:
     ///
     /// ```compile_fail
     /// const TOO_MANY: avr_embassy::Event = avr_embassy::Event::new::<4>();
@@ -62,7 +63,7 @@ impl Event {
         Event(BIT)
     }
 
-    /// The bit of this event, for handlers in assembly.
+    /// Returns the bit of this event, for handlers in assembly.
     pub const fn bit(self) -> u8 {
         self.0
     }
@@ -73,24 +74,25 @@ impl Event {
         flags::set(self.0);
     }
 
-    /// Whether it has happened since the main loop looked last. Any level. Cost: 2 cycles.
+    /// Whether the event has happened since the main loop looked last. Any level. Cost: 2 cycles.
     #[inline(always)]
     pub fn is_set(self) -> bool {
         flags::all() & 1 << self.0 != 0
     }
 
-    /// Waits until `ready` gives a value, asking now and after each time that this happens. Cost: see [`Waiter::wake_after`].
+    /// Waits until `ready` returns a value. Asks now, and after each time that the event happens. Cost: see
+    /// [`Waiter::wake_after`].
     ///
-    /// One task waits for an event. If another does too, both go on asking, at the cost of polls. The future keeps `ready` and a
-    /// byte; as an `async fn` it would keep its arguments twice.
+    /// An event is meant for one waiting task. If a second task waits, the two keep waking each other: both get on,
+    /// at the cost of polls. The future keeps `ready` and a byte; an `async fn` would keep its arguments twice.
     pub fn wait<R>(
         self,
         thread: Thread,
         mut ready: impl FnMut() -> Option<R>,
     ) -> impl Future<Output = R> {
         poll_fn(move |cx| {
-            // An event between the question and the registration sets its bit, which the main loop
-            // sees after this poll: nothing is missed.
+            // An event between the question and the registration sets its bit. The main loop sees that bit after this
+            // poll, so nothing is missed.
             if let Some(value) = ready() {
                 return Poll::Ready(value);
             }
@@ -99,13 +101,13 @@ impl Event {
         })
     }
 
-    /// Waits for the next time that this happens after the last poll of the task.
+    /// Waits for the next time that the event happens after the last poll of the task.
     pub fn next(self, thread: Thread) -> impl Future<Output = ()> {
         let mut asked = false;
         self.wait(thread, move || core::mem::replace(&mut asked, true).then_some(()))
     }
 
-    /// Has the main loop wake a task after the next time that this happens.
+    /// Has the main loop wake a task after the next time that the event happens.
     #[inline(never)]
     #[cfg_attr(target_arch = "avr", optimize(size))]
     pub fn wake_after(self, thread: Thread, waker: &Waker) {
@@ -127,7 +129,8 @@ impl Waiter {
         Self(Cell::new(None))
     }
 
-    /// Keeps a task for [`Waiter::wake`]. If it keeps another task, that is woken now, asks again, and comes back.
+    /// Keeps a task for [`Waiter::wake`]. If another task is kept, that one is woken now; it asks again and comes
+    /// back here.
     ///
     /// # Panics
     /// If the waker is not that of a task of Embassy's executors.
@@ -161,7 +164,8 @@ machine_static! {
     fn waiters() -> [Waiter; WAITABLE] = [const { Waiter::new() }; WAITABLE];
 }
 
-/// Wakes who waits for the events in `bits`, in the order of the bits: Embassy polls them in the reverse order. The main loop calls it.
+/// Wakes the tasks that wait for the events in `bits`, lowest bit first, because Embassy polls in the reverse order
+/// of wake-ups. The main loop calls it.
 pub(crate) fn dispatch(thread: Thread, bits: u8) {
     let mut left = bits & ((1 << WAITABLE) - 1);
     for waiter in waiters() {
@@ -180,14 +184,14 @@ pub(crate) fn dispatch(thread: Thread, bits: u8) {
 pub(crate) mod flags {
     use crate::chip::FLAGS;
 
-    /// In the data space.
+    /// Address in the data space.
     const REGISTER: *mut u8 = (FLAGS as usize + 0x20) as *mut u8;
 
     /// Sets a bit. Any level.
     #[inline(always)]
     pub fn set(bit: u8) {
         // One `sbi` for a constant bit: cannot be torn.
-        // SAFETY: the register is nobody else's.
+        // SAFETY: nobody else uses the register.
         unsafe { REGISTER.write_volatile(REGISTER.read_volatile() | 1 << bit) };
     }
 
@@ -210,7 +214,7 @@ pub(crate) mod flags {
     }
 }
 
-/// What stands in for it: a byte, and the event of Cortex-M that ends its sleep.
+/// Stands in for the register on Cortex-M: a byte, and the CPU's event (`sev`) that ends its sleep.
 #[cfg(all(target_arch = "arm", target_os = "none"))]
 pub(crate) mod flags {
     use crate::byte::SharedByte;
@@ -238,7 +242,7 @@ pub(crate) mod flags {
     }
 }
 
-/// What stands in for it.
+/// Stands in for the register on the host: an atomic byte.
 #[cfg(not(target_os = "none"))]
 pub(crate) mod flags {
     use core::sync::atomic::{AtomicU8, Ordering::Relaxed};
@@ -273,7 +277,7 @@ mod tests {
 
     type Seen = Rc<RefCell<Vec<&'static str>>>;
 
-    /// A task that notes each time that the event happens.
+    /// Spawns a task that notes each time that the event happens.
     fn note(runtime: &Runtime, event: Event, name: &'static str, seen: &Seen) {
         let (thread, seen) = (runtime.thread(), seen.clone());
         runtime.spawn(async move {
@@ -329,7 +333,7 @@ mod tests {
         let (thread, told) = (runtime.thread(), seen.clone());
         runtime.spawn(async move {
             let mut asked = false;
-            // The first time it happens right behind the question.
+            // The first time the event happens right behind the question.
             let ask = || {
                 FIRST.set();
                 core::mem::replace(&mut asked, true).then_some(())

@@ -18,16 +18,16 @@ impl Executor {
         Self(raw::Executor::new(pender::THREAD))
     }
 
-    /// Runs for ever: `init` spawns the tasks, with interrupts as they are; then interrupts are on, and the CPU sleeps
-    /// (idle mode) whenever there is nothing to do.
+    /// Runs for ever. `init` spawns the tasks; interrupts stay as they are meanwhile. Then interrupts are switched
+    /// on, and the CPU sleeps (idle mode) whenever there is nothing to do.
     ///
     /// Cost: from an event to the first instruction of the task that waits for it, see the README.
     pub fn run(&'static mut self, init: impl FnOnce(Spawner, Thread)) -> ! {
         self.run_with(init, |_, _| ())
     }
 
-    /// Runs the tasks as [`Executor::run`] does; besides, `turn` is called with the bits of the events that have happened, each time before
-    /// tasks are polled. It is for what is too small for a task.
+    /// Runs the tasks as [`Executor::run`] does. In addition, `turn` is called with the bits of the events that have
+    /// happened, each time before tasks are polled. It is for what is too small for a task.
     #[inline(always)]
     pub fn run_with(
         &'static mut self,
@@ -38,7 +38,7 @@ impl Executor {
         // SAFETY: this is thread mode.
         let thread = unsafe { Thread::assume() };
         init(executor.spawner(), thread);
-        // SAFETY: without its lowest bit `sleep` does nothing; the register is nobody else's. Tasks have been spawned
+        // SAFETY: without its lowest bit `sleep` does nothing; nobody else uses the register. Tasks have been spawned
         // and no critical section is open: interrupts may come.
         unsafe {
             asm!("cli");
@@ -48,23 +48,25 @@ impl Executor {
         loop {
             if flags::all() != 0 {
                 let bits = flags::take();
-                // Embassy polls tasks in the reverse order of their wake-ups: those that wait for a time come last.
+                // Embassy polls tasks in the reverse order of their wake-ups. Tasks that wait for a time are woken
+                // first, so they are polled last.
                 if bits & 1 << Event::TICK.bit() != 0 {
                     time::wake_expired(thread);
                 }
                 event::dispatch(thread, bits);
                 turn(thread, bits);
-                // SAFETY: called from here only, so never reentered.
+                // SAFETY: only this place calls it, so it is never reentered.
                 unsafe { executor.poll() };
                 continue;
             }
-            // With interrupts on, as all that may be: the interrupt executor runs right here if it wants to.
+            // Interrupts are on here, so the interrupt executor runs at this place if `idle` pends it.
             interrupt::idle();
             // SAFETY: interrupts are on again a few instructions further on.
             unsafe { asm!("cli") };
             if flags::all() == 0 {
-                // The CPU executes one instruction after `reti` before it serves the next interrupt. That is `nop`, not
-                // `cli`: a handler that is due when another one ends must not wait for this loop as well.
+                // The CPU executes one instruction after `reti` before it serves the next interrupt. That instruction
+                // is `nop`, not `cli`: a handler that is due when another one ends must not wait for this loop as
+                // well.
                 // SAFETY: plain instructions. They must stay together: an interrupt cannot come between
                 // `sei` and `sleep`, so an event set after the test above still ends the sleep.
                 unsafe { asm!("sei", "sleep", "nop") };

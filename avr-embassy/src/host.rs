@@ -1,8 +1,8 @@
-//! What stands in for the chip on the host, so that a program's tasks can be tested there.
+//! The stand-in for the chip on the host, so that a program's tasks can be tested there.
 //!
-//! Each thread is a machine of its own: it has its own event bits, waiting tasks and executors. Nothing happens by itself: a test
-//! sets events, and [`Runtime::settle`] lets the tasks react. The time driver is the test's, `embassy-time`'s
-//! mock for example.
+//! Each thread is a machine of its own: it has its own event bits, waiting tasks and executors. Nothing happens by
+//! itself: a test sets events, and [`Runtime::settle`] lets the tasks react. The test provides the time driver, for
+//! example the mock of `embassy-time`.
 
 use std::boxed::Box;
 
@@ -12,7 +12,8 @@ use embassy_executor::raw::{Executor, TaskStorage};
 use crate::event::{self, flags};
 use crate::{Interrupt, Thread, interrupt, pender};
 
-/// The thread-mode executor of this thread's machine, beside the one that [`interrupt::start`] makes. Neither is ever given back.
+/// The thread-mode executor of this thread's machine, beside the one that [`interrupt::start`] makes. Neither is ever
+/// freed.
 pub struct Runtime(&'static Executor);
 
 impl Runtime {
@@ -27,13 +28,13 @@ impl Runtime {
         self.0.spawner()
     }
 
-    /// The token of thread mode, which the host's thread is.
+    /// Returns the token of thread mode: the thread of the host stands for it.
     pub fn thread(&self) -> Thread {
-        // SAFETY: interrupt mode runs between other things here, never within them.
+        // SAFETY: on the host interrupt mode runs between polls of thread mode, never within them.
         unsafe { Thread::assume() }
     }
 
-    /// The token of interrupt mode, for tests that do themselves what its tasks do.
+    /// Returns the token of interrupt mode, for tests that themselves do what tasks of interrupt mode do.
     pub fn interrupt(&self) -> Interrupt {
         // SAFETY: as above.
         unsafe { Interrupt::assume() }
@@ -47,7 +48,7 @@ impl Runtime {
         }
     }
 
-    /// Polls until nobody has anything left to do now; `turn` is that of `Executor::run_with`.
+    /// Polls until no task has anything left to do now. `turn` is the one of `Executor::run_with`.
     pub fn settle(&self, mut turn: impl FnMut(u8)) {
         loop {
             if interrupt::take_request() {

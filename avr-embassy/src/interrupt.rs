@@ -1,12 +1,14 @@
 //! The interrupt executor: its tasks preempt those of thread mode, and every short interrupt preempts them.
 //!
-//! It is polled from a software interrupt, which [`pend`] raises and which runs with interrupts on. Two things keep it
-//! out: itself, while it runs, and [`lock`], with which thread mode touches what it shares with its tasks (a priority
-//! ceiling). Either way the request is remembered and served right after.
+//! The executor is polled from a software interrupt, which [`pend`] raises and which runs with interrupts on. Two
+//! things keep that interrupt out: its own handler while it runs, and [`lock`], with which thread mode touches what
+//! it shares with interrupt mode (a priority ceiling). In both cases the request is remembered and served right
+//! after.
 //!
-//! Its tasks may use all of Embassy: a `Signal`, a `Channel` or a `Waker` reaches them from thread mode, and them to thread
-//! mode. Handlers of other interrupts wake none of these: they [`pend`], and the task that [`wait`]s asks again. A task's
-//! `Timer` is looked at by the main loop: it comes as late as the longest poll of a thread-mode task.
+//! Its tasks may use all of Embassy: a `Signal`, a `Channel` or a `Waker` works between thread mode and these tasks,
+//! in both directions. Handlers of other interrupts must not use them: they call [`pend`], and the task that
+//! [`wait`]s asks again. The main loop serves the `Timer` of a task, so it comes as late as the longest poll of a
+//! thread-mode task.
 //!
 //! | | cycles |
 //! |---|---|
@@ -57,7 +59,7 @@ pub mod prompt;
 #[cfg(all(target_arch = "arm", target_os = "none"))]
 pub(crate) use prompt::is_prompt;
 
-/// Whether a task of the prompt executor has been woken: this chip has none.
+/// Whether a task of the prompt executor has been woken: always false, because this chip has no such executor.
 #[cfg(not(all(target_arch = "arm", target_os = "none")))]
 #[inline(always)]
 pub(crate) fn is_prompt(_context: *mut ()) -> bool {
@@ -66,8 +68,8 @@ pub(crate) fn is_prompt(_context: *mut ()) -> bool {
 
 /// Asks for the interrupt executor to run. Any level. Cost: 3 cycles.
 ///
-/// In thread mode it runs before the next instruction but one; above, when the handlers that run have ended. However often it was
-/// asked for by then, it runs once.
+/// If thread mode calls it, the executor runs before the next instruction but one; if a handler does, the executor
+/// runs when all handlers that run have ended. Requests that have come by then merge into one run.
 #[inline(always)]
 pub fn pend() {
     imp::pend();
@@ -78,7 +80,7 @@ pub fn pend_when_idle() {
     imp::pend_when_idle();
 }
 
-/// [`was_idle`] is to say whether thread mode has had nothing left to do from now on. Interrupt mode.
+/// Has [`was_idle`] tell from now on whether thread mode has had nothing left to do. Interrupt mode.
 pub fn note_idle() {
     imp::note_idle();
 }
@@ -88,8 +90,8 @@ pub fn was_idle() -> bool {
     imp::was_idle()
 }
 
-/// Runs `critical` while the interrupt executor cannot run; everything else goes on. It nests. Cost: 13 cycles, and the
-/// interrupt executor may come as much later as `critical` takes.
+/// Runs `critical` while the interrupt executor cannot run; all other interrupts go on. Locks nest. Cost: 13 cycles;
+/// the interrupt executor may come later by the time that `critical` takes.
 #[inline(always)]
 pub fn lock<R>(_: Thread, critical: impl FnOnce(&Ceiling) -> R) -> R {
     let before = imp::close();
@@ -98,9 +100,11 @@ pub fn lock<R>(_: Thread, critical: impl FnOnce(&Ceiling) -> R) -> R {
     result
 }
 
-/// Waits until `ready` gives a value, asking now and each time the executor is pended: how a handler reaches a task.
+/// Waits until `ready` returns a value. Asks now, and each time the executor is pended. This is how a handler reaches
+/// a task.
 ///
-/// One task waits so. If another does too, both go on asking, and the executor runs without end: use Embassy's ways between tasks.
+/// Only one task may wait in this way. If a second one does, both go on asking and the executor runs without end: use
+/// Embassy's means between tasks.
 pub fn wait<R>(level: Interrupt, mut ready: impl FnMut() -> Option<R>) -> impl Future<Output = R> {
     poll_fn(move |cx| match ready() {
         Some(value) => Poll::Ready(value),
@@ -111,7 +115,8 @@ pub fn wait<R>(level: Interrupt, mut ready: impl FnMut() -> Option<R>) -> impl F
     })
 }
 
-/// What a slot of [`wait`] is to hold from now on: this task. Another one that it held is woken, and comes back.
+/// Has a slot of [`wait`] hold this task from now on. Another task that the slot held is woken; it asks again and
+/// comes back.
 fn keep(kept: &mut Option<TaskRef>, waker: &Waker) {
     let task = task_from_waker(waker);
     if *kept != Some(task)

@@ -1,7 +1,8 @@
-//! Levels as types: who runs, and who cannot run meanwhile.
+//! Levels as types: a token shows which level runs, or which cannot run meanwhile.
 //!
-//! Functions that belong to a level ask for its token. Tokens take no room and no cycles. [`Thread`] and [`Interrupt`]
-//! are not [`Send`], so neither reaches the other level: what goes to a task of the interrupt executor must be [`Send`].
+//! Functions that belong to a level ask for its token. Tokens take no room and no cycles. [`Thread`] and
+//! [`Interrupt`] are not [`Send`], so neither reaches the other level: whatever goes to a task of the interrupt
+//! executor must be [`Send`].
 
 use core::marker::PhantomData;
 
@@ -17,10 +18,10 @@ use core::marker::PhantomData;
 pub struct Thread(PhantomData<*mut ()>);
 
 impl Thread {
-    /// A token out of nothing.
+    /// Makes a token out of nothing.
     ///
     /// # Safety
-    /// It is used in thread mode only.
+    /// The token is used in thread mode only.
     #[inline(always)]
     pub const unsafe fn assume() -> Self {
         Thread(PhantomData)
@@ -32,10 +33,10 @@ impl Thread {
 pub struct Interrupt(PhantomData<*mut ()>);
 
 impl Interrupt {
-    /// A token out of nothing.
+    /// Makes a token out of nothing.
     ///
     /// # Safety
-    /// It is used in tasks of the interrupt executor only.
+    /// The token is used in tasks of the interrupt executor only.
     #[inline(always)]
     pub const unsafe fn assume() -> Self {
         Interrupt(PhantomData)
@@ -58,7 +59,7 @@ impl Interrupt {
 /// }
 /// ```
 ///
-/// Interrupt mode has no way to one:
+/// Interrupt mode cannot get one:
 ///
 /// ```compile_fail,E0308
 /// # use avr_embassy::{Interrupt, interrupt};
@@ -67,12 +68,12 @@ impl Interrupt {
 /// }
 /// ```
 ///
-/// It takes no room. As the tokens it is not [`Send`], nor is a reference to it.
+/// A ceiling takes no room. Like the tokens it is not [`Send`], nor is a reference to it.
 #[derive(Debug)]
 pub struct Ceiling(PhantomData<*mut ()>);
 
 impl Ceiling {
-    /// Interrupt mode cannot run now.
+    /// Makes a ceiling. Interrupt mode must not be able to run now.
     #[inline(always)]
     pub(crate) const fn new() -> Self {
         Ceiling(PhantomData)

@@ -9,23 +9,24 @@
 //!
 //! # Levels
 //!
-//! A lower one preempts those below it in this table.
+//! A level preempts the levels below it in this table.
 //!
 //! | level | what runs there | what it may do |
 //! |---|---|---|
 //! | short interrupts | the program's handlers, in Rust or assembly; the tick | [`Event::set`], [`interrupt::pend`], its ends of rings, [`SharedByte`](byte::SharedByte) |
-//! | interrupt mode | tasks of the [`interrupt`] executor, with interrupts on | besides, all of Embassy; [`interrupt::wait`] |
-//! | thread mode | tasks of the `Executor`, the main loop | besides, [`Event::wait`], [`interrupt::lock`] |
+//! | interrupt mode | tasks of the [`interrupt`] executor, with interrupts on | as short interrupts, and all of Embassy; [`interrupt::wait`] |
+//! | thread mode | tasks of the `Executor`, the main loop | as short interrupts, and all of Embassy; [`Event::wait`], [`interrupt::lock`] |
 //!
-//! Functions that belong to a level ask for its token, [`Thread`] or [`Interrupt`], which the other level cannot have. What both change is a
-//! [`Shared`], what a handler and tasks have in turn a [`Baton`].
+//! Functions that belong to a level ask for its token, [`Thread`] or [`Interrupt`], which the other level cannot
+//! have. A value that both levels change is a [`Shared`]; a value that a handler and tasks use in turn is a
+//! [`Baton`].
 //!
 //! # Critical sections mask nothing
 //!
 //! The `critical-section` of this crate is [`interrupt::lock`]: it keeps interrupt mode out, and **no other interrupt**. That makes wake-ups
 //! and channels between the two levels cheap, and delays no handler. The price: a handler must not enter a critical section, so it
 //! wakes no `Waker` and touches no `embassy_sync` channel. It sets an event, pends, or fills a ring; a task does the rest.
-//! Of other crates, turn off their own critical section (`avr-device`: feature `critical-section-impl`).
+//! Turn off the critical sections that other crates bring along (`avr-device`: feature `critical-section-impl`).
 //!
 //! # What the runtime owns
 //!
@@ -41,16 +42,17 @@
 //!
 //! - **Events** that repeat before the main loop looks merge into one. None is lost.
 //! - **A ring** that is full refuses: [`Producer::push`](ring::Producer::push) gives the value back.
-//! - **Timers** of more than 4 tasks at once (features `timers-8`, `timers-16`): those beyond are polled all the time until
-//!   there is room. No time is missed, but the CPU does not sleep.
-//! - **A timer** is as late as the longest poll of a thread-mode task. What must be on time is done by a handler of the program that pends
-//!   a task of interrupt mode.
+//! - **Timers** of more than 4 tasks at once (features `timers-8`, `timers-16`): the tasks beyond that number are polled
+//!   all the time until there is room. No time is missed, but the CPU does not sleep.
+//! - **A timer** is as late as the longest poll of a thread-mode task. Work that must be on time is done by a handler
+//!   of the program that pends a task of interrupt mode.
 //! - **Requests** to interrupt mode merge while it cannot run, and are served right after.
 //! - **A second task** that waits for an event, or in [`interrupt::wait`], takes turns with the first: both go on, at the cost of polls.
 //!
 //! # Host
 //!
-//! Everything that is not a register works on the host, too, where each thread is a machine of its own: see `host::Runtime`.
+//! Everything that is not a register works on the host, too. There each thread is a machine of its own: see
+//! `host::Runtime`.
 #![no_std]
 #![cfg_attr(target_arch = "avr", feature(asm_experimental_arch, optimize_attribute))]
 
@@ -60,8 +62,8 @@ pub extern crate std;
 
 /// Declares a value that a machine has one of, as a function that returns `&'static` to it.
 ///
-/// In an image it is a static. On the host each thread is a machine of its own, so that tests run side
-/// by side: the value is made on the thread's first use.
+/// In an image it is a static. On the host each thread is a machine of its own, so that tests can run side by side:
+/// the value is made on the thread's first use.
 ///
 /// ```
 /// use std::sync::atomic::{AtomicU8, Ordering::Relaxed};
@@ -131,9 +133,9 @@ pub use executor::Executor;
 pub use level::{Ceiling, Interrupt, Thread};
 pub use shared::{InterruptEnd, Place, Shared};
 
-/// Does something of a few cycles with interrupts off. Any level. Cost: 3 cycles.
+/// Runs `act`, which takes a few cycles, with interrupts off. Any level. Cost: 3 cycles.
 ///
-/// On the host it only does it.
+/// On the host it only runs `act`.
 #[inline(always)]
 pub fn mask<R>(act: impl FnOnce() -> R) -> R {
     #[cfg(target_arch = "avr")]

@@ -1,4 +1,5 @@
-//! The pender that Embassy's executors call when a task of theirs is woken; it tells the two apart by their context.
+//! The pender, which Embassy's executors call when one of their tasks is woken. The context tells which executor that
+//! is.
 
 use crate::event::{POLL, flags};
 use crate::interrupt;

@@ -1,4 +1,4 @@
-//! How a timer of 8 bits makes milliseconds out of a clock.
+//! How an 8-bit timer makes milliseconds out of a clock.
 
 /// A millisecond in counts of the timer.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -7,15 +7,16 @@ pub struct Period {
     pub select: u8,
     /// Whole counts, 2 to 255.
     pub counts: u8,
-    /// What is left beside them, in parts of a count.
+    /// What is left beside the whole counts, in parts of a count.
     pub parts: u8,
-    /// How many parts a count has: 128 at the most, so that two sums of parts fit a byte.
+    /// How many parts a count has: at most 128, so that the sum of two numbers of parts fits a byte.
     pub of: u8,
 }
 
 impl Period {
-    /// By the finest prescaler that leaves no parts; if all do, by the finest. `None` if a millisecond does not fit the timer, or takes
-    /// smaller parts. A prescaler is its code and the cycles of a count.
+    /// Finds the period of a millisecond: with the finest prescaler that leaves no parts, or, if all leave parts,
+    /// with the finest one. `None` if a millisecond does not fit the timer, or takes smaller parts. A prescaler is
+    /// its code and the cycles of a count.
     pub const fn new(clock_hz: u32, prescalers: &[(u8, u32)]) -> Option<Period> {
         let (mut uneven, mut n) = (None, 0);
         while n < prescalers.len() {
@@ -36,7 +37,7 @@ impl Period {
     const fn by(clock_hz: u32, select: u8, cycles: u32) -> Option<Period> {
         let count_hz = cycles * 1_000;
         let (counts, left) = (clock_hz / count_hz, clock_hz % count_hz);
-        // The fraction in lowest terms.
+        // Finds the greatest common divisor, to reduce the fraction to lowest terms.
         let (mut divisor, mut rest) = (count_hz, left);
         while rest != 0 {
             (divisor, rest) = (rest, divisor % rest);
@@ -65,7 +66,7 @@ mod tests {
         assert_eq!(period(16_000_000), Some((3, 250, 0, 1)));
         assert_eq!(period(8_000_000), Some((3, 125, 0, 1)));
         assert_eq!(period(1_000_000), Some((2, 125, 0, 1)));
-        // Finer ones would leave parts.
+        // Finer prescalers would leave parts.
         assert_eq!(period(18_432_000), Some((4, 72, 0, 1)));
     }
 

@@ -1,10 +1,10 @@
 //! A ring between one producer and one consumer that may preempt each other.
 //!
-//! The indices are as wide as the CPU reads and writes in one instruction, single bytes on one of 8 bits, so neither
-//! side ever masks interrupts. Functions that tell slots as bytes are for rings of up to 256. Slots are filled and read in place. One slot stays empty to tell full
-//! from empty: a `Ring<T, N>` holds `N - 1`.
+//! An index is as wide as the CPU reads and writes in one instruction (one byte on an 8-bit CPU), so neither side
+//! ever masks interrupts. Functions that take or return slots as bytes are for rings of up to 256 slots. Slots are
+//! filled and read in place. One slot stays empty to tell full from empty: a `Ring<T, N>` holds `N - 1` values.
 //!
-//! When full, [`Producer::slot`] is `None`; the producer waits, or counts the loss.
+//! When the ring is full, [`Producer::slot`] is `None`; the producer waits, or counts the loss.
 
 #![allow(
     clippy::unnecessary_cast,
@@ -26,9 +26,9 @@ pub use crate::Ceiling;
 pub use crate::byte::Index;
 use crate::byte::{SharedByte, SharedIndex};
 
-/// The storage. `N` is 2 to 256, or to 65,536 where an [`Index`] has 16 bits.
+/// The storage. `N` is 2 to 256, or up to 65,536 where an [`Index`] has 16 bits.
 ///
-/// What all rings have alike lies first, so that a [`ConsumerView`] finds it whatever `N` is.
+/// The fields that do not depend on `N` lie first, so that a [`ConsumerView`] finds them whatever `N` is.
 #[repr(C)]
 pub struct Ring<T, const N: usize> {
     /// The slot filled last; written by the producer only.
@@ -40,12 +40,12 @@ pub struct Ring<T, const N: usize> {
     slots: UnsafeCell<[MaybeUninit<T>; N]>,
 }
 
-/// The end of the producer.
+/// Bit of [`Ring::taken`]: the producer's end has been handed out.
 const FILLS: u8 = 1;
-/// The end of the consumer.
+/// Bit of [`Ring::taken`]: the consumer's end has been handed out.
 const READS: u8 = 2;
 
-/// Takes ends, if none of them has been taken.
+/// Takes `ends` (bits) if none of them has been taken. Returns whether it has.
 #[inline(never)]
 #[cfg_attr(target_arch = "avr", optimize(size))]
 fn take(taken: &SharedByte, ends: u8) -> bool {
@@ -68,7 +68,7 @@ const fn next<const N: usize>(index: Index) -> Index {
 }
 
 impl<T: Copy, const N: usize> Ring<T, N> {
-    /// Where things lie, for interrupts in assembly that do a `push` or `pop` of their own.
+    /// Offset of the slots, for interrupts in assembly that have a `push` or `pop` of their own.
     pub const SLOTS: usize = core::mem::offset_of!(Self, slots);
     /// See [`Ring::SLOTS`].
     pub const HEAD: usize = core::mem::offset_of!(Self, head);
@@ -88,22 +88,23 @@ impl<T: Copy, const N: usize> Ring<T, N> {
         }
     }
 
-    /// The two ends of the ring. `None` if one has been taken. Any level.
+    /// Hands out the two ends of the ring. `None` if one has been taken. Any level.
     pub fn split(&'static self) -> Option<(Producer<T, N>, Consumer<T, N>)> {
         take(&self.taken, FILLS | READS).then_some((Producer(self), Consumer(self)))
     }
 
-    /// The end that fills. `None` if it has been taken. Any level, such as a handler that takes it when it first runs.
+    /// Hands out the filling end. `None` if it has been taken. Any level, such as a handler that takes it when it
+    /// first runs.
     pub fn producer(&'static self) -> Option<Producer<T, N>> {
         take(&self.taken, FILLS).then_some(Producer(self))
     }
 
-    /// The end that reads. `None` if it has been taken. Any level.
+    /// Hands out the reading end. `None` if it has been taken. Any level.
     pub fn consumer(&'static self) -> Option<Consumer<T, N>> {
         take(&self.taken, READS).then_some(Consumer(self))
     }
 
-    /// The end that reads, for who stands in for its owner.
+    /// Returns a second reading end, for code that stands in for the owner of the first.
     ///
     /// # Safety
     /// The owner does not run meanwhile.
@@ -111,15 +112,17 @@ impl<T: Copy, const N: usize> Ring<T, N> {
         Consumer(self)
     }
 
-    /// Values put in and not yet released. Each side sees the other's doings at once or a little later.
+    /// Returns the number of values put in and not yet released. Each side sees what the other does at once or a
+    /// little later.
     pub fn used(&self) -> usize {
-        // As wide as an index, which wraps. `N` may be one more than it holds, and is 0 then, which is as good.
+        // Computed at the width of an index, which wraps. If `N` is one more than an index holds, it becomes 0 here,
+        // and the sum modulo that width stays right.
         let (head, tail) = (self.head.get(), self.tail.get());
         let used = head.wrapping_sub(tail);
         usize::from(if head >= tail { used } else { used.wrapping_add(N as Index) })
     }
 
-    /// The slot filled last, if it has not been taken.
+    /// Returns the slot filled last, `None` if it has been taken.
     pub fn newest(&self) -> Option<u8> {
         let head = self.head.get();
         (head != self.tail.get()).then_some(head as u8)
@@ -130,20 +133,21 @@ impl<T: Copy, const N: usize> Ring<T, N> {
         self.tail.get() as u8
     }
 
-    /// The value in a slot.
+    /// Returns the value in a slot.
     ///
     /// # Safety
     ///
-    /// It has been filled, and the producer is held off.
+    /// The slot has been filled, and the producer is held off.
     pub unsafe fn at(&self, index: u8) -> T {
         // SAFETY: the caller says so.
         unsafe { self.slot(index.into()).read() }
     }
 
-    /// The value taken last. `None` if nobody knows: at first, and each time the ring has gone round.
+    /// Returns the value taken last. `None` if unknown: at first, and each time the ring has gone round.
     pub fn taken_last(&self) -> Option<T> {
         let tail = self.tail.get();
-        // SAFETY: slot 0 alone is ever read last without having been filled; no slot that `tail` is on is written.
+        // SAFETY: only slot 0 can be the slot read last without having been filled; no slot that `tail` is on is
+        // written.
         (tail != 0).then(|| unsafe { self.slot(tail).read() })
     }
 
@@ -159,7 +163,7 @@ impl<T: Copy, const N: usize> Default for Ring<T, N> {
     }
 }
 
-/// The end that fills.
+/// The filling end.
 pub struct Producer<T: 'static, const N: usize>(&'static Ring<T, N>);
 
 impl<T: Copy, const N: usize> Producer<T, N> {
@@ -181,14 +185,14 @@ impl<T: Copy, const N: usize> Producer<T, N> {
         self.0.head.get() as u8
     }
 
-    /// The slot behind the one filled last, if it is not the one taken last.
+    /// Returns the slot behind the one filled last, `None` if that is the slot taken last.
     #[inline(always)]
     fn vacant(&self) -> Option<Index> {
         let after = next::<N>(self.0.head.get());
         (after != self.0.tail.get()).then_some(after)
     }
 
-    /// Writes a slot behind `head`: a vacant one, or that of `tail` if nothing has been taken from it.
+    /// Writes a slot behind `head`: a vacant slot, or the slot of `tail` if nothing has been taken from it.
     #[inline(always)]
     fn write(&mut self, index: Index, value: T) {
         // SAFETY: a slot behind `head` is the producer's until `head` moves onto it.
@@ -210,7 +214,8 @@ impl<T: Copy, const N: usize> Producer<T, N> {
         let mut index = self.0.head.get();
         loop {
             index = next::<N>(index);
-            // The slot taken last holds a value, except slot 0 at first, from which nothing has been taken.
+            // Skips the slot taken last, which holds a value already. Slot 0 is always written, because at first
+            // nothing has been taken from it.
             if index != tail || index == 0 {
                 self.write(index, value);
             }
@@ -220,15 +225,16 @@ impl<T: Copy, const N: usize> Producer<T, N> {
         }
     }
 
-    /// The slot that the next value goes to, with `value` in it. None if the ring is full.
+    /// Returns the slot of the next value, with `value` in it. `None` if the ring is full.
     ///
-    /// To make a value in its place saves the CPU a copy.
+    /// A value that is made in its place needs no copy.
     #[inline(always)]
     pub fn slot(&mut self, value: T) -> Option<Slot<'_, T, N>> {
         self.slot_with(|| value)
     }
 
-    /// A free slot as [`Producer::slot`] gives, holding what `make` makes. `make` is not called if the ring is full.
+    /// Returns a free slot as [`Producer::slot`] does, holding what `make` returns. `make` is not called if the ring
+    /// is full.
     #[inline(always)]
     pub fn slot_with(&mut self, make: impl FnOnce() -> T) -> Option<Slot<'_, T, N>> {
         let after = self.vacant()?;
@@ -236,7 +242,7 @@ impl<T: Copy, const N: usize> Producer<T, N> {
         Some(Slot { ring: self.0, after, producer: PhantomData })
     }
 
-    /// A look at a value pushed earlier; `back` 0 is the newest. `None` if it has been released.
+    /// Returns a value pushed earlier; `back` 0 is the newest. `None` if it has been released.
     pub fn pushed(&self, back: usize) -> Option<&T> {
         if back >= self.0.used() {
             return None;
@@ -246,8 +252,8 @@ impl<T: Copy, const N: usize> Producer<T, N> {
         Some(unsafe { &*self.0.slot(self.index_of(back)) })
     }
 
-    /// The values behind slot `index`, which the consumer has released or not; none of them may have been
-    /// overwritten since.
+    /// Returns the values behind slot `index`, including those that the consumer has released. None of them may have
+    /// been overwritten since.
     pub fn behind(&self, index: u8) -> impl Iterator<Item = &T> {
         let (mut at, head) = (Index::from(index), self.0.head.get());
         core::iter::from_fn(move || {
@@ -260,7 +266,7 @@ impl<T: Copy, const N: usize> Producer<T, N> {
         })
     }
 
-    /// Puts values in, as many as there is room for, and shows them to the consumer all at once.
+    /// Puts values in, as many as there is room for, and shows all of them to the consumer at once.
     #[inline]
     pub fn push_all(&mut self, values: impl Iterator<Item = T>) {
         let tail = self.0.tail.get();
@@ -276,36 +282,37 @@ impl<T: Copy, const N: usize> Producer<T, N> {
         self.0.head.set(head);
     }
 
-    /// Puts a run of values in: `fill` gets the vacant slots that lie side by side, writes them from the first on, and
-    /// gives those back that it has written. The consumer sees these, all at once. How many they are.
+    /// Puts a run of values in. `fill` gets the vacant slots that lie side by side, writes them from the first on,
+    /// and returns the part that it has written. The consumer sees that part all at once. Returns its length.
     #[inline(always)]
     pub fn fill(
         &mut self,
         fill: impl for<'a> FnOnce(&'a mut [MaybeUninit<T>]) -> &'a mut [T],
     ) -> u8 {
         let (start, tail) = (next::<N>(self.0.head.get()), self.0.tail.get());
-        // Up to the consumer, which one slot stays vacant before, or to the end. In bytes: that is half the time of words.
+        // The run ends before the slot of `tail`, which stays vacant, or at the end of the array. Arithmetic in bytes
+        // takes half the time of words.
         let len = if tail >= start { tail - start } else { (N - usize::from(start)) as Index };
         let slots = self.0.slot(start);
         // SAFETY: the slots behind `head` are the producer's, as many as are free, and these do not
         // go beyond the end; `MaybeUninit` may lie there whatever was written.
         let vacant = unsafe { core::slice::from_raw_parts_mut(slots.cast(), len.into()) };
         let filled = fill(vacant);
-        // Values that lie elsewhere have filled no slot.
+        // A slice that does not begin at these slots has filled none of them.
         if filled.as_ptr() != slots.cast_const() {
             return 0;
         }
         let count = filled.len() as Index;
         if count > 0 {
-            // The last of them: not beyond the end.
+            // The last value of the run: not beyond the end.
             self.0.head.set(start + (count - 1));
         }
         count as u8
     }
 
-    /// Changes a value pushed earlier; `back` 0 is the newest. False if it has been released.
+    /// Changes a value pushed earlier; `back` 0 is the newest. Returns `false` if it has been released.
     ///
-    /// The consumer is interrupt mode, which cannot run meanwhile: `_ceiling` is the witness.
+    /// The consumer is interrupt mode, which cannot run meanwhile: `_ceiling` proves it.
     pub fn amend(&mut self, _ceiling: &Ceiling, back: usize, change: impl FnOnce(&mut T)) -> bool {
         if back >= self.0.used() {
             return false;
@@ -316,14 +323,16 @@ impl<T: Copy, const N: usize> Producer<T, N> {
         true
     }
 
-    /// Changes a value pushed earlier; `back` 0 is the newest. False if it has been released, or if another one is just then.
+    /// Changes a value pushed earlier; `back` 0 is the newest. Returns `false` if it has been released, or if another
+    /// value is released just then.
     ///
-    /// The consumer may be any interrupt: they are off meanwhile, so `change` is to take few cycles. Cost: 8 of interrupts off besides.
+    /// The consumer may be any interrupt. Interrupts are off while `change` runs, so it has to be short. Cost:
+    /// interrupts off for 8 cycles more than `change` takes.
     #[inline(always)]
     pub fn amend_masked(&mut self, back: usize, change: impl FnOnce(&mut T)) -> bool {
         let tail = self.0.tail.get();
         let Some(index) = self.waiting(back) else { return false };
-        // Worked out before interrupts are off.
+        // The address is computed before interrupts are off.
         let slot = core::hint::black_box(self.0.slot(index));
         crate::mask(|| {
             let waits = self.0.tail.get() == tail;
@@ -336,14 +345,15 @@ impl<T: Copy, const N: usize> Producer<T, N> {
         })
     }
 
-    /// Where a value pushed earlier is, if it has not been released.
+    /// Returns the index of a value pushed earlier, `None` if it has been released.
     #[inline(never)]
     #[cfg_attr(target_arch = "avr", optimize(size))]
     fn waiting(&self, back: usize) -> Option<Index> {
         (back < self.0.used()).then(|| self.index_of(back))
     }
 
-    /// A copy of a value pushed earlier; `back` 0 is the newest. `None` if it has been released. Smaller than [`Producer::pushed`].
+    /// Returns a copy of a value pushed earlier; `back` 0 is the newest. `None` if it has been released. Smaller code
+    /// than [`Producer::pushed`].
     pub fn copy_of(&self, back: usize) -> Option<T> {
         // SAFETY: as in `pushed`.
         self.waiting(back).map(|index| unsafe { self.0.slot(index).read() })
@@ -356,23 +366,25 @@ impl<T: Copy, const N: usize> Producer<T, N> {
     }
 }
 
-/// The end that fills a ring in which every slot holds a value ([`Producer::prefilled`]). A slot is handed out as it is: to clear it would take
-/// time.
+/// The filling end of a ring in which every slot holds a value ([`Producer::prefilled`]). A slot is handed out with
+/// its old value, because clearing it would take time.
 pub struct Prefilled<T: 'static, const N: usize>(Producer<T, N>);
 
 impl<T: Copy, const N: usize> Prefilled<T, N> {
-    /// The slot that the next value goes to. It holds an older value. None if the ring is full.
+    /// Returns the slot of the next value, which holds an older value. `None` if the ring is full.
     #[inline(always)]
     pub fn slot(&mut self) -> Option<Slot<'_, T, N>> {
         let after = self.0.vacant()?;
         Some(Slot { ring: self.0.0, after, producer: PhantomData })
     }
 
-    /// What that slot holds, which is changed in several steps before it is [published](Slot::publish). `None` if the ring is full.
+    /// Returns the value of that slot, to be changed in several steps before it is [published](Slot::publish). `None`
+    /// if the ring is full.
     #[inline(always)]
     pub fn vacant_mut(&mut self) -> Option<&mut T> {
         let after = self.0.vacant()?;
-        // SAFETY: `Producer::prefilled` has written it, and it is the producer's, which is borrowed, until it is published.
+        // SAFETY: `Producer::prefilled` has written the slot. It belongs to the producer, which is borrowed, until it
+        // is published.
         Some(unsafe { &mut *self.0.0.slot(after) })
     }
 
@@ -392,7 +404,7 @@ impl<T: Copy, const N: usize> Deref for Prefilled<T, N> {
     }
 }
 
-/// The end that reads.
+/// The reading end.
 pub struct Consumer<T: 'static, const N: usize>(&'static Ring<T, N>);
 
 impl<T: Copy, const N: usize> Consumer<T, N> {
@@ -402,7 +414,7 @@ impl<T: Copy, const N: usize> Consumer<T, N> {
         self.0.used()
     }
 
-    /// Whether none waits.
+    /// Whether no value waits.
     #[inline]
     pub fn is_empty(&self) -> bool {
         self.0.head.get() == self.0.tail.get()
@@ -414,7 +426,7 @@ impl<T: Copy, const N: usize> Consumer<T, N> {
         self.0.tail()
     }
 
-    /// What `look` makes of the value `ahead` places behind the oldest.
+    /// Returns what `look` makes of the value `ahead` places behind the oldest. `None` if no value waits there.
     #[inline]
     pub fn peek<R>(&self, ahead: usize, look: impl FnOnce(&T) -> R) -> Option<R> {
         if ahead >= self.0.used() {
@@ -436,7 +448,7 @@ impl<T: Copy, const N: usize> Consumer<T, N> {
         }
     }
 
-    /// The oldest values, as many as lie side by side; empty only if none waits.
+    /// Returns the oldest values, as many as lie side by side; empty only if none waits.
     #[inline]
     pub fn waiting(&self) -> &[T] {
         // Read once: the producer may move it meanwhile.
@@ -453,7 +465,7 @@ impl<T: Copy, const N: usize> Consumer<T, N> {
         unsafe { core::slice::from_raw_parts(self.0.slot(start), len) }
     }
 
-    /// Releases the oldest `count` values, of those that [`Consumer::waiting`] gave.
+    /// Releases the oldest `count` values of those that [`Consumer::waiting`] returned.
     #[inline]
     pub fn release_many(&mut self, count: u8) {
         let count = usize::from(count).min(self.0.used());
@@ -461,7 +473,7 @@ impl<T: Copy, const N: usize> Consumer<T, N> {
         self.0.tail.set(if tail >= N { tail - N } else { tail } as Index);
     }
 
-    /// Takes the oldest value.
+    /// Takes the oldest value. `None` if none waits.
     #[inline]
     pub fn pop(&mut self) -> Option<T> {
         if self.is_empty() {
@@ -476,7 +488,7 @@ impl<T: Copy, const N: usize> Consumer<T, N> {
     }
 }
 
-/// A value that the consumer does not see before it is published.
+/// A slot with a value that the consumer does not see before it is published.
 pub struct Slot<'a, T: 'static, const N: usize> {
     ring: &'static Ring<T, N>,
     after: Index,
@@ -497,7 +509,8 @@ impl<T: Copy, const N: usize> Deref for Slot<'_, T, N> {
 
     #[inline(always)]
     fn deref(&self) -> &T {
-        // SAFETY: `Producer::slot` or `Producer::prefilled` has written it, and it is the producer's until it is published.
+        // SAFETY: `Producer::slot` or `Producer::prefilled` has written the slot, and it is the producer's until it
+        // is published.
         unsafe { &*self.ring.slot(self.after) }
     }
 }
@@ -505,7 +518,7 @@ impl<T: Copy, const N: usize> Deref for Slot<'_, T, N> {
 impl<T: Copy, const N: usize> DerefMut for Slot<'_, T, N> {
     #[inline(always)]
     fn deref_mut(&mut self) -> &mut T {
-        // SAFETY: as in `deref`, and `self` is the only way to it.
+        // SAFETY: as in `deref`, and `self` is the only way to the slot.
         unsafe { &mut *self.ring.slot(self.after) }
     }
 }
@@ -656,7 +669,7 @@ mod tests {
             p.slot().expect("room").publish();
         }
         assert!(p.slot().is_none() && p.producer().push(1) == Err(1));
-        // What is full, or has been taken from, is left as it is.
+        // Slots that are full, or from which a value has been taken, stay as they are.
         let mut p = p.0.prefilled(9);
         assert_eq!((c.pop(), c.pop(), c.pop()), (Some(6), Some(7), Some(8)));
         assert_eq!(p.slot().map(|slot| *slot), Some(9));

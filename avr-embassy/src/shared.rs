@@ -1,11 +1,12 @@
-//! State that thread mode and interrupt mode both change: one by the ceiling lock, the other because it preempts.
+//! State that thread mode and interrupt mode both change: thread mode under the ceiling lock, interrupt mode because
+//! it preempts.
 //!
 //! | end | who has it | why nobody else has the value meanwhile |
 //! |---|---|---|
 //! | [`Shared::with`] | thread mode, within [`interrupt::lock`](crate::interrupt::lock) | the lock keeps interrupt mode out |
 //! | [`InterruptEnd`] | a task of interrupt mode | thread mode goes on only when that task waits, which it cannot within a closure |
 //!
-//! Nothing is checked or counted at run time: who would come back to a value from within itself finds that it does not
+//! Nothing is checked or counted at run time: code that would use a value again from within its own closure does not
 //! compile. (On the host, where a thread-local could smuggle a token, a second borrow is a panic.) A handler of a
 //! short interrupt has no end; see [`Baton`](crate::Baton).
 
@@ -15,7 +16,7 @@ use crate::byte::SharedByte;
 use crate::value::Value;
 use crate::{Ceiling, Interrupt};
 
-/// A value that thread mode and interrupt mode share. Its end for interrupt mode is handed out once.
+/// A value that thread mode and interrupt mode share. The end for interrupt mode is handed out once.
 ///
 /// ```
 /// use avr_embassy::{InterruptEnd, host::Runtime, interrupt};
@@ -44,7 +45,7 @@ use crate::{Ceiling, Interrupt};
 /// }
 /// ```
 ///
-/// It keeps no borrow beyond the lock:
+/// Thread mode keeps no borrow beyond the lock:
 ///
 /// ```compile_fail
 /// # use avr_embassy::{Shared, Thread, interrupt};
@@ -53,7 +54,8 @@ use crate::{Ceiling, Interrupt};
 /// }
 /// ```
 ///
-/// It cannot come back to the value from within, because neither the ceiling nor its own token goes in there:
+/// Thread mode cannot use the value again from within `act`, because neither the ceiling nor the thread token can
+/// enter the closure:
 ///
 /// ```compile_fail,E0277
 /// # use avr_embassy::{Ceiling, Shared};
@@ -71,7 +73,7 @@ use crate::{Ceiling, Interrupt};
 /// }
 /// ```
 ///
-/// It cannot have the end of interrupt mode:
+/// Thread mode cannot have the end of interrupt mode:
 ///
 /// ```compile_fail,E0308
 /// # use avr_embassy::{InterruptEnd, Shared, Thread};
@@ -81,40 +83,41 @@ use crate::{Ceiling, Interrupt};
 /// ```
 pub struct Shared<T> {
     value: Value<T>,
-    /// Whether there is an end of interrupt mode.
+    /// Not 0: the end of interrupt mode has been handed out.
     taken: SharedByte,
 }
 
 impl<T: Send> Shared<T> {
-    /// With a value.
+    /// Makes it with a value.
     pub const fn new(value: T) -> Self {
         Self { value: Value::new(value), taken: SharedByte::new(0) }
     }
 
-    /// Has `act` use the value. Thread mode, which shows the ceiling.
+    /// Lets `act` use the value. Thread mode, which shows the ceiling.
     ///
-    /// `act` is [`Send`], so that it takes along no [`Thread`](crate::Thread) and no [`Ceiling`]: it cannot come back here.
+    /// `act` is [`Send`], so it captures no [`Thread`](crate::Thread) and no [`Ceiling`] and cannot call this again.
     #[inline(always)]
     pub fn with<R>(&self, _: &Ceiling, act: impl FnOnce(&mut T) -> R + Send) -> R {
-        // SAFETY: the ceiling says that interrupt mode cannot run. Thread mode is here once: `act`, without a token, gets no
-        // ceiling, and `T` holds none.
+        // SAFETY: the ceiling shows that interrupt mode cannot run. Thread mode is here only once: `act` has no token
+        // and gets no ceiling, and `T` holds none.
         unsafe { self.value.with(act) }
     }
 }
 
-/// Where a [`Shared`] is: a reference, or a type that [`shared_static!`](crate::shared_static!) declares, which takes no room.
+/// Where a [`Shared`] is: a reference, or a type that [`shared_static!`](crate::shared_static!) declares and that
+/// takes no room.
 ///
 /// # Safety
-/// [`Place::shared`] always returns the same (on the host: in a thread).
+/// [`Place::shared`] always returns the same reference (on the host: within a thread).
 pub unsafe trait Place: Copy {
-    /// What is shared.
+    /// The type of the shared value.
     type Value: Send + 'static;
 
-    /// The one.
+    /// Returns the [`Shared`] at this place.
     fn shared(self) -> &'static Shared<Self::Value>;
 }
 
-// SAFETY: a reference is always to the same.
+// SAFETY: a reference always points to the same value.
 unsafe impl<T: Send> Place for &'static Shared<T> {
     type Value = T;
 
@@ -132,7 +135,7 @@ macro_rules! shared_static {
         #[derive(Clone, Copy)]
         $vis struct $name;
 
-        // SAFETY: the only one that this type stands for.
+        // SAFETY: the type stands for this one value only.
         unsafe impl $crate::Place for $name {
             type Value = $type;
 
@@ -146,7 +149,7 @@ macro_rules! shared_static {
         }
 
         impl $name {
-            /// Has `act` use the value, see [`Shared::with`]($crate::Shared::with).
+            /// Lets `act` use the value, see [`Shared::with`]($crate::Shared::with).
             #[inline(always)]
             $vis fn with<R>(
                 self,
@@ -159,9 +162,9 @@ macro_rules! shared_static {
     };
 }
 
-/// Interrupt mode's end of a [`Shared`]. It is not [`Send`]: it stays there.
+/// Interrupt mode's end of a [`Shared`]. It is not [`Send`], so it stays in interrupt mode.
 ///
-/// Nothing of the value is kept while the task waits:
+/// A task keeps no reference to the value while it waits:
 ///
 /// ```compile_fail
 /// # use avr_embassy::{InterruptEnd, Shared};
@@ -172,7 +175,7 @@ macro_rules! shared_static {
 /// }
 /// ```
 ///
-/// A task of thread mode cannot have it:
+/// A task of thread mode cannot have an end:
 ///
 /// ```compile_fail,E0277
 /// fn is_send<T: Send>() {}
@@ -181,7 +184,7 @@ macro_rules! shared_static {
 pub struct InterruptEnd<P: Place>(P, PhantomData<*mut ()>);
 
 impl<P: Place> InterruptEnd<P> {
-    /// The end in interrupt mode of what is at a place. `None` after the first time.
+    /// Hands out the end in interrupt mode of the value at a place. `None` after the first time.
     pub fn of(place: P, _: Interrupt) -> Option<Self> {
         let taken = &place.shared().taken;
         if taken.get() != 0 {
@@ -191,18 +194,18 @@ impl<P: Place> InterruptEnd<P> {
         Some(Self(place, PhantomData))
     }
 
-    /// Has `act` use the value.
+    /// Lets `act` use the value.
     #[inline(always)]
     pub fn with<R>(&mut self, act: impl FnOnce(&mut P::Value) -> R) -> R {
-        // SAFETY: interrupt mode runs, for this cannot leave it; so thread mode does not, nor is it within the lock. This is
-        // the only end, and it is borrowed.
+        // SAFETY: interrupt mode runs, because the end cannot leave it. So thread mode does not run, nor is it within
+        // the lock. This is the only end, and it is borrowed.
         unsafe { self.0.shared().value.with(act) }
     }
 
-    /// Has `act` look at the value.
+    /// Lets `act` look at the value.
     #[inline(always)]
     pub fn look<R>(&self, act: impl FnOnce(&P::Value) -> R) -> R {
-        // SAFETY: as in `with`; the borrow keeps that away.
+        // SAFETY: as in `with`; the borrow of `self` excludes `with`.
         unsafe { self.0.shared().value.look(act) }
     }
 }

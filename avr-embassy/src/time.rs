@@ -1,11 +1,11 @@
 //! Time: a millisecond tick, and embassy-time's driver on top of it.
 //!
-//! The interrupt only counts and sets [`Event::TICK`]. The list of those who wait is walked in thread mode, where it costs
-//! no time with interrupts off: a timer is as late as the longest poll of a thread-mode task, and exact to the millisecond
-//! otherwise.
+//! The interrupt only counts and sets [`Event::TICK`]. Thread mode walks the list of waiting tasks, without masking
+//! interrupts for it. So a timer is as late as the longest poll of a thread-mode task, and otherwise exact to the
+//! millisecond.
 //!
-//! The list has room for 4 tasks, with the feature `timers-8` for 8, with `timers-16` for 16. Further ones are polled all the
-//! time until there is room.
+//! The list has room for 4 tasks, with the feature `timers-8` for 8, with `timers-16` for 16. Further tasks are
+//! polled all the time until there is room.
 
 use core::arch::asm;
 use core::cell::UnsafeCell;
@@ -23,13 +23,14 @@ use crate::{Event, Thread, interrupt};
 /// Milliseconds since reset, the lowest byte first: enough for 34 years. The interrupt alone writes it.
 static mut MILLIS: [u8; 5] = [0; 5];
 
-/// What a millisecond is on an uneven clock, of which it is no whole number of the timer's counts: the parts of a count that have been
-/// left out so far, the parts that each millisecond leaves out, of how many, and the whole counts. The interrupt alone touches it
-/// once it is on.
+/// The length of a millisecond on an uneven clock, of which a millisecond is no whole number of the timer's counts.
+/// Four bytes: the parts of a count that have been left out so far, the parts that each millisecond leaves out, how
+/// many parts make a count, and the whole counts. Only the interrupt touches it once the tick is on.
 #[cfg(feature = "uneven-clock")]
 static mut PERIOD: [u8; 4] = [0; 4];
 
-/// The text of the tick. In brackets what it does about the length of the millisecond that has begun, then the operands of that.
+/// The assembly of the tick. The brackets hold the code that sets the length of the millisecond that has begun; the
+/// operands of that code follow.
 macro_rules! tick {
     ([$($period:literal),*] $($operands:tt)*) => {
         asm!(
@@ -40,7 +41,7 @@ macro_rules! tick {
             "lds  r24, {millis}",
             "inc  r24",
             "sts  {millis}, r24",
-            // Each 256 ms the way is 8 cycles longer, so it is the one without a jump.
+            // Every 256 ms the path is 8 cycles longer, so the longer path is the one without a jump.
             "brne 4f",
             "lds  r24, {closed}",
             "inc  r24",
@@ -94,20 +95,21 @@ macro_rules! tick {
     };
 }
 
-/// The tick: counts, in 33 cycles, with interrupts off for 21.
+/// The handler of the tick: counts, in 33 cycles, with interrupts off for 21.
 ///
-/// Every 256 ms it carries into the upper bytes, with interrupts on. Interrupt mode is kept out meanwhile: its tasks
-/// may ask for the time.
+/// Every 256 ms it carries into the upper bytes, with interrupts on. Interrupt mode is kept out meanwhile, because
+/// its tasks may ask for the time.
 ///
-/// With the feature `uneven-clock` it also says how long the millisecond is that has begun, which takes 21 cycles more, with interrupts
-/// off: one count more as soon as the parts that were left out make a count. The timer's count is far from its end then.
+/// With the feature `uneven-clock` it also sets the length of the millisecond that has begun, which takes 21 cycles
+/// more, with interrupts off. A millisecond is one count longer as soon as the parts that were left out make a count.
+/// The timer's count is far from its end at that time.
 ///
 /// # Safety
 /// It is the handler of the tick's interrupt, and nothing else calls it.
 #[inline(always)]
 pub(crate) unsafe fn handler() -> ! {
-    // SAFETY: every register it changes is restored, and it returns by `reti`. Only it writes `MILLIS` and `PERIOD`. Whoever
-    // interrupts it leaves `CLOSED` as it was, so counting up and down restores it.
+    // SAFETY: every register it changes is restored, and it returns by `reti`. Only it writes `MILLIS` and `PERIOD`.
+    // Whoever interrupts it leaves `CLOSED` as it was, so counting up and down restores it.
     #[cfg(not(feature = "uneven-clock"))]
     unsafe {
         tick!([])
@@ -122,7 +124,7 @@ pub(crate) unsafe fn handler() -> ! {
             "add  r24, r25",
             "lds  r25, {period} + 2",
             "cp   r24, r25",
-            // Carry is set from here to `sbci` if this millisecond is one of whole counts.
+            // From here to `sbci` carry is set if this millisecond has only the whole counts.
             "brlo 5f",
             "sub  r24, r25",
             "5:",
@@ -160,7 +162,7 @@ impl Driver for Millis {
     }
 
     fn schedule_wake(&self, at: u64, waker: &Waker) {
-        // SAFETY: see above; to wake a task does not come back here.
+        // SAFETY: see above; waking a task does not come back here.
         critical_section::with(|_| unsafe { &mut *self.0.get() }.schedule(at, waker));
     }
 }
@@ -175,11 +177,13 @@ pub(crate) fn wake_expired(thread: Thread) {
     }
 }
 
-/// Starts the tick of a chip whose clock is `CLOCK_HZ`, 8 or 16 MHz for example. The timer then is the runtime's.
+/// Starts the tick of a chip whose clock is `CLOCK_HZ`, 8 or 16 MHz for example. From then on the timer belongs to
+/// the runtime.
 ///
-/// A clock of which a millisecond is no whole number of timer counts, such as 20 MHz, needs the feature `uneven-clock`. Milliseconds
-/// differ by a count then, 12.8 us at 20 MHz, and their mean is exact: no parts of a count are lost. A clock of which a
-/// millisecond is no whole number of 128ths of a count, or of larger parts, does not compile.
+/// If a millisecond of the clock is no whole number of timer counts, as at 20 MHz, the feature `uneven-clock` is
+/// needed. Milliseconds then differ by one count, 12.8 us at 20 MHz, and their mean is exact: no parts of a count are
+/// lost. A clock of which a millisecond is no whole number of 128ths of a count, or of larger parts, does not
+/// compile.
 pub fn start<const CLOCK_HZ: u32>() {
     let period = const {
         let period = Period::new(CLOCK_HZ, &PRESCALERS)
@@ -197,7 +201,7 @@ pub fn start<const CLOCK_HZ: u32>() {
     unsafe {
         (&raw mut PERIOD).write([0, period.parts, period.of, period.counts]);
     }
-    // SAFETY: the timer is nobody else's. CTC: it counts up to `OCRA` and begins anew.
+    // SAFETY: nobody else uses the timer. In CTC mode it counts up to `OCRA` and begins anew.
     unsafe {
         (OCRA as *mut u8).write_volatile(period.counts - 1);
         (TCCRA as *mut u8).write_volatile(0b10);

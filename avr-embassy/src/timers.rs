@@ -1,18 +1,19 @@
-//! The times that tasks wait for: a short list.
+//! A short list of the times that tasks wait for.
 //!
-//! A task has one entry, its earliest time: woken then, it asks again for what it still waits for. With more than `N`
-//! tasks waiting, one is woken at once, looks at its timer and asks again: it costs cycles and sleep, and no time is missed.
-//! Times are milliseconds since reset, modulo 2^32; a task that waits for more than 24 days is woken early, and asks again.
+//! A task has one entry, its earliest time. When it is woken then, it asks again for the times that it still waits
+//! for. If more than `N` tasks wait, a task beyond that number is woken at once, looks at its timer and asks again:
+//! this costs cycles and sleep, and no time is missed. Times are milliseconds since reset, modulo 2^32; a task that
+//! waits for more than 24 days is woken early, and asks again.
 //!
-//! Embassy's own queue keeps an entry of 16 bytes in every task; here each of `N` takes 6 bytes.
+//! Embassy's own queue keeps an entry of 16 bytes in every task. Here the list takes 6 bytes for each of `N` tasks.
 
 use core::task::Waker;
 
 use embassy_executor::raw::{TaskRef, task_from_waker, wake_task};
 use heapless::Vec;
 
-/// How many tasks of a program can wait for a time at once without polling: 4, or as a feature says. A program that counts its own can
-/// check them against it when it is built.
+/// How many tasks of a program can wait for a time at once without polling: 4, or as a feature says. A program that
+/// counts its own waiting tasks can check that number against this one at compile time.
 pub const TIMERS: usize = match (cfg!(feature = "timers-8"), cfg!(feature = "timers-16")) {
     (_, true) => 16,
     (true, _) => 8,
@@ -28,12 +29,12 @@ struct Entry {
 pub struct Timers<const N: usize>(Vec<Entry, N>);
 
 impl<const N: usize> Timers<N> {
-    /// Nobody waits.
+    /// Makes an empty list.
     pub const fn new() -> Self {
         Self(Vec::new())
     }
 
-    /// Keeps a task until a time, in milliseconds: it is woken then, or before.
+    /// Keeps a task until the time `at`, in milliseconds. The task is woken then, or earlier.
     ///
     /// # Panics
     /// If the waker is not that of a task of Embassy's executors.
@@ -48,7 +49,7 @@ impl<const N: usize> Timers<N> {
         }
     }
 
-    /// Takes a task whose time has come out of the list, to be woken.
+    /// Takes a task whose time has come out of the list, to be woken. `None` if there is no such task.
     pub fn take_expired(&mut self, now: u32) -> Option<TaskRef> {
         let expired = self.0.iter().position(|entry| !is_after(entry.at, now))?;
         Some(self.0.swap_remove(expired).task)
@@ -78,7 +79,7 @@ mod tests {
 
     type Shared<const N: usize> = Rc<RefCell<Timers<N>>>;
 
-    /// A task that waits for times, all at once, and counts how often it is woken.
+    /// Spawns a task that waits for several times at once, and counts how often it is woken.
     fn task<const N: usize>(
         runtime: &Runtime,
         timers: &Shared<N>,
@@ -97,7 +98,7 @@ mod tests {
         count
     }
 
-    /// Lets it be so late; how often the task has been woken by then.
+    /// Sets the time to `now`. Returns how often the task has been woken by then.
     fn at<const N: usize>(
         runtime: &Runtime,
         timers: &Shared<N>,

@@ -1,4 +1,5 @@
-//! A value that one level at a time has: what is behind [`Shared`](crate::Shared) and [`Baton`](crate::Baton), which see to that.
+//! A value that one level at a time uses. [`Shared`](crate::Shared) and [`Baton`](crate::Baton), which are made of
+//! it, ensure that.
 
 pub use imp::Value;
 
@@ -8,7 +9,7 @@ mod imp {
 
     pub struct Value<T>(UnsafeCell<T>);
 
-    // SAFETY: on the only core one level at a time has it, see `with`.
+    // SAFETY: there is one core, and one level at a time uses the value, see `with`.
     unsafe impl<T: Send> Sync for Value<T> {}
 
     impl<T> Value<T> {
@@ -17,7 +18,7 @@ mod imp {
         }
 
         /// # Safety
-        /// Nobody else has the value.
+        /// Nobody else uses the value.
         #[inline(always)]
         pub unsafe fn with<R>(&self, act: impl FnOnce(&mut T) -> R) -> R {
             // SAFETY: the caller says so.
@@ -38,7 +39,7 @@ mod imp {
 mod imp {
     use std::sync::RwLock;
 
-    /// On the host it is a lock that nobody ever has to wait for.
+    /// On the host the value is behind a lock that nobody ever has to wait for.
     pub struct Value<T>(RwLock<T>);
 
     impl<T> Value<T> {
@@ -47,13 +48,13 @@ mod imp {
         }
 
         /// # Safety
-        /// None: see above.
+        /// None: the lock checks it.
         pub unsafe fn with<R>(&self, act: impl FnOnce(&mut T) -> R) -> R {
             act(&mut self.0.try_write().expect("nobody else has the value"))
         }
 
         /// # Safety
-        /// None: see above.
+        /// None: the lock checks it.
         pub unsafe fn look<R>(&self, act: impl FnOnce(&T) -> R) -> R {
             act(&self.0.try_read().expect("nobody else changes the value"))
         }

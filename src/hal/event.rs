@@ -1,6 +1,6 @@
 //! What interrupts and the exec level tell thread-mode tasks, by the event bits of [`avr_embassy::event`].
 //!
-//! Each event has one waiting task at most, but for the transmitters.
+//! Each event has at most one waiting task. Only for [`Event::Transmitted`] there is one task for each port.
 
 use core::future::poll_fn;
 use core::task::{Poll, Waker};
@@ -11,12 +11,13 @@ use super::byte::SharedByte;
 use super::imp;
 use super::serial::{NATIVE, PORTS, USB};
 
-/// What happened. The discriminant is the bit; of events that happen in one turn of the main loop the one with the highest bit is
-/// seen to first: control before the reader, and that before the planner and the reporter, whose turns may take 10 ms of a busy CPU.
+/// What happened. The discriminant is the bit. Of the events in one turn of the main loop the one with the highest
+/// bit is served first: control before the reader, and the reader before the planner and the reporter, whose turns
+/// may take 10 ms of a busy CPU.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub enum Event {
-    /// The transmit ring drained by a byte.
+    /// The transmit ring has room for one more byte.
     Transmitted = 0,
     /// Exec released a block.
     BlockDone = 1,
@@ -29,7 +30,7 @@ pub enum Event {
 }
 
 impl Event {
-    /// The event of the runtime.
+    /// Returns the event of the runtime.
     #[inline(always)]
     pub(super) const fn bit(self) -> avr_embassy::Event {
         match self {
@@ -41,69 +42,73 @@ impl Event {
         }
     }
 
-    /// Whether it is among the bits of a turn.
+    /// Whether the event is among the bits of a turn.
     #[inline(always)]
     pub(super) const fn is_in(self, bits: u8) -> bool {
         bits & 1 << self as u8 != 0
     }
 }
 
-/// Whether bytes have come, and a millisecond has passed, since the main loop had its last turn: the reader should have one before a
-/// long calculation.
+/// Whether bytes have come and a millisecond has passed since the last turn of the main loop. The reader should then
+/// have a turn before a long calculation.
 #[inline(always)]
 pub fn is_unheard() -> bool {
     imp::flags::has(Event::Received) && imp::flags::has(Event::Tick)
 }
 
-/// Whether others should have their turn before the next line is carried out: the reader for what [`is_unheard`], unless that can wait for some
-/// lines, and others for a real-time character or a switch.
+/// Whether other tasks should have their turn before the next line is carried out: for a real-time character or a
+/// switch, or because bytes are unheard ([`is_unheard`]) that the reader must not leave for some lines
+/// (`calls_reader`).
 #[inline(always)]
 pub fn is_wanted() -> bool {
     imp::flags::has(Event::Realtime) || is_unheard() && imp::uart::calls_reader()
 }
 
-/// Segments without a turn of the main loop after which bytes that have come count as a question.
+/// Segments that pass without a turn of the main loop before bytes that have come count as a question: see
+/// [`is_asked`].
 const UNHEARD: u8 = 1;
 
 machine_static! {
-    // Who waits for the transmitter of the second port.
+    // The task that waits for the transmitter of the second port.
     fn transmitted() -> Waiter = Waiter::new();
-    // Exec counts; the main loop, which never runs in between, begins anew.
+    // Exec counts up. The main loop, which never runs between exec's read and its write, clears.
     fn passed_over() -> SharedByte = SharedByte::new(0);
-    // Thread mode alone.
+    // Used by thread mode only.
     fn eager() -> SharedByte = SharedByte::new(0);
-    // Thread mode says so, exec looks.
+    // Thread mode writes it, exec reads it.
     fn asked() -> SharedByte = SharedByte::new(0);
 }
 
-/// Says on which ports, as bits, bytes are looked for that act without the end of a line: while any byte waits there, there is an
-/// [`Event::Received`] each [`EAGER_MS`]. Thread mode.
+/// Sets the ports, as bits, on which bytes may act without the end of a line. While any byte waits on such a port,
+/// there is an [`Event::Received`] each [`EAGER_MS`]. Thread mode.
 pub fn set_eager(ports: u8) {
     eager().set(ports);
 }
 
-/// Says whether somebody waits for an answer that thread mode works on. Exec leaves it more of the CPU then.
+/// Sets whether somebody waits for an answer that thread mode works on. Exec then leaves more of the CPU to thread
+/// mode.
 pub fn set_asked(waits: bool) {
     asked().set(waits.into());
 }
 
-/// Whether somebody does, or may: bytes have come, and the main loop has had no turn since the last segment. Exec and thread mode.
+/// Whether somebody waits for an answer, or may: bytes have come, and the main loop has had no turn since the last
+/// segment. Exec and thread mode.
 #[inline(always)]
 pub fn is_asked() -> bool {
     asked().get() != 0 || (passed_over().get() >= UNHEARD && is_unheard())
 }
 
-/// Counts one more segment since the main loop had its last turn, and says how many they are. Exec only.
+/// Counts one more segment since the last turn of the main loop. Returns how many there have been. Exec only.
 pub fn pass_over() -> u8 {
     let count = passed_over().get().saturating_add(1);
     passed_over().set(count);
     count
 }
 
-/// See [`set_eager`]: a power of two.
+/// Milliseconds between two events of [`set_eager`]: a power of two.
 const EAGER_MS: u8 = 4;
 
-/// Waits until `ready` gives a value, asking again after each `event`.
+/// Waits until `ready` returns a value. Asks now, and again after each `event`.
 pub fn wait<R>(
     thread: Thread,
     event: Event,
@@ -112,7 +117,7 @@ pub fn wait<R>(
     event.bit().wait(thread, ready)
 }
 
-/// Waits until `ready` gives a value, asking again after each byte that any port has sent.
+/// Waits until `ready` returns a value. Asks now, and again after each byte that any port has sent.
 pub fn wait_transmitted<R>(
     thread: Thread,
     port: u8,
@@ -145,13 +150,13 @@ pub fn next(thread: Thread, event: Event) -> impl Future<Output = ()> {
     event.bit().next(thread)
 }
 
-/// Whether a byte waits on a port where one may act without the end of a line.
+/// Whether a byte waits on a port where bytes may act without the end of a line.
 fn is_eager() -> bool {
     let eager = eager().get();
     (0..PORTS as u8).any(|port| eager & 1 << port != 0 && imp::uart::newest(port).is_some())
 }
 
-/// A turn of the main loop: what is too small for a task. `bits` are the events since the last.
+/// Does, in each turn of the main loop, what is too small for a task. `bits` are the events since the last turn.
 pub fn turn(thread: Thread, bits: u8) {
     passed_over().set(0);
     if NATIVE {

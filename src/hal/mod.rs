@@ -1,9 +1,10 @@
 //! The hardware, and what stands in for it on the host.
 //!
-//! Executors, rings, event bits and the ceiling lock are those of [`avr_embassy`]; this module says what Kerf
-//! uses them for. `avr` and `rp2040` own all the registers of their chips and nearly all the `unsafe`; `host` is the same over
-//! mocked time. Exactly one of the three is compiled, under the name [`imp`]. What both have is written down as traits in [`contract`] and
-//! [`primitives`]; all other code calls that, as `hal::stepper::go()`, and does not know which it is.
+//! Executors, rings, event bits and the ceiling lock come from [`avr_embassy`]; this module says what Kerf uses them
+//! for. `avr` and `rp2040` own all registers of their chips and contain nearly all the `unsafe`. `host` provides the
+//! same functions over mocked time. Exactly one of the three is compiled, under the name [`imp`]. The traits in
+//! [`contract`] and [`primitives`] say what each of them provides. All other code calls those functions, for example
+//! `hal::stepper::go()`, and does not know which chip it runs on.
 
 pub use avr_embassy::{Ceiling, Interrupt, Thread, byte, ring};
 
@@ -17,7 +18,7 @@ pub use contract::{
 pub use place::Never;
 pub use primitives::{arithmetic, float, text};
 
-/// Waits so many milliseconds. The tick of `embassy-time` is the chip's.
+/// Waits for `ms` milliseconds. How long a tick of `embassy-time` is depends on the chip.
 #[inline(always)]
 pub fn after_ms(ms: u64) -> embassy_time::Timer {
     embassy_time::Timer::after_ticks(ms * (embassy_time::TICK_HZ / 1_000))
@@ -42,7 +43,7 @@ pub mod imp;
 #[path = "host/mod.rs"]
 pub mod imp;
 
-/// A part of `rp2040` that is plain Rust, for its tests.
+/// The part of `rp2040` that is plain Rust, compiled here for its tests.
 #[cfg(test)]
 #[allow(dead_code)]
 #[path = "rp2040/stepper/words.rs"]

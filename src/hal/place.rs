@@ -1,7 +1,7 @@
-//! Where what lives for ever is put, and tasks: in statics on the chip, where there is one machine; on the heap of the host, where
-//! each machine that is made gets its own.
+//! Storage for values that live for ever, and for tasks. On the chip, which is one machine, they are statics. On the
+//! host they are on the heap, and each machine that a test makes gets its own.
 
-/// Memory for lines, once in an image; on the host each machine that is made gets its own.
+/// Returns memory for lines. An image has it once; on the host each machine gets its own.
 macro_rules! line_bytes {
     ($len:expr) => {{
         #[cfg(target_os = "none")]
@@ -15,7 +15,7 @@ macro_rules! line_bytes {
     }};
 }
 
-/// Puts something where it stays.
+/// Moves a value to a place where it lives for ever, and returns a reference to it.
 macro_rules! place {
     ($type:ty, $value:expr) => {{
         #[cfg(target_os = "none")]
@@ -28,7 +28,7 @@ macro_rules! place {
     }};
 }
 
-/// Declares tasks: one of each in an image; on the host each machine that is made gets its own.
+/// Declares tasks. An image has one of each; on the host each machine gets its own.
 macro_rules! tasks {
     ($(fn $name:ident($($arg:ident: $type:ty),*) = $run:path;)+) => {$(
         #[cfg(target_os = "none")]
@@ -47,10 +47,10 @@ macro_rules! tasks {
     )+};
 }
 
-/// What a task returns, that never does: `!`, which is no type of stable Rust yet.
+/// The return type of a task that never returns: `!`, which stable Rust does not yet accept as a type.
 pub type Never = <fn() -> ! as Returns>::Value;
 
-/// See [`Never`].
+/// Names the return type of a function, for [`Never`].
 pub trait Returns {
     /// What the function returns.
     type Value;

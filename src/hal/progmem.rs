@@ -1,11 +1,11 @@
 //! Tables and text in program memory.
 //!
-//! On AVR a constant lives in RAM unless it is placed in flash and read with `lpm`. [`Progmem`] does
-//! both: the only way to a value is a copy out of flash. The linker puts these sections right behind
-//! the vectors, inside the first 64 KiB, where `lpm` reaches without touching RAMPZ, so reading is
-//! safe in interrupts too. On the host it is an ordinary constant.
+//! On AVR a constant lives in RAM unless it is placed in flash and read with `lpm`. [`Progmem`] does both: the only
+//! way to a value is a copy out of flash. The linker puts these sections right behind the vectors, inside the first
+//! 64 KiB, where `lpm` reaches without RAMPZ, so reading is safe in interrupts too. On the host a [`Progmem`] is an
+//! ordinary constant.
 //!
-//! Cost on AVR: about 4 cycles a byte. The reads are the chip's (`imp::flash`).
+//! Cost on AVR: about 4 cycles a byte. The chip provides the reads (`imp::flash`).
 
 mod text;
 
@@ -49,13 +49,13 @@ impl<T: Copy, const N: usize> Progmem<[T; N]> {
         (index < N).then(|| load((&raw const self.0).cast::<T>().wrapping_add(index)))
     }
 
-    /// All of it, whatever its length.
+    /// Returns the array without its length in the type.
     pub const fn slice(&self) -> Slice<T> {
         Slice { start: (&raw const self.0).cast(), len: N }
     }
 }
 
-/// An array in program memory, of any length.
+/// An array in program memory, without its length in the type.
 #[derive(Clone, Copy)]
 pub struct Slice<T> {
     start: *const T,
@@ -67,9 +67,9 @@ pub struct Slice<T> {
 /// # Safety
 /// The bytes of the name lie at `AT` in the row, `WIDTH` of them.
 pub unsafe trait Named: Copy {
-    /// Where the name is in the row.
+    /// Offset of the name in the row.
     const AT: usize;
-    /// How long it is, with its padding.
+    /// Length of the name with its padding.
     const WIDTH: usize;
 }
 
@@ -87,7 +87,8 @@ macro_rules! named {
 }
 
 impl<T: Named> Slice<T> {
-    /// The number of the row called `name`, which is padded with zeros. Cost on AVR: 13 cycles a row.
+    /// Returns the number of the row called `name`, which is padded with zeros; `None` if there is no such row. Cost
+    /// on AVR: 13 cycles a row.
     pub fn find<const N: usize>(self, name: [u8; N]) -> Option<u8> {
         const { assert!(N == T::WIDTH && size_of::<T>() < 256) }
         let start = self.start.cast::<u8>().wrapping_add(T::AT);
@@ -95,7 +96,8 @@ impl<T: Named> Slice<T> {
     }
 }
 
-/// The first of `count` names, one each `stride` bytes from `start` on, that is `name`. They are in program memory.
+/// Returns the number of the first name that equals `name`, of `count` names in program memory that lie `stride`
+/// bytes apart from `start` on. `None` if there is none.
 #[inline(never)]
 fn find(start: *const u8, stride: u8, count: u8, name: &[u8]) -> Option<u8> {
     let first = *name.first()?;
@@ -114,13 +116,13 @@ fn find(start: *const u8, stride: u8, count: u8, name: &[u8]) -> Option<u8> {
 impl<T: Copy> Slice<T> {
     /// A copy of element `index`, or `None` beyond the end.
     pub fn at(self, index: usize) -> Option<T> {
-        // As in an array of known length.
+        // The index is checked, as in an array of known length.
         (index < self.len).then(|| load(self.start.wrapping_add(index)))
     }
 }
 
 impl<const N: usize> Progmem<[u8; N]> {
-    /// The bytes, to be copied.
+    /// Returns the bytes as [`Plain`], which can be copied fast.
     pub const fn plain(&'static self) -> Plain {
         // SAFETY: whoever made it has placed it in program memory.
         unsafe { Plain::new(self) }
@@ -129,11 +131,12 @@ impl<const N: usize> Progmem<[u8; N]> {
 
 /// A copy of a value that is part of a [`Progmem`].
 fn load<T: Copy>(from: *const T) -> T {
-    // SAFETY: the callers in this module pass a pointer into a `Progmem` of theirs.
+    // SAFETY: the callers in this module pass a pointer into a `Progmem`.
     unsafe { flash::load(from) }
 }
 
-/// Unpacked bytes in program memory: a pointer that only this type follows. They are copied five times as fast as a [`Text`].
+/// Unpacked bytes in program memory. Only this type follows its pointer. They are copied five times as fast as a
+/// [`Text`].
 #[derive(Clone, Copy)]
 pub struct Plain {
     start: *const u8,
@@ -153,7 +156,7 @@ impl Plain {
         Self { start: (&raw const bytes.0).cast(), len: N as u8 }
     }
 
-    /// Whether there is none.
+    /// Whether there are no bytes.
     pub const fn is_empty(&self) -> bool {
         self.len == 0
     }
@@ -163,13 +166,14 @@ impl Plain {
         (index < self.len).then(|| load(self.start.wrapping_add(index.into())))
     }
 
-    /// Copies them to the beginning of `to`, as far as there is room. Returns the part of `to` that is filled now. Cost on
-    /// AVR: 8 cycles a byte.
+    /// Copies the bytes to the beginning of `to`, as far as there is room. Returns the part of `to` that is filled
+    /// now. Cost on AVR: 8 cycles a byte.
     #[inline(always)]
     pub fn copy(self, to: &mut [MaybeUninit<u8>]) -> &mut [u8] {
         let count = usize::from(self.len).min(to.len()) as u8;
         let start = to.as_mut_ptr().cast();
-        // SAFETY: both have as many bytes; these are copied if there is at least one, and then all of them are filled.
+        // SAFETY: both have at least `count` bytes. They are copied if `count` is not 0, so all bytes of the result
+        // have been written.
         unsafe {
             if count > 0 {
                 flash::copy(self.start, start, count);
@@ -184,7 +188,7 @@ impl Plain {
         Self { len: count.min(self.len), ..self }
     }
 
-    /// What is behind the first `count` bytes.
+    /// Returns the bytes behind the first `count`.
     #[inline(always)]
     pub fn behind(self, count: u8) -> Self {
         let count = count.min(self.len);

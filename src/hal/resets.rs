@@ -1,7 +1,8 @@
 //! Why the machine has started.
 //!
-//! The chip notes the cause of a reset, but common boot loaders clear the note before the firmware sees it. So the
-//! firmware leaves a mark in memory that resets do not clear: that it runs, and why it is about to reset itself.
+//! The chip notes the cause of a reset, but common boot loaders clear that note before the firmware sees it.
+//! Therefore the firmware leaves a mark in memory that resets do not clear. The mark says that the firmware runs, or
+//! why it is about to reset itself.
 //!
 //! | what the chip says | mark | cause |
 //! |---|---|---|
@@ -41,29 +42,29 @@ impl Cause {
         }
     }
 
-    /// Whether nobody wanted it.
+    /// Whether nobody wanted this reset.
     pub fn is_fault(self) -> bool {
         matches!(self, Cause::BrownOut | Cause::Watchdog)
     }
 }
 
-/// What is left in memory over a reset.
+/// The mark that survives a reset in memory.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Mark(pub u16);
 
 impl Mark {
     const RUNNING: u16 = 0x4BA0;
-    /// About to reset, as asked.
+    /// The firmware is about to reset because somebody asked for it.
     pub const ASKED: Mark = Mark(0x4B5A);
-    /// About to reset, for something has got stuck.
+    /// The firmware is about to reset because something has got stuck.
     pub const STARVED: Mark = Mark(0x4BC3);
 
-    /// The mark of a firmware that runs after a start by `cause`.
+    /// Returns the mark of a running firmware that was started by `cause`.
     pub fn running(cause: Cause) -> Mark {
         Mark(Self::RUNNING | cause as u16)
     }
 
-    /// Why it was started, if it runs.
+    /// Returns why the firmware was started, if the mark is that of a running firmware; else `None`.
     pub fn cause(self) -> Option<Cause> {
         let number = self.0 ^ Self::RUNNING;
         (number <= Cause::Asked as u16).then(|| Cause::from_number(number as u8))
@@ -76,7 +77,7 @@ const EXTERNAL: u8 = 1 << 1;
 const BROWN_OUT: u8 = 1 << 2;
 const WATCHDOG: u8 = 1 << 3;
 
-/// Why the machine has started, of what the chip says and the mark that was left.
+/// Returns why the machine has started, from the chip's note `chip` and the mark that was left.
 #[small]
 pub fn cause(chip: u8, mark: Mark) -> Cause {
     if chip & POWER_ON != 0 {

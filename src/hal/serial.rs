@@ -1,14 +1,14 @@
-//! What both sides of the serial line agree on: the rings, and the marks of lost bytes.
+//! What both sides of a serial line agree on: the rings, and the marks of lost bytes.
 //!
-//! Bytes that come when the receive ring is full are lost, and so is one that comes damaged. A mark
-//! stands in their place: it replaces the newest byte of a full ring (or the damaged one), and says in
-//! three bits what the reader must know. Line ends that were lost are counted besides (`imp::uart::lost_ends`),
-//! so that each lost line is answered.
+//! A byte that comes when the receive ring is full is lost, and so is a byte that comes damaged. A mark stands in the
+//! place of the loss: it replaces the newest byte of a full ring, or the damaged byte, and tells the reader in three
+//! bits what was lost. Lost line ends are also counted (`imp::uart::lost_ends`), so that each lost line gets an
+//! answer.
 
 use super::ring::{ConsumerView, Producer, Window};
 use crate::boards::{ACTIVE, Serial, Usart};
 
-/// How many ports there are, and the numbers of the one that every board has and of the other.
+/// The number of ports. [`USB`] is the number of the port that every board has, [`AUX`] that of the second one.
 pub const PORTS: usize = ACTIVE.serial.len();
 /// See [`PORTS`].
 pub const USB: u8 = 0;
@@ -22,9 +22,10 @@ pub const AUX_RING: usize = 64;
 /// Size of each transmit ring, a power of two.
 pub const TX_RING: usize = 128;
 
-/// Bytes below this are marks. None of them is in a line of text: in place of one that comes from outside there is a [`STRAY`].
+/// Bytes below this are marks. No line of text contains one: a byte with such a value that comes from outside is
+/// replaced by [`STRAY`].
 pub const MARKS: u8 = 8;
-/// A byte that no line may hold, and no mark.
+/// A byte that no line may contain and that is no mark.
 pub const STRAY: u8 = 8;
 /// A bit of a mark: the mark replaced the end of a whole line.
 pub const BEHIND_END: u8 = 1;
@@ -33,40 +34,42 @@ pub const CLEAN: u8 = 2;
 /// A bit of a mark: the byte lost last was a carriage return, which a line feed may follow.
 pub const RETURNED: u8 = 4;
 
-/// No mark of a loss (none has this bit without [`CLEAN`]): here a `%` or `^d` stood in the stream.
+/// Not a loss marker (a loss marker has this bit only together with [`CLEAN`]): records where `%` or `^d` stood in
+/// the stream.
 pub const CUT: u8 = RETURNED;
-/// No mark of a loss either: here a `~` stood in the stream.
+/// Not a loss marker either: records where `~` stood in the stream.
 pub const GO: u8 = RETURNED | BEHIND_END;
 
-/// Stands where a line was that has been taken out of its turn. No such byte comes into the ring from outside: it resets.
+/// Replaces a line that has been taken out of its turn. This byte never comes into the ring from outside, where it is
+/// `^x`: that resets.
 pub const TAKEN: u8 = 0x18;
-/// Stands behind [`TAKEN`] for the carriage return of that line, which a line feed may follow.
+/// Follows [`TAKEN`] in place of the carriage return of that line, after which a line feed may come.
 pub const TAKEN_RETURN: u8 = b'!';
 
-/// The reader is woken at the end of a line, and when this many bytes have come since: a power of two.
+/// Bytes after which the reader is woken, besides at the end of each line. A power of two.
 pub const fn batch(ring: usize) -> u8 {
     (ring / 8) as u8
 }
 
-/// What stops the other side of a line, and lets it go on. Where they mean that (`ex` 1) the receive interrupt takes them
-/// out of the stream and obeys: they never wait behind data.
+/// Stops the other side of a line; [`XON`] lets it go on. If flow control is by characters (`ex` 1), the receive
+/// interrupt takes both out of the stream and obeys, so that they never wait behind data.
 pub const XOFF: u8 = 0x13;
 /// See [`XOFF`].
 pub const XON: u8 = 0x11;
-/// Added to one of the two for each millisecond that it may wait for the end of the line that is being sent.
+/// Added to XOFF or XON for each millisecond that the character may wait for the end of the line that is being sent.
 pub const WAIT_MS: u8 = 0x20;
-/// A byte below this ends a line: XOFF and XON may follow it.
+/// A byte below this ends a line. XOFF and XON that wait may follow it.
 pub const LINE_END: u8 = b' ';
 
-/// How many ms XOFF and XON wait for the end of a line on a port with this divisor (`baud::divisor`), at most. The sender
-/// says up to 50 bytes meanwhile, or 12 where the ring is short.
+/// Returns for how many ms at most XOFF and XON wait for the end of a line, on a port with this divisor
+/// (`baud::divisor`). The other side sends up to 50 bytes meanwhile, or 12 where the receive ring is short.
 pub const fn wait_ms(port: u8, divisor: u8) -> u8 {
     let (ms, most) = (divisor / 3, if port == USB { 4 } else { 1 });
     if ms > most { most } else { ms }
 }
 
-/// The sender is stopped when the receive ring holds more. Most say 100 bytes more before they heed XOFF, and that waits
-/// for the end of a line.
+/// Returns how many bytes the receive ring may hold before the sender is stopped. Most senders send 100 more bytes
+/// before they obey XOFF, and XOFF itself waits for the end of a line.
 pub const fn high_water(flow: Flow, ring: usize) -> usize {
     match flow {
         Flow::Characters if ring < RX_RING => ring / 8,
@@ -74,19 +77,20 @@ pub const fn high_water(flow: Flow, ring: usize) -> usize {
         _ => ring / 2,
     }
 }
-/// Thread mode is late when the ring of the second port holds this many bytes: exec stops the sender.
+/// When the receive ring of the second port holds this many bytes, thread mode is late, and exec stops the sender.
 pub const LATE: usize = AUX_RING / 4;
 
-/// The sender may go on when the ring holds less than this many bytes.
+/// The sender may go on when the receive ring holds fewer bytes than this.
 pub const fn low_water(ring: usize) -> usize {
     if ring < RX_RING { ring / 16 } else { ring / 8 }
 }
 
-/// With so many bytes in the receive ring of the first port the reader has its turn: it may have to stop the sender.
+/// With more bytes than this in the receive ring of the first port the reader gets its turn: it may have to stop the
+/// sender.
 const MANY: u8 = high_water(Flow::Characters, RX_RING) as u8;
 
-/// Whether the reader is to have its turn before a line that waits is carried out: what is in the receive ring of the first port
-/// begins or ends like a control line, or is much. Cost: 60 cycles.
+/// Whether the reader has to have its turn before the next waiting line is carried out: the bytes in the receive ring
+/// of the first port begin or end like a control line, or there are many. Cost: 60 cycles.
 pub fn calls_reader(ring: &Window<'_>) -> bool {
     let len = ring.len();
     let newest = ring.get(len.wrapping_sub(1));
@@ -97,7 +101,7 @@ pub fn calls_reader(ring: &Window<'_>) -> bool {
 /// How the two sides of a line stop each other.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Flow {
-    /// Not at all.
+    /// No flow control.
     None,
     /// By XOFF and XON.
     Characters,
@@ -106,11 +110,11 @@ pub enum Flow {
 }
 
 impl Flow {
-    /// The flow control of a port by the setting `ex`.
+    /// Returns the flow control of a port for the setting `ex`.
     pub const fn of(port: u8, ex: u8) -> Flow {
         let has_pins = matches!(hardware(port), Some(Serial { handshake: Some(_), .. }));
         match ex {
-            // A bus belongs to others too, who would heed it.
+            // Other devices on a bus would obey XOFF, too.
             1 if !is_shared(port) => Flow::Characters,
             2 if has_pins => Flow::Pins,
             _ => Flow::None,
@@ -118,18 +122,18 @@ impl Flow {
     }
 }
 
-/// What the board says of a port.
+/// Returns what the board says of a port; `None` if the board does not have that port.
 pub const fn hardware(port: u8) -> Option<Serial> {
     let port = port as usize;
     if port < ACTIVE.serial.len() { Some(ACTIVE.serial[port]) } else { None }
 }
 
-/// Bytes received: a view, for rings differ in size.
+/// The reading end of a receive ring: a view, because the rings differ in size.
 pub type Received = ConsumerView<u8>;
-/// Bytes to send. Call `imp::uart::kick` after filling it.
+/// The filling end of a transmit ring. Call `imp::uart::kick` after filling it.
 pub type Outgoing = Producer<u8, TX_RING>;
 
-/// The ends of a port's rings that tasks have.
+/// The ends of a port's rings that tasks own.
 pub type Ends = (Received, Outgoing);
 
 /// The ends of all ports.
@@ -140,16 +144,16 @@ pub struct AllEnds {
     pub aux: Option<Ends>,
 }
 
-/// Whether others share the line of a port, so that it must not speak unasked.
+/// Whether other devices share the line of a port, so that the port must not speak unasked.
 pub const fn is_shared(port: u8) -> bool {
     matches!(hardware(port), Some(Serial { driver_enable: Some(_), .. }))
 }
 
-/// The first port is USB of the chip's own: what it has no room for waits in the computer.
+/// Whether the first port is the chip's own USB. The computer then keeps bytes that the receive ring has no room for.
 pub const NATIVE: bool = matches!(ACTIVE.serial[USB as usize].usart, Usart::Usb);
 
-/// The mark that replaces `newest`, if it is none yet. The receive interrupt of the AVR has the twins of
-/// these two in assembly.
+/// Returns the mark that replaces `newest`, the newest byte of a full ring. A mark stays as it is. The receive
+/// interrupt of the AVR does what `mark` and [`lose`] do in assembly.
 pub fn mark(newest: u8) -> u8 {
     match newest {
         b'\r' => BEHIND_END | CLEAN | RETURNED,
@@ -159,7 +163,7 @@ pub fn mark(newest: u8) -> u8 {
     }
 }
 
-/// The mark after `byte` was lost too, and whether that was one more line end.
+/// Returns the mark after `byte` was lost as well, and whether that was one more line end.
 pub fn lose(mark: u8, byte: u8) -> (u8, bool) {
     let begun = mark & BEHIND_END;
     match byte {
@@ -169,8 +173,8 @@ pub fn lose(mark: u8, byte: u8) -> (u8, bool) {
     }
 }
 
-/// The slot of the last [`CUT`] that waits in a receive ring. One that found the ring full has become the mark of a loss, the
-/// newest byte.
+/// Returns the slot of the last [`CUT`] that waits in a receive ring, `None` if there is none. A `CUT` that found the
+/// ring full has become a loss marker, the newest byte.
 #[inline(never)]
 #[small]
 pub fn last_mark(ring: &Window<'_>) -> Option<u8> {

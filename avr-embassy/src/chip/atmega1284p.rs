@@ -1,8 +1,10 @@
-//! The ATmega1284P, and with it the ATmega1284 and ATmega644P: their registers and vectors up to USART1's are the same.
+//! The ATmega1284P. The ATmega1284 and ATmega644P have the same registers, and the same vectors up to those of
+//! USART1.
 //!
-//! The tick is on timer 0. The software interrupt is USART1's data-register-empty: that transmitter never sends, so its condition
-//! always holds, and the enable bit raises or withdraws it. The transmitter is on, which keeps port D bit 3 high. USART1's
-//! receiver is free. SPM_READY is a level, too, and takes no pin, but its register must not be written while the EEPROM is.
+//! The tick is on timer 0. The software interrupt is USART1's data-register-empty. That transmitter never sends, so
+//! the condition of the interrupt always holds, and its enable bit raises or withdraws it. The transmitter is on,
+//! which keeps port D bit 3 high. USART1's receiver is free. SPM_READY is a level-triggered interrupt as well and
+//! takes no pin, but its register must not be written while the EEPROM is being written.
 
 /// GPIOR0.
 pub const FLAGS: u8 = 0x1E;

@@ -1,7 +1,8 @@
-//! The ATmega2560, and with it the ATmega1280 and ATmega640: their registers and vectors are the same.
+//! The ATmega2560. The ATmega1280 and ATmega640 have the same registers and vectors.
 //!
-//! The tick is on timer 0. The software interrupt is USART2's data-register-empty: that transmitter never sends, so its
-//! condition always holds, and the enable bit raises or withdraws it. The transmitter is on, which keeps port H bit 1 high.
+//! The tick is on timer 0. The software interrupt is USART2's data-register-empty. That transmitter never sends, so
+//! the condition of the interrupt always holds, and its enable bit raises or withdraws it. The transmitter is on,
+//! which keeps port H bit 1 high.
 
 /// GPIOR0.
 pub const FLAGS: u8 = 0x1E;

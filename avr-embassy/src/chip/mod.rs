@@ -1,4 +1,5 @@
-//! The chips: where their registers are, and which vectors the runtime takes. All that differs between them.
+//! The chips: the addresses of their registers, and the vectors that the runtime takes. Nothing else differs between
+//! chips.
 //!
 //! A chip is one file with these names:
 //!
@@ -27,8 +28,8 @@ macro_rules! handlers {
             unsafe { crate::interrupt::handler() }
         }
 
-        /// Whoever starts one of the two calls this, so that a linker without LTO takes the handlers along: they are
-        /// in the same object file. With LTO nothing is left of it.
+        /// Does nothing. Whoever starts the tick or the interrupt executor calls it, so that a linker without LTO
+        /// takes the handlers along: they are in the same object file. With LTO the call vanishes.
         #[inline(never)]
         pub fn link() {}
     };

@@ -1,6 +1,6 @@
-//! The RP2040: which interrupts stand for the interrupt executor and the prompt one.
+//! The RP2040: the software interrupts of the interrupt executor and of the prompt executor.
 //!
-//! They are the second and the third of the six that no peripheral raises (RP2040 data sheet, 2.3.2).
+//! They are the second and the third of the six interrupts that no peripheral raises (RP2040 data sheet, 2.3.2).
 
 use cortex_m::interrupt::InterruptNumber;
 

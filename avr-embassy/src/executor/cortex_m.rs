@@ -1,7 +1,7 @@
 //! The thread-mode executor and its loop on Cortex-M.
 //!
-//! It is `embassy_executor::raw`'s. The loop is our own, for it does what `embassy_executor::Executor` has no place for: it turns event bits into
-//! wake-ups, and tells interrupt mode when thread mode has nothing left to do.
+//! The executor is that of `embassy_executor::raw`. The loop is our own, because `embassy_executor::Executor` cannot
+//! do two things: turn event bits into wake-ups, and tell interrupt mode when thread mode has nothing left to do.
 
 use cortex_m::asm::wfe;
 use embassy_executor::{Spawner, raw};
@@ -19,13 +19,14 @@ impl Executor {
         Self(raw::Executor::new(pender::THREAD))
     }
 
-    /// Runs for ever: `init` spawns the tasks, with interrupts off; then interrupts are on, and the CPU sleeps whenever there is nothing to do.
+    /// Runs for ever. `init` spawns the tasks with interrupts off. Then interrupts are on, and the CPU sleeps
+    /// whenever there is nothing to do.
     pub fn run(&'static mut self, init: impl FnOnce(Spawner, Thread)) -> ! {
         self.run_with(init, |_, _| ())
     }
 
-    /// Runs the tasks as [`Executor::run`] does; besides, `turn` is called with the bits of the events that have happened, each time before
-    /// tasks are polled. It is for what is too small for a task.
+    /// Runs the tasks as [`Executor::run`] does. In addition, `turn` is called with the bits of the events that have
+    /// happened, each time before tasks are polled. It is for what is too small for a task.
     pub fn run_with(
         &'static mut self,
         init: impl FnOnce(Spawner, Thread),
@@ -43,14 +44,15 @@ impl Executor {
                 let bits = flags::take();
                 event::dispatch(thread, bits);
                 turn(thread, bits);
-                // SAFETY: called from here only, so never reentered.
+                // SAFETY: only this place calls it, so it is never reentered.
                 unsafe { executor.poll() };
                 continue;
             }
-            // The interrupt executor runs right here if it wants to.
+            // The interrupt executor runs at this place if `idle` pends it.
             interrupt::idle();
             if flags::all() == 0 {
-                // An event that is set after this look leaves a mark by which `wfe` does not sleep.
+                // An event that is set after this test also sets the CPU's event register, so that `wfe` does not
+                // sleep.
                 wfe();
             }
         }

@@ -1,13 +1,13 @@
-//! What interrupt mode wants of the time when thread mode has nothing left to do, on every chip.
+//! Requests of interrupt mode for the moment when thread mode has nothing left to do. The same on every chip.
 
 use crate::byte::SharedByte;
 
-/// What was asked for last, for when thread mode has nothing left to do: a number, and whether to go on then
-/// ([`GO_ON`]). Written by interrupt mode only.
+/// The last request: a number that counts requests, and the bit [`GO_ON`], which asks for the executor to run.
+/// Written by interrupt mode only.
 static ASKED: SharedByte = SharedByte::new(0);
 const GO_ON: u8 = 1;
 const NEXT: u8 = 2;
-/// What of that thread mode, the only writer, has seen with nothing left to do.
+/// The last request that thread mode, the only writer, has seen with nothing left to do.
 static SEEN: SharedByte = SharedByte::new(0);
 
 pub fn pend_when_idle() {
@@ -22,10 +22,10 @@ pub fn was_idle() -> bool {
     SEEN.get() == ASKED.get()
 }
 
-/// Thread mode has nothing left to do.
+/// Serves the last request: thread mode has nothing left to do.
 #[inline(always)]
 pub fn idle() {
-    // Something else may be asked for in between: it is seen the next time.
+    // If interrupt mode makes another request in between, the next call sees it.
     let asked = ASKED.get();
     if SEEN.get() != asked {
         SEEN.set(asked);

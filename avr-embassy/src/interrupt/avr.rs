@@ -1,4 +1,4 @@
-//! The interrupt executor on the chip.
+//! The interrupt executor on AVR.
 
 use core::arch::asm;
 use core::cell::UnsafeCell;
@@ -20,7 +20,7 @@ struct Context {
     task: UnsafeCell<Option<TaskRef>>,
 }
 
-// SAFETY: `start` writes the executor before it lets the software interrupt in; the rest is touched by that only.
+// SAFETY: `start` writes the executor before it lets the software interrupt in; only that interrupt touches the rest.
 unsafe impl Sync for Context {}
 
 static CONTEXT: Context =
@@ -32,24 +32,24 @@ pub fn pend() {
     unsafe { (PEND as *mut u8).write_volatile(PENDED) };
 }
 
-/// A task of it was woken. The ceiling is closed: it runs when that opens.
+/// Notes that one of the executor's tasks was woken. The ceiling is closed now; the executor runs when it opens.
 #[inline(always)]
 pub fn woken() {
     MISSED.set(1);
 }
 
-/// Starts the interrupt executor: `init` spawns its first tasks, and the result spawns more, from any task. `None` if it
-/// has been started before, or within [`lock`](super::lock).
+/// Starts the interrupt executor: `init` spawns its first tasks, and the result spawns more, from any task. `None` if
+/// it has been started before, or if called within [`lock`](super::lock).
 ///
-/// Before [`Executor::run`](crate::Executor::run): its tasks are polled as soon as interrupts are on.
+/// Call it before [`Executor::run`](crate::Executor::run): the tasks are polled as soon as interrupts are on.
 #[inline(always)]
 pub fn start(init: impl FnOnce(Spawner, Interrupt) + Send) -> Option<SendSpawner> {
     if CLOSED.get() != NOT_STARTED {
         return None;
     }
     chip::link();
-    // SAFETY: once, before the software interrupt is let in. What `init` takes along is `Send`; interrupt mode does not
-    // run yet, so the token stands for it.
+    // SAFETY: this runs once, before the software interrupt is let in. What `init` captures is `Send`; interrupt mode
+    // does not run yet, so this code stands for interrupt mode and may have its token.
     let (spawner, level) = unsafe {
         (*CONTEXT.executor.get()).write(Executor::new(pender::INTERRUPT));
         (executor().spawner(), Interrupt::assume())
@@ -61,14 +61,14 @@ pub fn start(init: impl FnOnce(Spawner, Interrupt) + Send) -> Option<SendSpawner
 }
 
 /// # Safety
-/// It has been made.
+/// The executor has been made.
 #[inline(always)]
 unsafe fn executor() -> &'static Executor {
     // SAFETY: the caller says so.
     unsafe { (*CONTEXT.executor.get()).assume_init_ref() }
 }
 
-/// Keeps the interrupt executor out. What [`CLOSED`] was before, for [`open`].
+/// Keeps the interrupt executor out. Returns the previous value of [`CLOSED`], for [`open`].
 #[inline(always)]
 pub fn close() -> u8 {
     let before = CLOSED.get();
@@ -76,7 +76,7 @@ pub fn close() -> u8 {
     before
 }
 
-/// Takes that back; lets it in at once if it was asked for meanwhile.
+/// Undoes [`close`]. Lets the executor in at once if it was asked for meanwhile.
 #[inline(always)]
 pub fn open(before: u8) {
     CLOSED.set(before);
@@ -89,9 +89,9 @@ pub fn open(before: u8) {
 struct CeilingSection;
 critical_section::set_impl!(CeilingSection);
 
-// SAFETY: critical sections (the executors' run queues, Embassy's channels) are entered by thread mode and by interrupt mode,
-// and by no other interrupt: keeping the latter out while thread mode is in one keeps them apart. While interrupt mode runs,
-// or before it has been started, `CLOSED` is set anyway.
+// SAFETY: critical sections (the executors' run queues, Embassy's channels) are entered by thread mode and by
+// interrupt mode, and by no other interrupt. Keeping interrupt mode out while thread mode is in a critical section
+// keeps the two apart. While interrupt mode runs, or before it has been started, `CLOSED` is set anyway.
 unsafe impl critical_section::Impl for CeilingSection {
     unsafe fn acquire() -> u8 {
         close()
@@ -102,7 +102,7 @@ unsafe impl critical_section::Impl for CeilingSection {
     }
 }
 
-/// Keeps the task that waits.
+/// Keeps the task that waits in [`wait`](super::wait).
 pub fn keep(_: Interrupt, waker: &Waker) {
     // SAFETY: interrupt mode runs, and no reference outlives a call of this or `poll`'s wake.
     super::keep(unsafe { &mut *CONTEXT.task.get() }, waker);
@@ -123,10 +123,11 @@ pub unsafe fn handler() -> ! {
             "push r24",
             "ldi  r24, {withdrawn}",
             "sts  {pend}, r24",
-            // Should it come again before `CLOSED` is set, then it runs first and this one after it.
+            // If the interrupt comes again before `CLOSED` is set, the second one runs first and this one after it.
             "sei",
             "in   r24, 0x3F",
-            // Interrupts stay off from `out` to `reti`: one that comes again at once must not pile up.
+            // Interrupts stay off from `out` to `reti`: an interrupt that comes again at once must not pile up on the
+            // stack.
             "andi r24, 0x7F",
             "push r24",
             "sbic {flags}, {hold}",
@@ -175,13 +176,13 @@ pub unsafe fn handler() -> ! {
             "out  0x3F, r24",
             "pop  r24",
             "reti",
-            // Asked for meanwhile: it comes again at once.
+            // The executor was asked for meanwhile: it comes again at once.
             "3:",
             "ldi  r24, {pended}",
             "sts  {pend}, r24",
             "ldi  r24, 0",
             "rjmp 1b",
-            // Not now: remember it.
+            // The executor must not run now: remember the request.
             "8:",
             "sbi  {flags}, {held}",
             "rjmp 2b",
@@ -203,14 +204,15 @@ pub unsafe fn handler() -> ! {
     }
 }
 
-/// What the interrupt runs.
+/// Polls the executor. The software interrupt calls it.
 extern "C" fn poll() {
-    // What was asked for up to now is served by what follows.
+    // Requests up to now are served by this poll.
     MISSED.set(0);
     // SAFETY: as in `keep`; no task runs yet.
     if let Some(task) = unsafe { *CONTEXT.task.get() } {
         wake_task_no_pend(task);
     }
-    // SAFETY: the only place that polls it, and it does not nest; `CLOSED` was open, so it has been made.
+    // SAFETY: only this function polls the executor, and it does not nest; `CLOSED` was open, so the executor has
+    // been made.
     unsafe { executor().poll() };
 }

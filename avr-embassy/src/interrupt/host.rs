@@ -1,4 +1,4 @@
-//! The interrupt executor on the host: it runs between polls of the thread-mode one, never inside them.
+//! The interrupt executor on the host: it runs between polls of the thread-mode executor, never inside them.
 
 use std::boxed::Box;
 use std::cell::Cell;
@@ -9,7 +9,7 @@ use embassy_executor::{SendSpawner, Spawner};
 
 use crate::{Interrupt, pender};
 
-/// What is wanted of the time when nobody else has anything to do.
+/// What interrupt mode has asked for, for the moment when thread mode has nothing left to do.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Wanted {
     Nothing,
@@ -37,13 +37,13 @@ pub fn start(init: impl FnOnce(Spawner, Interrupt) + Send) -> Option<SendSpawner
     }
     let executor = &*Box::leak(Box::new(Executor::new(pender::INTERRUPT)));
     EXECUTOR.set(Some(executor));
-    // SAFETY: the token stands for what `init` spawns.
+    // SAFETY: what `init` spawns are tasks of interrupt mode, which may have the token.
     init(executor.spawner(), unsafe { Interrupt::assume() });
     pend();
     Some(executor.spawner().make_send())
 }
 
-/// What `start` has made.
+/// Returns the executor that `start` has made; `None` before.
 pub fn executor() -> Option<&'static Executor> {
     EXECUTOR.get()
 }
@@ -74,7 +74,7 @@ pub fn was_idle() -> bool {
     STATE.get().wanted == Wanted::Nothing
 }
 
-/// Thread mode has nothing left to do. Whether the interrupt executor runs then.
+/// Serves the request: thread mode has nothing left to do. Returns whether the interrupt executor runs now.
 pub fn idle() -> bool {
     let runs = STATE.get().wanted == Wanted::GoOn;
     change(|state| state.wanted = Wanted::Nothing);
@@ -84,7 +84,7 @@ pub fn idle() -> bool {
     runs
 }
 
-/// Whether it was asked for; withdraws the request and wakes the task that waits.
+/// Whether the executor was asked for. Withdraws the request, and wakes the task that waits.
 pub fn take_request() -> bool {
     if !STATE.get().pended {
         return false;

@@ -1,27 +1,28 @@
-//! The end of a ring that reads, without the ring's size in its type.
+//! The reading end of a ring, without the ring's size in its type.
 
 use core::marker::PhantomData;
 use core::ptr::NonNull;
 
 use super::{Consumer, Index, Ring};
 
-/// The end of a ring that reads, for code that is the same for all sizes of rings: the program has it once.
+/// The reading end of a ring, for code that is shared by rings of all sizes: the program contains that code once.
 ///
-/// A call costs some cycles more than that of a [`Consumer`].
+/// A call takes some cycles more than with a [`Consumer`].
 pub struct ConsumerView<T: 'static> {
-    /// A `Ring<T, N>`. What a `Ring<T, 1>` has lies at the same places in it, but for the slots behind the first.
+    /// Points to a `Ring<T, N>`. The fields of a `Ring<T, 1>` lie at the same places in it, except the slots after
+    /// the first.
     ring: NonNull<Ring<T, 1>>,
     /// The highest index: one less than a power of two.
     pub(super) last: Index,
-    /// It gives out references into the ring.
+    /// The view gives out references into the ring.
     values: PhantomData<&'static T>,
 }
 
-// SAFETY: it is a `Consumer`, which may go to another level: all that both ends touch are shared indices.
+// SAFETY: a view is a `Consumer`, which may go to another level: all that both ends touch are shared indices.
 unsafe impl<T: Send> Send for ConsumerView<T> {}
 
 impl<T: Copy, const N: usize> Consumer<T, N> {
-    /// This end without the size in its type.
+    /// Turns this end into one without the size in its type.
     pub fn into_view(self) -> ConsumerView<T> {
         const { assert!(N.is_power_of_two()) };
         ConsumerView {
@@ -33,13 +34,13 @@ impl<T: Copy, const N: usize> Consumer<T, N> {
 }
 
 impl<T: Copy> ConsumerView<T> {
-    /// What lies before the slots.
+    /// Returns the fields that lie before the slots.
     fn ring(&self) -> &Ring<T, 1> {
-        // SAFETY: `Ring` is laid out as in C, so one with more slots begins as one with one.
+        // SAFETY: `Ring` is laid out as in C, so a ring with more slots begins like a ring with one slot.
         unsafe { self.ring.as_ref() }
     }
 
-    /// Where a slot is. `index` is no higher than `last`.
+    /// Returns the address of a slot. `index` must not be higher than `last`.
     pub(super) fn slot(&self, index: Index) -> *mut T {
         let slots = self.ring.as_ptr().wrapping_byte_add(Ring::<T, 1>::SLOTS).cast::<T>();
         slots.wrapping_add(index.into())
@@ -55,7 +56,7 @@ impl<T: Copy> ConsumerView<T> {
         usize::from(ring.head.get().wrapping_sub(ring.tail.get()) & self.last)
     }
 
-    /// Whether none waits.
+    /// Whether no value waits.
     pub fn is_empty(&self) -> bool {
         let ring = self.ring();
         ring.head.get() == ring.tail.get()
@@ -66,7 +67,7 @@ impl<T: Copy> ConsumerView<T> {
         self.ring().tail()
     }
 
-    /// The oldest values, as many as lie side by side; empty only if none waits.
+    /// Returns the oldest values, as many as lie side by side; empty only if none waits.
     #[inline(always)]
     pub fn waiting(&self) -> &[T] {
         // Read once: the producer may move it meanwhile.
@@ -83,14 +84,14 @@ impl<T: Copy> ConsumerView<T> {
         unsafe { core::slice::from_raw_parts(self.slot(start), len) }
     }
 
-    /// Releases the oldest `count` values, of those that [`ConsumerView::waiting`] gave.
+    /// Releases the oldest `count` values of those that [`ConsumerView::waiting`] returned.
     pub fn release_many(&mut self, count: u8) {
         let count = usize::from(count).min(self.len()) as Index;
         let tail = &self.ring().tail;
         tail.set(tail.get().wrapping_add(count) & self.last);
     }
 
-    /// Takes the oldest value.
+    /// Takes the oldest value. `None` if none waits.
     pub fn pop(&mut self) -> Option<T> {
         if self.is_empty() {
             return None;
@@ -116,7 +117,7 @@ mod tests {
         (put, got.into_view())
     }
 
-    /// A view tells the values of its ring in order, side by side where they are, however often it goes round.
+    /// A view returns the values of its ring in order, however often the ring goes round.
     fn goes_round<const N: usize>() {
         let (mut put, mut got) = ring::<N>();
         assert_eq!((got.len(), got.waiting().len()), (0, 0));

@@ -4,22 +4,22 @@ use core::marker::PhantomData;
 
 use super::{ConsumerView, Ring};
 
-/// The bytes that wait in a ring, for code that is the same for all sizes of rings.
+/// The bytes that wait in a ring, for code that is shared by rings of all sizes.
 pub struct Window<'a> {
     slots: *mut u8,
     /// The highest index: one less than a power of two.
     last: u8,
     tail: u8,
     len: u8,
-    /// Nobody takes them meanwhile.
+    /// Borrows the consumer: nobody takes bytes while the window exists.
     consumer: PhantomData<&'a mut ()>,
 }
 
 impl<const N: usize> Ring<u8, N> {
-    /// What waits now.
+    /// Returns a window on the bytes that wait now.
     ///
     /// # Safety
-    /// The caller is the consumer, or that does not run meanwhile.
+    /// The caller is the consumer, or the consumer does not run meanwhile.
     pub unsafe fn window(&self) -> Window<'_> {
         const { assert!(N.is_power_of_two()) };
         Window {
@@ -33,7 +33,7 @@ impl<const N: usize> Ring<u8, N> {
 }
 
 impl ConsumerView<u8> {
-    /// What waits now.
+    /// Returns a window on the bytes that wait now.
     pub fn window(&mut self) -> Window<'_> {
         Window {
             slots: self.slot(0),
@@ -51,12 +51,12 @@ impl Window<'_> {
         self.len
     }
 
-    /// Whether none does.
+    /// Whether no byte waits.
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }
 
-    /// Whether no byte more has room.
+    /// Whether the ring has no room for another byte.
     pub fn is_full(&self) -> bool {
         self.len == self.last
     }
@@ -66,17 +66,18 @@ impl Window<'_> {
         self.tail.wrapping_add(ahead).wrapping_add(1) & self.last
     }
 
-    /// The byte `ahead` places behind the oldest, 0 if none waits there.
+    /// Returns the byte `ahead` places behind the oldest, 0 if none waits there.
     pub fn get(&self, ahead: u8) -> u8 {
         if ahead >= self.len {
             return 0;
         }
-        // SAFETY: it waits, so it has been filled, and `slot` is within the ring. The producer may change the newest in
-        // one instruction.
+        // SAFETY: the byte waits, so its slot has been filled, and `slot` is within the ring. The producer may change
+        // the newest byte, in one instruction.
         unsafe { self.slots.add(self.slot(ahead).into()).read_volatile() }
     }
 
-    /// The first place from `ahead` on with a byte below a blank, or behind the newest byte. Cost: 11 cycles a byte.
+    /// Returns the first place from `ahead` on whose byte is below a blank, or the place behind the newest byte.
+    /// Cost: 11 cycles a byte.
     #[inline(never)]
     pub fn behind_text(&self, ahead: u8) -> u8 {
         let mut at = ahead;
@@ -93,8 +94,8 @@ impl Window<'_> {
         at
     }
 
-    /// Takes bytes out of the midst: those before them move up, and the consumer is to release as many. The newest byte of a full
-    /// ring stays. Cost: 20 cycles for each byte before them.
+    /// Removes `count` bytes from place `at` on. The bytes before them move up, and the consumer has to release
+    /// `count` bytes. The newest byte of a full ring stays. Cost: 20 cycles for each byte before them.
     #[inline(never)]
     #[cfg_attr(target_arch = "avr", optimize(size))]
     pub fn take_out(&mut self, at: u8, count: u8) {
@@ -102,15 +103,16 @@ impl Window<'_> {
         let count = count.min(most);
         for n in (0..at.min(self.len)).rev() {
             let byte = self.get(n);
-            // SAFETY: the place is one of a byte that waits, and not the newest of a full ring, which alone the producer changes.
+            // SAFETY: the slot holds a byte that waits. It is not the newest of a full ring, the only one that the
+            // producer changes.
             unsafe { self.slots.add(self.slot(n + count).into()).write_volatile(byte) };
         }
         self.tail = self.tail.wrapping_add(count) & self.last;
         self.len -= count;
     }
 
-    /// Replaces a byte that waits, if it is still `from`: the producer may have changed the newest. Whether it was. Masks
-    /// interrupts for some cycles.
+    /// Replaces the byte at `ahead` if it is still `from`: the producer may have changed the newest one. Returns
+    /// whether it was replaced. Masks interrupts for some cycles.
     #[inline(never)]
     #[cfg_attr(target_arch = "avr", optimize(size))]
     pub fn replace(&mut self, ahead: u8, from: u8, to: u8) -> bool {

@@ -1,17 +1,19 @@
-//! Integer arithmetic by hand, where the compiler's takes two to four times as long. Any level; cycles as told, inlined.
+//! Integer arithmetic in assembly, where the compiler's takes two to four times as long. Any level. Costs are cycles,
+//! inlined.
 
-/// `a / b` and `a % b` if the quotient fits 16 bits: `a >> 16 < b`. Else something, without a panic. Cost: 170, 100 if
-/// the quotient fits eight bits; 195 and 115 if `b` has 16 bits; 120 and 80 if it has seven.
+/// Returns `a / b` and `a % b` if the quotient fits 16 bits: `a >> 16 < b`. Otherwise the result is arbitrary,
+/// without a panic. Cost: 170, 100 if the quotient fits eight bits; 195 and 115 if `b` has 16 bits; 120 and 80 if it
+/// has seven.
 #[inline(always)]
 pub fn divide(a: u32, b: u16) -> (u16, u16) {
-    // Bit by bit, four in a turn.
+    // Computes the quotient bit by bit, four bits in each turn of the loop.
     let mut rest = (a >> 16) as u16;
     let mut low = a as u16;
     // SAFETY: arithmetic on its operands.
     unsafe {
         core::arch::asm!(
             "ldi  {n}, 4",
-            // Where the quotient has eight bits there is no need to look for more.
+            // If the quotient has only eight bits, no more are computed.
             "cp   {low:h}, {b:l}",
             "cpc  {rest:l}, {b:h}",
             "cpc  {rest:h}, {zero}",
@@ -19,11 +21,12 @@ pub fn divide(a: u32, b: u16) -> (u16, u16) {
             "mov  {rest:h}, {rest:l}",
             "mov  {rest:l}, {low:h}",
             "mov  {low:h}, {low:l}",
-            // The loop makes the complement of the quotient, whose upper byte is to be 0. `com` sets the carry, which is the ninth one.
+            // The loop makes the complement of the quotient, whose upper byte has to be 0. `com` sets the carry,
+            // which is the ninth bit.
             "clr  {low:l}",
             "com  {low:l}",
             "ldi  {n}, 2",
-            // None of this changes the carry.
+            // The tests up to the loop do not change the carry.
             "1:",
             "tst  {b:h}",
             "brne 20f",
@@ -54,7 +57,7 @@ pub fn divide(a: u32, b: u16) -> (u16, u16) {
             "com  {low:l}",
             "com  {low:h}",
             "rjmp 9f",
-            // A divisor of seven bits, as most machines' steps a millimetre are made of, and a rest of as many.
+            // A divisor of seven bits, usual for steps a millimetre: the remainder has seven bits, too.
             "30:",
             ".rept 4",
             "rol  {low:l}",
@@ -68,13 +71,13 @@ pub fn divide(a: u32, b: u16) -> (u16, u16) {
             "dec  {n}",
             "brne 30b",
             "rjmp 40b",
-            // A divisor of 16 bits: the shift may lose a bit of the rest.
+            // A divisor of 16 bits: the shift may lose a bit of the remainder.
             "4:",
             "cpi  {n}, 2",
             "brne 5f",
             "clr  {low:l}",
             "5:",
-            // Two bits in a turn: divisors are seldom so great.
+            // Two bits in each turn: such great divisors are rare.
             "lsl  {n}",
             "6:",
             ".rept 2",
@@ -106,8 +109,8 @@ pub fn divide(a: u32, b: u16) -> (u16, u16) {
     (low, rest)
 }
 
-/// `a / b` if the quotient fits 32 bits: `a >> 32 < b`. Else something, without a panic. Cost: 700, where the compiler calls a
-/// division of 64 bits for 4,500.
+/// Returns `a / b` if the quotient fits 32 bits: `a >> 32 < b`. Otherwise the result is arbitrary, without a panic.
+/// Cost: 700, where the compiler calls a division of 64 bits for 4,500.
 #[inline(never)]
 pub fn wide_quotient(a: u64, b: u32) -> u32 {
     let (mut low, mut low_upper) = (a as u16, (a >> 16) as u16);
@@ -124,7 +127,7 @@ pub fn wide_quotient(a: u64, b: u32) -> u32 {
             "rol  {rest:h}",
             "rol  {rest_upper:l}",
             "rol  {rest_upper:h}",
-            // With the bit that the shift lost the rest is above any divisor.
+            // If the shift lost a bit, the remainder is above any divisor.
             "brcs 2f",
             "cp   {rest:l}, {b:l}",
             "cpc  {rest:h}, {b:h}",
@@ -235,8 +238,8 @@ pub fn high_product(a: u8, b: u8) -> u8 {
 /// The square root, rounded down. Cost: 320.
 #[inline(always)]
 pub fn root(x: u32) -> u16 {
-    // A bit at a time, from the top: each is the greatest whose square with the bits before it still fits. What
-    // is left is doubled every time, so that all of it is done in 16 bits and the carry.
+    // Finds the root bit by bit, from the top: a bit is 1 if the square of the root with it still fits. The remainder
+    // is doubled every time, so that everything fits 16 bits and the carry.
     let mut high = (x >> 16) as u16;
     let mut low = x as u16;
     let root: u16;
@@ -249,7 +252,8 @@ pub fn root(x: u32) -> u16 {
             "ldi  {half:l}, 0",
             "clc",
             "rjmp 2f",
-            // Half of what was tried is what is tried next; the carry ends it before the last bit.
+            // Each turn tries half of the value before. When that bit falls into the carry, only the root's last bit
+            // is left.
             "1:",
             "lsl  {low:l}",
             "rol  {low:h}",
@@ -266,7 +270,7 @@ pub fn root(x: u32) -> u16 {
             "3:",
             "sub  {high:l}, {trial:l}",
             "sbc  {high:h}, {trial:h}",
-            // Twice `half` is the bit: with one `half` in the trial already.
+            // The bit of the root is twice `half`. The trial contains one `half` already, so one more is added.
             "movw {root:l}, {trial:l}",
             "add  {root:l}, {half:l}",
             "adc  {root:h}, {half:h}",
@@ -274,7 +278,8 @@ pub fn root(x: u32) -> u16 {
             "lsr  {half:h}",
             "ror  {half:l}",
             "brcc 1b",
-            // The last bit: its half is not in 16 bits, but the one after the rest.
+            // The last bit. Its half lies below the 16 bits, so the bit behind the remainder takes part in the
+            // comparison.
             "lsl  {low:l}",
             "rol  {low:h}",
             "rol  {high:l}",
@@ -298,14 +303,16 @@ pub fn root(x: u32) -> u16 {
     root
 }
 
-/// 2^23 over the square root of a number from 2^14 on, 0.006 % exact. Of a smaller one something. Cost: 80.
+/// Returns 2^23 over the square root of a number from 2^14 on, 0.006 % exact. For a smaller number the result is
+/// arbitrary. Cost: 80.
 #[inline(always)]
 pub fn inverse_root(x: u16) -> u16 {
     let root: u16;
     // SAFETY: arithmetic on its operands; r0 is scratch, and r1 is 0 again at the end.
     unsafe {
         core::arch::asm!(
-            // Of the upper byte, by a polynomial of the second degree: 338/128 - h (286/128 - 204/128 h), 2.9 % exact.
+            // First approximation, from the upper byte, by a polynomial of the second degree: 338/128 - h (286/128 -
+            // 204/128 h), 2.9 % exact.
             "ldi  {n}, 204",
             "mul  {x:h}, {n}",
             "ldi  {n}, 30",
@@ -316,7 +323,7 @@ pub fn inverse_root(x: u16) -> u16 {
             "ldi  {n}, 126",
             "mul  {x:h}, {n}",
             "sub  {first}, r1",
-            // Its square, and times the number: 1 in 2^-30.
+            // The square of that times the number, in units of 2^-30.
             "mul  {first}, {first}",
             "movw {square:l}, r0",
             "mul  {x:l}, {square:l}",
@@ -332,7 +339,7 @@ pub fn inverse_root(x: u16) -> u16 {
             "add  {n}, r0",
             "adc  {error:l}, r1",
             "adc  {error:h}, {more:h}",
-            // How far that is from 1, in 2^-16.
+            // How far that product is from 1, in units of 2^-16.
             ".rept 2",
             "lsl  {n}",
             "rol  {error:l}",
@@ -341,13 +348,13 @@ pub fn inverse_root(x: u16) -> u16 {
             "com  {error:h}",
             "neg  {error:l}",
             "sbci {error:h}, 255",
-            // And in 2^-11: e.
+            // The same difference in units of 2^-11: e.
             "movw {more:l}, {error:l}",
             ".rept 3",
             "lsl  {more:l}",
             "rol  {more:h}",
             ".endr",
-            // 1 / sqrt(1 - e) = 1 + e / 2 + e^2 (3 + 5/2 e) / 8: all but the first term, in 2^-16.
+            // 1 / sqrt(1 - e) = 1 + e / 2 + e^2 (3 + 5/2 e) / 8: all terms except the first, in units of 2^-16.
             "mov  {n}, {more:h}",
             "sbrc {n}, 7",
             "neg  {n}",
@@ -368,7 +375,7 @@ pub fn inverse_root(x: u16) -> u16 {
             "sec",
             "adc  {error:l}, r1",
             "adc  {error:h}, {more:h}",
-            // The first one and so much of it.
+            // The first approximation, plus that share of it.
             "mul  {error:l}, {first}",
             "mov  {more:l}, r1",
             "mov  {more:h}, {first}",
@@ -390,8 +397,9 @@ pub fn inverse_root(x: u16) -> u16 {
     root
 }
 
-/// How many pairs of a mark and a value come before the first whose mark has its highest bit set, or whose value is below `least`; all of
-/// them, at most 255, if there is none. Cost: 14 each, where the compiler's loop takes 25.
+/// Returns how many pairs of a mark and a value come before the first pair whose mark has its highest bit set or
+/// whose value is below `least`. If there is no such pair, returns the number of all pairs, at most 255. Cost: 14 for
+/// each pair, where the compiler's loop takes 25.
 #[inline(always)]
 pub fn passed_over(marks: &[u8], values: &[u16], least: u16) -> u8 {
     let count = marks.len().min(values.len()).min(255) as u8;
@@ -434,9 +442,9 @@ pub fn ratio(a: f32, b: f32) -> f32 {
     // SAFETY: arithmetic on its operands; r0 is scratch.
     unsafe {
         core::arch::asm!(
-            // Not 0: the quotient is left to the library. Operands are unchanged where it stays so.
+            // Not 0 if the quotient is left to the library. The operands are unchanged in that case.
             "ldi  {left}, 0x80",
-            // The exponents.
+            // Separates the exponents.
             "mov  {e}, {a_upper:h}",
             "mov  {q}, {a_upper:l}",
             "lsl  {q}",
@@ -445,7 +453,8 @@ pub fn ratio(a: f32, b: f32) -> f32 {
             "mov  {q}, {b_upper:l}",
             "lsl  {q}",
             "rol  {n}",
-            // Zeros, subnormal numbers, infinities and NaN, and quotients that may be such, are left to the library.
+            // Zeros, subnormal numbers, infinities and NaN, and quotients that may be one of these, are left to the
+            // library.
             "mov  {q}, {e}",
             "dec  {q}",
             "cpi  {q}, 254",
@@ -464,7 +473,7 @@ pub fn ratio(a: f32, b: f32) -> f32 {
             "dec  {q}",
             "cpi  {q}, 252",
             "brsh 8f",
-            // The sign; and mantissas, of which the first is made the greater.
+            // Computes the sign. Then makes the first mantissa the greater of the two.
             "eor  {b_upper:h}, {a_upper:h}",
             "or   {a_upper:l}, {left}",
             "or   {b_upper:l}, {left}",
@@ -481,7 +490,7 @@ pub fn ratio(a: f32, b: f32) -> f32 {
             "rol  {a:h}",
             "rol  {a_upper:l}",
             "2:",
-            // The first bit of the quotient is 1. The others, and one more to round by, make three bytes.
+            // The first bit of the quotient is 1. The other bits, and one more bit for rounding, make three bytes.
             "sub  {a:l}, {b:l}",
             "sbc  {a:h}, {b:h}",
             "sbc  {a_upper:l}, {b_upper:l}",
@@ -496,7 +505,7 @@ pub fn ratio(a: f32, b: f32) -> f32 {
             "lsl  {a:l}",
             "rol  {a:h}",
             "rol  {a_upper:l}",
-            // With the bit that the shift lost the rest is above any divisor.
+            // If the shift lost a bit, the remainder is above any divisor.
             "brcs 5f",
             "cp   {a:l}, {b:l}",
             "cpc  {a:h}, {b:h}",
@@ -513,7 +522,7 @@ pub fn ratio(a: f32, b: f32) -> f32 {
             "brne 4b",
             "dec  {n}",
             "brne 3b",
-            // Sign, exponent and mantissa; the last bit goes to the carry.
+            // Puts sign, exponent and mantissa together; the last bit goes to the carry.
             "lsl  {b_upper:h}",
             "ror  {e}",
             "ror  {a_upper:h}",
@@ -523,7 +532,7 @@ pub fn ratio(a: f32, b: f32) -> f32 {
             "mov  {a:h}, r0",
             "mov  {a_upper:l}, {a_upper:h}",
             "mov  {a_upper:h}, {e}",
-            // Rounded. A quotient never lies in the middle between two floats.
+            // Rounds. A quotient never lies in the middle between two floats.
             "adc  {a:l}, r1",
             "adc  {a:h}, r1",
             "adc  {a_upper:l}, r1",
@@ -545,14 +554,15 @@ pub fn ratio(a: f32, b: f32) -> f32 {
     if left != 0 { a / whole(b_low, b_upper) } else { a }
 }
 
-/// A number rounded down; one of 2^31 or more, or below 0, or a NaN, is 2^31. Cost: 120, where `as` takes 260.
+/// Returns a number rounded down. For 2^31 or more, for a number below 0 and for a NaN the result is 2^31. Cost: 120,
+/// where `as` takes 260.
 #[inline(never)]
 pub fn whole(x: f32) -> u32 {
     const END: u32 = 2_147_483_648.0f32.to_bits();
-    // Bits of negative numbers are above those of all others.
+    // As integers, the bits of negative numbers are above those of all positive numbers.
     if x.to_bits() >= END {
         return 1 << 31;
     }
-    // SAFETY: from 0 to below 2^31, as its bits tell; not a NaN.
+    // SAFETY: the comparison above leaves numbers from 0 to below 2^31, and no NaN.
     unsafe { x.to_int_unchecked() }
 }

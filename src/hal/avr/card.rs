@@ -1,6 +1,6 @@
 //! The SD card's lines: SPI, and the pin that selects it. Thread mode.
 //!
-//! While the card is selected nobody else speaks on SPI ([`is_free`]).
+//! While the card is selected nobody else uses SPI ([`is_free`]).
 
 use super::{gpio, spi};
 use crate::boards::ACTIVE;
@@ -20,7 +20,7 @@ pub fn select() {
     }
 }
 
-/// Lets it go, with a byte more in which it lets go of the line.
+/// Deselects the card, then sends one more byte, during which the card lets go of the line.
 #[small]
 pub fn release() {
     if let Some(pin) = ACTIVE.card {
@@ -30,23 +30,23 @@ pub fn release() {
     TAKEN.set(0);
 }
 
-/// Whether the lines are free for somebody else, who has to wait until the card is let go otherwise.
+/// Whether the lines are free for another device. If they are not, notes that it waits for them: see [`is_wanted`].
 pub(super) fn is_free() -> bool {
     WANTED.set(TAKEN.get());
     TAKEN.get() == 0
 }
 
-/// Whether somebody waits for the lines.
+/// Whether another device waits for the lines.
 pub fn is_wanted() -> bool {
     WANTED.get() != 0
 }
 
-/// 4 MHz, or 250 kHz, from the next time on that it is selected.
+/// Sets the clock from the next [`select`] on: 4 MHz if `fast`, else 250 kHz.
 pub fn set_fast(fast: bool) {
     FAST.set(fast.into());
 }
 
-/// Sends a byte; what came meanwhile.
+/// Sends a byte and returns the byte received meanwhile.
 #[small]
 pub fn exchange(byte: u8) -> u8 {
     spi::exchange(byte)

@@ -1,6 +1,6 @@
-//! Drivers that are told by UART: no board with this chip has them.
+//! Drivers that are set up by UART: no board with this chip has any.
 
 use crate::drivers::REGISTERS;
 
-/// Nobody is told.
+/// Does nothing.
 pub fn tell(_motor: u8, _values: &[u32; REGISTERS]) {}

@@ -1,14 +1,15 @@
-//! The handlers of edges: INT0 to INT7 and PCINT0 to PCINT2, each vector made from the same text.
+//! The handlers of edges, INT0 to INT7 and PCINT0 to PCINT2. Each vector is made from the same text.
 //!
 //! | handler of | does | cycles |
 //! |---|---|---|
-//! | a switch's pin | has someone look at all switches ([`inputs`]) | 20, interrupts off |
-//! | an encoder's pin, none set up | the same | 25, interrupts off |
-//! | an encoder's pin | takes the time of a pulse ([`encoder`](super::encoder)) | 106 at most, 119 with a second one of sync, interrupts off for 31 and 25 |
+//! | a switch's pin | starts a sample of all switches ([`inputs`]) | 20, interrupts off |
+//! | an encoder's pin while no encoder is set up | starts a sample of all switches | 25, interrupts off |
+//! | an encoder's pin | takes the time of a pulse ([`encoder`](super::encoder)) | at most 106, 119 with a second sync pin; interrupts off for 31 and 25 |
 //!
-//! A handler of an encoder's pin reads timer 5 first, 20 cycles after it has been entered. It masks both pins of the encoder and lets
-//! all other interrupts in but exec: it nests neither in itself nor in the other. An edge that comes
-//! meanwhile waits for its end. A pulse that is over before its handler reads the pin is none.
+//! A handler of an encoder's pin reads timer 5 first, 20 cycles after it has been entered. It masks the interrupts of
+//! both encoder pins, and lets in all other interrupts except exec. So it nests neither in itself nor in the other
+//! encoder handler. An edge that comes meanwhile waits for its end. A pulse that is over before its handler reads the
+//! pin does not count.
 
 use core::arch::asm;
 use core::mem::offset_of;
@@ -20,12 +21,13 @@ use super::inputs::{self, MASKS};
 use crate::boards::{ACTIVE, Encoder, Pin, inputs::COUNT};
 use crate::capability::Capability;
 
-/// INT0.
+/// Vector number of INT0.
 const FIRST: u8 = 1;
-/// PCINT0.
+/// Vector number of PCINT0.
 const FIRST_CHANGE: u8 = 9;
 
-/// The pin of the encoder that a vector is for, and its number: 0 index, 1 sync.
+/// Returns the encoder pin that a vector is for, and the number of its line: 0 index, 1 sync. `None` if the vector is
+/// for switches.
 const fn sensor(vector: u8) -> Option<(Pin, u8)> {
     match ACTIVE.encoder {
         Some(encoder) if Capability::Lathe.is_built_in() => {
@@ -49,7 +51,7 @@ const fn line(vector: u8) -> u8 {
     }
 }
 
-/// The address of its PIN register, and its bit.
+/// Returns the address of the PIN register of the vector's sensor, and its bit there.
 const fn place(vector: u8) -> (usize, u8) {
     match sensor(vector) {
         Some((pin, _)) => (pin.port.address() - 2, pin.bit),
@@ -57,7 +59,7 @@ const fn place(vector: u8) -> (usize, u8) {
     }
 }
 
-/// The bit of the second pin of sync in the port of the first; 8 without one.
+/// Returns the bit of the second sync pin, in the port of the first; 8 if there is none.
 const fn second(vector: u8) -> u8 {
     match (sensor(vector), ACTIVE.encoder) {
         (Some((_, 1)), Some(Encoder { second: Some(pin), .. })) => pin.bit,
@@ -65,7 +67,8 @@ const fn second(vector: u8) -> u8 {
     }
 }
 
-/// The pins that the vector watches in the port of its sensor. Others change without an interrupt, as a second pin of sync does.
+/// Returns the pins that the vector watches in the port of its sensor. Other pins change without an interrupt, for
+/// example a second sync pin.
 const fn watched(vector: u8) -> u8 {
     let Some((sensor, _)) = sensor(vector) else { return 0 };
     let mut bits = 1 << sensor.bit;
@@ -81,13 +84,13 @@ const fn watched(vector: u8) -> u8 {
     bits
 }
 
-/// Whether the vectors of the encoder are those of pin changes.
+/// Whether the vector is one of pin changes.
 const fn changes(vector: u8) -> bool {
     vector >= FIRST_CHANGE
 }
 
-/// The register that masks the sources of the vector, and what is in it while an encoder's handler runs: all else. An encoder's pins are
-/// both of one kind.
+/// Returns the register that masks the sources of the vector, its value while an encoder's handler runs, and its
+/// usual value. The handler masks both encoder pins, which are of one kind.
 const fn mask(vector: u8) -> (usize, u8, u8) {
     let (mut external, mut change) = (MASKS.0, 0b111);
     if let Some(encoder) = ACTIVE.encoder {
@@ -116,9 +119,10 @@ macro_rules! edges {
     ($($name:ident = $vector:literal;)+) => {$(
         #[unsafe(no_mangle)]
         extern "C" fn $name() -> ! {
-            // SAFETY: it restores every register it changes, T with the status, and returns by `reti`. With a sensor it is the only one to write the
-            // sensor's `Line`, but for `quiet`, which thread mode and exec set with interrupts off; the mask that it changes is
-            // written by handlers of sensors alone, which do not nest. `HOLD` is set and cleared by them alone.
+            // SAFETY: it restores every register it changes (T with the status), and returns by `reti`. A handler
+            // with a sensor is the only one to write the sensor's `Line`, except `quiet`, which thread mode and exec
+            // set with interrupts off. The mask that it changes is written by handlers of sensors only, which do not
+            // nest. Only they set and clear `HOLD`.
             unsafe {
                 asm!(
                     ".if {sensor} == 0",
@@ -136,9 +140,11 @@ macro_rules! edges {
                     "in   r25, 0x3F",
                     "ldi  r24, {masked}",
                     "sts  {mask}, r24",
-                    // TCNT5. Its high byte waits in a register of the timer, which nobody reads meanwhile.
+                    // TCNT5. Reading its low byte latches the high byte in a register of the timer, which nobody else
+                    // reads meanwhile.
                     "lds  r24, 0x124",
-                    // Whoever holds exec off already lets it in, too. In here that bit of the status is clear.
+                    // If an outer handler holds exec off, that one lets exec in again at its end. Bit 7 of the saved
+                    // status, which is clear in a handler, is set to note this.
                     "sbic {flags}, {hold}",
                     "ori  r25, 0x80",
                     "sbi  {flags}, {hold}",
@@ -150,7 +156,7 @@ macro_rules! edges {
                     "push r27",
                     "lds  r31, {pins}",
                     ".if {shared}",
-                    // Which pins of the port have changed: others may be switches.
+                    // Finds out which pins of the port have changed: others may be switches.
                     "lds  r27, {state} + {levels}",
                     "sts  {state} + {levels}, r31",
                     "eor  r27, r31",
@@ -164,7 +170,8 @@ macro_rules! edges {
                     "1:",
                     ".endif",
                     ".if {second} < 8",
-                    // With a second pin that one's level says whether the edge counts, and the pin's own which way.
+                    // With a second sync pin, the level of that pin says whether the edge counts, and the first pin's
+                    // own level says which way.
                     "clt",
                     "lds  r26, {state} + {in_use}",
                     "sbrs r26, 2",
@@ -175,7 +182,7 @@ macro_rules! edges {
                     "ori  r31, 1 << {bit}",
                     "3:",
                     ".endif",
-                    // How long ago the last edge was.
+                    // Computes how long ago the last edge was.
                     "lds  r26, {state} + {place} + {edge}",
                     "lds  r27, {state} + {place} + {edge} + 1",
                     "sts  {state} + {place} + {edge}, r24",
@@ -235,13 +242,13 @@ macro_rules! edges {
                     "pop  r25",
                     "pop  r24",
                     "reti",
-                    // No encoder: a switch.
+                    // No encoder is set up: the pin is a switch's.
                     "7:",
                     "ldi  r24, {run}",
                     "sts  {start}, r24",
                     "pop  r24",
                     "reti",
-                    // Exec has been asked for meanwhile.
+                    // Exec has been asked for meanwhile: pend it.
                     "8:",
                     "cbi  {flags}, {held}",
                     "ldi  r24, {pended}",
@@ -250,7 +257,7 @@ macro_rules! edges {
                     "pop  r25",
                     "pop  r24",
                     "reti",
-                    // Exec is held off still.
+                    // An outer handler still holds exec off.
                     "9:",
                     "andi r25, 0x7F",
                     "rjmp 6b",

@@ -1,5 +1,6 @@
-//! The EEPROM: 4,096 bytes, 3.4 ms to write one. Thread mode alone uses it, after start-up:
-//! the storage task writes the log, the parser the program behind it, a byte each in turn; whoever looks for something reads. A read waits for a write under way.
+//! The EEPROM: 4,096 bytes; writing one takes 3.4 ms. After start-up only thread mode uses it. The storage task
+//! writes the log, and the parser the program behind the log, one byte each in turn; any task may read. A read waits
+//! for a write that is under way.
 
 use core::arch::asm;
 
@@ -16,7 +17,7 @@ const WRITE: u8 = 1 << 1;
 pub struct Eeprom(());
 
 impl Eeprom {
-    /// Access from thread mode. One task at most is to write each part.
+    /// Returns access from thread mode. At most one task may write each part.
     pub fn take() -> Self {
         Self(())
     }
@@ -36,7 +37,7 @@ impl Memory for Eeprom {
     #[inline(always)]
     fn read_here(&self, at: u16) -> u8 {
         while self.is_busy() {}
-        // SAFETY: registers of the EEPROM, which thread mode alone touches; it is idle.
+        // SAFETY: these registers of the EEPROM are touched by thread mode only; the EEPROM is idle.
         unsafe {
             EEAR.write_volatile(at);
             EECR.write_volatile(READ);
@@ -51,8 +52,8 @@ impl Memory for Eeprom {
 
     fn write(&mut self, at: u16, byte: u8) {
         while self.is_busy() {}
-        // SAFETY: registers of the EEPROM, which thread mode alone touches; it is idle. The write has to be begun within
-        // four cycles: interrupts are off for 6.
+        // SAFETY: these registers of the EEPROM are touched by thread mode only; the EEPROM is idle. The write has to
+        // begin within four cycles of its enable, so interrupts are off for 6.
         unsafe {
             EEAR.write_volatile(at);
             EEDR.write_volatile(byte);

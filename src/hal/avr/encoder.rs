@@ -1,12 +1,15 @@
-//! The pulses of the spindle's sensors: timer 5 tells their time, the handlers in [`edges`](super::edges) take it.
+//! The pulses of the spindle's sensors. Timer 5 counts the time, and the handlers in [`edges`](super::edges) record
+//! it.
 //!
-//! Timer 5 counts 4 us ([`Pulses`]) and stands still unless an encoder is set up. It has no interrupt: who reads knows the time since it was
-//! read last, which is to be less than 262 ms. Owns [`SHARED`]. A pulse is the falling edge of a pin that has been still for `bounce` before;
-//! so a contact that bounces is one pulse, and neither its end nor noise right behind another edge is any. That
-//! time is 16 bits, too, so that whoever reads says of a pin which has been still for longer that it is `quiet`.
+//! Timer 5 counts in units of 4 us ([`Pulses`]) and stands still unless an encoder is set up. It has no interrupt:
+//! the reader of [`SHARED`], which this module owns, knows the time since its last read, which must be less than 262
+//! ms. A pulse is a falling edge of a pin that has not changed for `bounce` before. So a contact that bounces makes
+//! one pulse; the end of a pulse, and noise right after another edge, make none. Times of edges have 16 bits as well,
+//! so the reader marks a pin that has been still for longer than it bounces as `quiet`.
 //!
-//! With a second sensor of sync an edge counts while that one's pin is high: a falling one is a pulse, a rising one takes a pulse back. Both are at the same
-//! place of the mark, so that a spindle which swings about it counts nothing.
+//! With a second sync sensor an edge of the first one counts while the pin of the second one is high: a falling edge
+//! is a pulse, a rising one takes a pulse back. Both edges are at the same place of the mark, so a spindle that
+//! swings about that place counts nothing.
 //!
 //! Each read costs 300 cycles, interrupts off for 20 of them. RAM: 20 bytes.
 
@@ -24,44 +27,45 @@ const TCNT5: *const u16 = 0x124 as *const u16;
 /// A count each 64 cycles.
 const RUN: u8 = 0b011;
 
-/// What is known of a sensor. The assembly knows its layout.
+/// The state of one sensor. The assembly knows its layout.
 #[repr(C)]
 pub(super) struct Line {
-    /// When its pin has changed last.
+    /// When its pin changed last, in counts.
     pub edge: u16,
-    /// When its last pulse began.
+    /// When its last pulse began, in counts.
     pub at: u16,
-    /// The pulses on the line, modulo 2^16; with a second sensor less those of the way back.
+    /// The pulses on the line, modulo 2^16. With a second sync sensor, pulses of the way back are subtracted.
     pub count: u16,
-    /// Not 0: its pin has been still for so long that `edge` does not tell.
+    /// Not 0: the pin has been still for so long that `edge` may be ambiguous.
     pub quiet: u8,
 }
 
-/// What handlers and readers share.
+/// The state that handlers and readers share.
 #[repr(C)]
 pub(super) struct Shared {
     lines: [Line; 2],
-    /// The pulses of the sync sensor at the last one of the index.
+    /// The count of the sync sensor's pulses at the last pulse of the index.
     pub at_index: u16,
     /// How long a pin must have been still before a pulse, in counts.
     pub bounce: u16,
-    /// The port of each sensor as it was at the last change of a pin.
+    /// The port of each sensor, as read at the last change of a pin.
     pub levels: [u8; 2],
-    /// Bits: the sensors that are used.
+    /// The sensors that are used, as bits.
     pub in_use: u8,
 }
 
-/// Where the lines are.
+/// Offsets of the lines in [`Shared`].
 pub(super) const LINES: [usize; 2] = {
     let first = offset_of!(Shared, lines);
     [first, first + size_of::<Line>()]
 };
 
-/// See [`Shared`].
+/// Holds [`Shared`].
 #[repr(transparent)]
 pub(super) struct Place(UnsafeCell<Shared>);
 
-// SAFETY: handlers write it; who reads does so volatile, and again if it has changed meanwhile. The rest is set with interrupts off.
+// SAFETY: handlers write it; a reader reads it volatile, and again if it has changed meanwhile. The other fields are
+// set with interrupts off.
 unsafe impl Sync for Place {}
 
 const LINE: Line = Line { edge: 0, at: 0, count: 0, quiet: 1 };
@@ -74,7 +78,7 @@ pub(super) static SHARED: Place = Place(UnsafeCell::new(Shared {
     in_use: 0,
 }));
 
-/// Pull-ups. Before interrupts are on.
+/// Sets the pull-ups. Before interrupts are on.
 pub(super) fn start() {
     if let Some(encoder) = ACTIVE.encoder
         && Capability::Lathe.is_built_in()
@@ -87,12 +91,13 @@ pub(super) fn start() {
     }
 }
 
-/// The sensors `lines` are read from now on (bit 0 index, bit 1 sync, bit 2 the second one of sync), whose contacts bounce for so many counts. Thread mode.
+/// Sets which sensors are read from now on (bit 0 index, bit 1 sync, bit 2 the second sync sensor), and for how many
+/// counts their contacts bounce. Thread mode.
 #[inline(never)]
 #[small]
 pub fn set_up(lines: u8, bounce: u16) {
     let shared = SHARED.0.get();
-    // SAFETY: interrupts are off for each; the timer's register is this module's.
+    // SAFETY: interrupts are off for each write; the timer's register is this module's.
     mask(|| unsafe { (&raw mut (*shared).bounce).write_volatile(bounce) });
     mask(|| unsafe {
         (&raw mut (*shared).in_use).write_volatile(lines);
@@ -112,22 +117,22 @@ pub fn is_set_up() -> bool {
     unsafe { (&raw const (*SHARED.0.get()).in_use).read_volatile() != 0 }
 }
 
-/// The time now, counts.
+/// Returns the time now, in counts.
 fn now() -> u16 {
-    // SAFETY: the high byte waits in a register of this timer, which handlers use as well: they are off.
+    // SAFETY: the high byte is latched in a register of this timer, which handlers use as well; interrupts are off.
     mask(|| unsafe { TCNT5.read_volatile() })
 }
 
-/// What the sensors have seen so far. Thread mode and exec.
+/// Returns the pulses counted and timed so far. Thread mode and exec.
 #[inline(never)]
 #[small]
 pub fn read() -> Pulses {
     let shared = SHARED.0.get();
-    // SAFETY: a field that is read while a handler writes it is read again.
+    // SAFETY: a field that a handler writes during the read is read again.
     let field = |at: *const u16| unsafe { at.read_volatile() };
     let mut pulses = Pulses::NONE;
     loop {
-        // SAFETY: no reference is made, these are places.
+        // SAFETY: no reference is made, only pointers.
         let (index, sync, at_index) = unsafe {
             (
                 &raw mut (*shared).lines[0],
@@ -154,13 +159,13 @@ pub fn read() -> Pulses {
     }
 }
 
-/// Says of a pin that it is quiet, if it has been still for longer than it bounces. The time is read behind the edge: an edge later than the
-/// time would look like one of 262 ms ago.
+/// Marks a pin as quiet if it has been still for longer than it bounces. The time is read after the edge: an edge
+/// later than the time would look like one of 262 ms ago.
 ///
 /// # Safety
-/// It is one of the lines.
+/// `line` points to one of the lines of [`SHARED`].
 unsafe fn settle(line: *mut Line) {
-    // SAFETY: as in `read`; `edge` and `quiet` go together, so they are compared and set with interrupts off.
+    // SAFETY: as in `read`; `edge` and `quiet` belong together, so they are compared and set with interrupts off.
     unsafe {
         let edge = mask(|| (&raw const (*line).edge).read_volatile());
         let bounce = (&raw const (*SHARED.0.get()).bounce).read_volatile();

@@ -2,10 +2,11 @@
 
 use core::mem::MaybeUninit;
 
-/// Values up to this size, in bytes, are read byte by byte into registers; larger ones by a loop in half the code.
+/// Values up to this size, in bytes, are read byte by byte into registers. Larger ones are read by a loop, in half
+/// the code.
 const WORD: usize = 4;
 
-/// A copy of a value.
+/// Returns a copy of a value.
 ///
 /// # Safety
 /// `from` points to a value in program memory.
@@ -37,7 +38,7 @@ pub unsafe fn load<T: Copy>(from: *const T) -> T {
 /// Copies `count` bytes, 1 to 255, out of program memory.
 ///
 /// # Safety
-/// `from` points to program memory, `to` to memory, of at least as many bytes.
+/// `from` points to program memory, `to` to RAM, and both hold at least `count` bytes.
 #[inline(always)]
 pub unsafe fn copy(from: *const u8, to: *mut u8, count: u8) {
     // SAFETY: the caller's.

@@ -2,7 +2,7 @@
 //!
 //! Cost, cycles: `sqrtf` 490, `sinf` and `cosf` about 1,800, `atan2f` 3,000, `powf` 4,000. Thread mode and exec.
 
-// avr-libc's `double` is 32 bits wide, and most of its functions go by the name without the `f`.
+// avr-libc's `double` is 32 bits wide, and most of its functions have the name without the `f`.
 unsafe extern "C" {
     /// The square root.
     #[link_name = "sqrt"]
@@ -21,8 +21,8 @@ unsafe extern "C" {
     pub safe fn atan2f(y: f32, x: f32) -> f32;
 }
 
-/// Links avr-libc and libgcc. The image's own crate says so: there it puts these archives before `compiler_builtins`, whose float
-/// functions take five times as long.
+/// Links avr-libc and libgcc. The crate of the image has to use it: then the linker takes these archives before
+/// `compiler_builtins`, whose float functions take five times as long.
 #[macro_export]
 macro_rules! link_libraries {
     () => {

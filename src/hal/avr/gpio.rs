@@ -1,8 +1,8 @@
-//! Pins of the board, as constants: setting one is a single `sbi` or `cbi` on ports A to G, as long as
-//! its level is a constant too.
+//! Pins of the board, as constants. On ports A to G a pin is set by a single `sbi` or `cbi` if its level is a
+//! constant as well.
 //!
-//! Otherwise, and on ports H to L, it is a read-modify-write, so the pin must share its port with no pin
-//! that another level writes meanwhile. Enables see to that themselves.
+//! Otherwise, and on ports H to L, setting a pin is a read-modify-write. Its port must then have no pin that another
+//! level writes meanwhile. The functions for enables ensure that themselves.
 
 use crate::boards::outputs::{COUNTERCLOCKWISE, SPINDLE};
 use crate::boards::{ACTIVE, Handshake, Pin, each_motor};
@@ -24,7 +24,7 @@ pub fn low(pin: Pin) {
     unsafe { port.write_volatile(port.read_volatile() & !(1 << pin.bit)) };
 }
 
-/// Turns a pin round. One store on any port, which disturbs no other pin.
+/// Toggles a pin. One store on any port, which disturbs no other pin.
 #[inline(always)]
 pub fn toggle(pin: Pin) {
     let input = (pin.port.address() - 2) as *mut u8;
@@ -35,11 +35,12 @@ pub fn toggle(pin: Pin) {
 #[inline(always)]
 pub(super) fn output(pin: Pin) {
     let direction = (pin.port.address() - 1) as *mut u8;
-    // SAFETY: the data direction register lies one below the port register; thread mode alone writes it.
+    // SAFETY: the data direction register lies one below the port register; only thread mode writes it.
     unsafe { direction.write_volatile(direction.read_volatile() | 1 << pin.bit) };
 }
 
-/// Does the same for each item of a list of the board's, up to eight, as a constant: neither list nor loop are left.
+/// Repeats code for each item of a list of the board's, up to eight, with the item as a constant: neither the list
+/// nor a loop is left in the image.
 macro_rules! each {
     ($list:expr, $item:ident => $body:expr) => {
         each!($list, $item => $body; 0 1 2 3 4 5 6 7)
@@ -53,13 +54,14 @@ macro_rules! each {
 
 pub(super) use each;
 
-/// An item of a list.
+/// Returns item `i` of a list, `None` beyond its end.
 pub(super) const fn item<T: Copy>(list: &[T], i: usize) -> Option<T> {
     if i < list.len() { Some(list[i]) } else { None }
 }
 
-/// Makes outputs of the board's outputs: steps low, drivers off, hazards off, senders welcome, no bus driven.
-/// Of the spindle's enable it is not known yet which level is off: see [`set_low`].
+/// Makes the board's output pins outputs: steps low, drivers off, hazards off, senders not held back, no bus driven.
+/// The level that switches the spindle off is not known yet, so the pin of its enable is not driven before
+/// [`set_low`].
 pub fn start() {
     each_motor!(M => {
         low(ACTIVE.motors[M].step);
@@ -84,7 +86,7 @@ pub fn start() {
         if let Some(Handshake { rts, cts }) = serial.handshake {
             low(rts);
             output(rts);
-            // Pulled up: of a wire that is not there nothing is sent.
+            // Pulled up: without a cable nothing is sent.
             high(cts);
         }
         if let Some(driver) = serial.driver_enable {
@@ -100,17 +102,17 @@ pub fn start() {
     }
 }
 
-/// The motors whose drivers are wanted on, as bits.
+/// The motors whose drivers have been asked for, as bits.
 static WANTED: SharedByte = SharedByte::new(0);
 
-/// The motors whose drivers are on, as bits.
+/// Returns the motors whose drivers are on, as bits.
 #[inline(never)] // In a function built for size the board would be a table in RAM.
 pub fn powered() -> u8 {
     ACTIVE.powered(WANTED.get())
 }
 
-/// Switches the drivers of these motors (bits) on, and the others off as far as the board can: an
-/// enable that all drivers share is on for any of them. Exec, or while it cannot run.
+/// Switches the drivers of these motors (bits) on and the others off, as far as the board can: an enable that all
+/// drivers share is on as soon as one of them is wanted. Exec, or other levels while exec cannot run.
 pub fn power(motors: u8) {
     WANTED.set(motors);
     each_motor!(M => if let Some(enable) = ACTIVE.motors[M].enable {
@@ -121,11 +123,11 @@ pub fn power(motors: u8) {
     }
 }
 
-/// The outputs that are on when they are low, as bits.
+/// The outputs that are active low, as bits.
 static LOW: SharedByte = SharedByte::new(0);
 
-/// Switches the outputs of M3 to M9, bits of [`outputs`](crate::boards::outputs). The direction of a spindle that is
-/// off stays as it is. Exec, or while it cannot run.
+/// Switches the outputs of M3 to M9, bits of [`outputs`](crate::boards::outputs). While the spindle is off, its
+/// direction pin keeps its level. Exec, or other levels while exec cannot run.
 pub fn set_outputs(on: u8) {
     let high = on ^ LOW.get();
     macro_rules! each {
@@ -140,8 +142,8 @@ pub fn set_outputs(on: u8) {
     each!(1 0 2 3);
 }
 
-/// Which outputs are on when they are low. From the first time on the spindle's enable is driven. Thread mode, while
-/// exec cannot run.
+/// Sets which outputs are active low, and switches to the outputs `on`. The first call also begins to drive the
+/// enable of the spindle. Thread mode, while exec cannot run.
 pub fn set_low(outputs: u8, on: u8) {
     LOW.set(outputs);
     if let Some(direction) = ACTIVE.outputs[1] {
@@ -160,8 +162,8 @@ pub fn stop_spindle() {
     }
 }
 
-/// The compiler makes one read-modify-write of the two cases, and the port may be shared with pins of the
-/// step interrupt, which must not come in between: 8 cycles.
+/// Sets a pin to a level, with interrupts off for 8 cycles: the compiler makes one read-modify-write of the two
+/// cases, and the port may be shared with pins of the step interrupt, which must not come in between.
 #[inline(always)]
 pub(super) fn set(pin: Pin, level: bool) {
     avr_device::interrupt::free(|_| if level { high(pin) } else { low(pin) });

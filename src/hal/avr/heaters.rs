@@ -1,8 +1,8 @@
-//! Heaters and their sensors: the converter, and the pins.
+//! Heaters and their sensors: the analog-to-digital converter, and the pins.
 //!
-//! A reading is [`SAMPLES`] conversions of one channel, 104 us each, which the converter's interrupt adds up. It has the converter to itself:
-//! the next conversion is started when the one before has been added, so that it cannot come again soon, and it lets all other interrupts
-//! in. Nothing hangs on its time: exec may come in between.
+//! A reading is the sum of [`SAMPLES`] conversions of one channel, 104 us each, which the converter's interrupt adds
+//! up. A conversion is started only after the one before has been added, so the interrupt cannot come again soon, and
+//! it lets all other interrupts in. It is not time-critical: exec may come in between.
 //!
 //! | interrupt | does | cycles |
 //! |---|---|---|
@@ -10,8 +10,8 @@
 //!
 //! A reading each 20 ms is 0.6 % of the CPU. RAM: 3 bytes.
 //!
-//! What hangs at an output of timer 2 (D10 and D9) has pulses of that timer, 122 a second, up and down (mode 1): a power of 0 has no pulse,
-//! one of 255 no gap. Its interrupts are off.
+//! A pin at an output of timer 2 (D10 and D9) gets pulses from that timer, 122 a second, which counts up and down
+//! (mode 1). With power 0 there is no pulse, with 255 no gap. The interrupts of the timer are off.
 
 #[cfg(feature = "printer")]
 use core::arch::asm;
@@ -24,9 +24,9 @@ use crate::heat::sensor::SAMPLES;
 const ADCSRA: *mut u8 = 0x7A as *mut u8;
 const ADCSRB: *mut u8 = 0x7B as *mut u8;
 const ADMUX: *mut u8 = 0x7C as *mut u8;
-/// On, with a clock each 128 cycles; start, with an interrupt at the end.
+/// Switched on, a clock each 128 cycles; starts a conversion, with an interrupt at its end.
 const START: u8 = 1 << 7 | 1 << 6 | 1 << 3 | 0b111;
-/// Against the supply, as the sensors are.
+/// Reference is the supply, as for the sensors.
 const SUPPLY: u8 = 1 << 6;
 
 const TCCR2A: *mut u8 = 0xB0 as *mut u8;
@@ -39,7 +39,7 @@ const PACE: u8 = 0b110;
 /// Whether timer 2 drives anything.
 const HAS_PULSES: bool = cfg!(feature = "printer") && (PULSED[0] || PULSED[1] || PULSED[2]);
 
-/// What the interrupt adds up, and how many conversions are left.
+/// The sum that the interrupt adds up, and the number of conversions that are left.
 #[repr(C)]
 struct Sum {
     sum: u16,
@@ -63,8 +63,8 @@ const _: () = assert!(
 #[cfg(feature = "printer")]
 #[unsafe(no_mangle)]
 extern "C" fn __vector_29() -> ! {
-    // SAFETY: it restores every register it changes, and returns by `reti`. Nobody else touches the sum while conversions are left; it does
-    // not nest, for the next conversion is started with interrupts off.
+    // SAFETY: it restores every register it changes, and returns by `reti`. Nobody else touches the sum while
+    // conversions are left. It does not nest, because the next conversion is started with interrupts off.
     unsafe {
         asm!(
             "push r24",
@@ -102,7 +102,8 @@ extern "C" fn __vector_29() -> ! {
     }
 }
 
-/// Begins a reading of a heater's sensor. One that is under way goes on instead. Thread mode.
+/// Begins a reading of a heater's sensor. If a reading is already under way, that one goes on and none begins. Thread
+/// mode.
 #[small]
 pub fn begin(heater: u8) {
     let Some(Heaters { heaters: [hot_end, bed], .. }) = ACTIVE.heaters else { return };
@@ -121,7 +122,7 @@ pub fn begin(heater: u8) {
     }
 }
 
-/// The reading that has been begun last, if it is complete. Thread mode.
+/// Returns the reading that was begun last; `None` until it is complete. Thread mode.
 #[small]
 pub fn reading() -> Option<u16> {
     let sum = SUM.0.get();
@@ -132,14 +133,15 @@ pub fn reading() -> Option<u16> {
     }
 }
 
-/// What a heater's MAX6675 sends, if the board has one and no card is spoken to: see [`sensor`](crate::heat::sensor). It begins to convert then. Thread mode. Cost: 500 cycles.
+/// Reads the word of a heater's MAX6675, which then begins a conversion: see [`sensor`](crate::heat::sensor). `None`
+/// if the board has none, or while the SD card is selected. Thread mode. Cost: 500 cycles.
 #[small]
 pub fn word(heater: u8) -> Option<u16> {
     let Heaters { heaters: [hot_end, bed], .. } = ACTIVE.heaters?;
     if !super::card::is_free() {
         return None;
     }
-    // Each with its pin as a constant.
+    // Each call has its pin as a constant.
     match heater {
         0 => hot_end.select.map(ask),
         _ => bed.select.map(ask),
@@ -151,13 +153,14 @@ fn ask(select: Pin) -> u16 {
     exchange(select.port.address() as u16, 1 << select.bit)
 }
 
-/// Reads two bytes while one bit of a port is low.
+/// Exchanges two bytes over SPI while one bit of a port is low, and returns those received.
 #[inline(never)]
 #[small]
 fn exchange(port: u16, bit: u8) -> u16 {
     let port = usize::from(port) as *mut u8;
     spi::set_clock(spi::Clock::Mhz1);
-    // SAFETY: the output port of a pin of the board; other levels write it with interrupts off or by single instructions.
+    // SAFETY: this is the output port of a pin of the board. Other levels write it with interrupts off or by single
+    // instructions.
     avr_device::interrupt::free(|_| unsafe { port.write_volatile(port.read_volatile() & !bit) });
     let word = u16::from_be_bytes([spi::exchange(0), spi::exchange(0)]);
     // SAFETY: as above.
@@ -165,7 +168,7 @@ fn exchange(port: u16, bit: u8) -> u16 {
     word
 }
 
-/// Makes outputs of what selects sensors, and has timer 2 run. Start-up.
+/// Makes the select pins of sensors outputs, and starts timer 2. Start-up.
 pub fn start() {
     let Some(Heaters { heaters: [hot_end, bed], .. }) = ACTIVE.heaters else { return };
     for select in [hot_end.select, bed.select].into_iter().flatten() {
@@ -181,7 +184,8 @@ pub fn start() {
     }
 }
 
-/// Gives the hot end, the bed and the fan their power, 255 for all: pulses where [`PULSED`] says so, elsewhere on or, with 0, off. Thread mode.
+/// Sets the power of the hot end, the bed and the fan; 255 is full power. Outputs that [`PULSED`] names have pulses;
+/// the others are off at 0, else on. Thread mode.
 pub fn drive(power: [u8; 3]) {
     let Some(heaters) = ACTIVE.heaters else { return };
     let [hot_end, bed] = heaters.heaters;
@@ -191,14 +195,16 @@ pub fn drive(power: [u8; 3]) {
     drive_pin(heaters.fan, of_fan);
 }
 
-/// The timer drives its pin while it is connected to it. The port's bit stays low, so that the pin is low whenever it is not.
+/// Sets the power of a pin. The timer drives the pin while it is connected to it. The port's bit stays low, so the
+/// pin is low while it is not connected.
 #[inline(always)]
 fn drive_pin(pin: Pin, power: u8) {
     let Some(channel) = pin.channel().filter(|_| HAS_PULSES) else {
         return gpio::set(pin, power != 0);
     };
     let connected = 1 << (7 - 2 * channel);
-    // SAFETY: the registers of the timer are this module's; what stops it for good, with interrupts off, does not come back.
+    // SAFETY: the registers of the timer are this module's; code that stops the timer for good, with interrupts off,
+    // does not come back.
     unsafe {
         OCR2[usize::from(channel)].write_volatile(power);
         let others = TCCR2A.read_volatile() & !connected;
@@ -206,7 +212,7 @@ fn drive_pin(pin: Pin, power: u8) {
     }
 }
 
-/// Disconnects the pins of heaters, which are low from then on. For the panic handler.
+/// Disconnects the pins of heaters from the timer; they are low from then on. For the panic handler.
 #[small]
 pub fn kill() {
     if HAS_PULSES {

@@ -2,16 +2,18 @@
 //!
 //! | interrupt | does | cycles |
 //! |---|---|---|
-//! | INT0 to INT7, PCINT0 to PCINT2 (`edges`) | starts the timer of the samples: someone has to look | 20, interrupts off |
-//! | TIMER2_COMPA, of printers TIMER3_COMPA | looks at all pins, as [`Switches`] wants it | 300, interrupts off for 26 and 26 |
+//! | INT0 to INT7, PCINT0 to PCINT2 (`edges`) | starts the timer of the samples, because a switch may have moved | 20, interrupts off |
+//! | TIMER2_COMPA, of printers TIMER3_COMPA | takes a sample of all pins, when [`Switches`] asks for one | 300, interrupts off for 26 and 26 |
 //!
-//! The timer is timer 2, in an image that can print timer 3: timer 2 makes pulses for heaters then ([`heaters`](super::heaters)).
+//! The timer is timer 2; in an image that can print it is timer 3, because timer 2 then makes the pulses of heaters
+//! ([`heaters`](super::heaters)).
 //!
-//! While no switch moves none of them comes. The sampling interrupt lets all interrupts in but itself and exec, which would run
-//! far too long inside it. Where a limit is hit it stops the steps right there: 20 us after the edge and its own
-//! 300 cycles, for which it competes with the step interrupt. That is 50 us in all at 50,000 steps a second, and
-//! 120 at 85,000, which leave it a sixth of the CPU. The place of a probe's contact is that at the
-//! first of two samples, 20 us behind its edge at 10,000: a fifth of a step.
+//! While no switch moves none of these interrupts comes. The sampling interrupt lets in all interrupts except itself
+//! and exec, which would run far too long inside it. When a limit is hit, this interrupt itself stops the steps: 20
+//! us after the edge and its own 300 cycles, for which it competes with the step interrupt. In all that is 50 us at
+//! 50,000 steps a second, and 120 us at 85,000, where the step interrupt leaves it a sixth of the CPU. The place of a
+//! probe's contact is the place at the first of two samples, 20 us after the edge at 10,000 steps a second: a fifth
+//! of a step.
 
 use core::arch::asm;
 use core::cell::UnsafeCell;
@@ -40,7 +42,7 @@ const EICRB: *mut u8 = 0x6A as *mut u8;
 const EIMSK: *mut u8 = 0x3D as *mut u8;
 const PCICR: *mut u8 = 0x68 as *mut u8;
 const PCMSK: [*mut u8; 3] = [0x6B as *mut u8, 0x6C as *mut u8, 0x6D as *mut u8];
-/// Timer 2 has 8 bits, timer 3 has 16; what is written to a count fits 8.
+/// Timer 2 has 8 bits, timer 3 has 16. All values that are written to a count fit 8 bits.
 #[cfg(not(feature = "printer"))]
 mod timer {
     pub const CONTROL_A: *mut u8 = 0xB0 as *mut u8;
@@ -48,7 +50,7 @@ mod timer {
     pub const COUNT: *mut u8 = 0xB2 as *mut u8;
     pub const COMPARE: *mut u8 = 0xB3 as *mut u8;
     pub const MASK: usize = 0x70;
-    /// Clear on compare match, in each of the two; a count each 8 cycles.
+    /// Clear on compare match, which the two timers select in different registers; a count each 8 cycles.
     pub const CTC: u8 = 1 << 1;
     pub const RUN: u8 = 1 << 1;
 }
@@ -59,24 +61,24 @@ mod timer {
     pub const COUNT: *mut u16 = 0x94 as *mut u16;
     pub const COMPARE: *mut u16 = 0x98 as *mut u16;
     pub const MASK: usize = 0x71;
-    /// See the other.
+    /// See the module above, for timer 2.
     pub const CTC: u8 = 0;
     pub const RUN: u8 = 1 << 3 | 1 << 1;
 }
 use timer::{COMPARE, CONTROL_A, CONTROL_B, COUNT, CTC, MASK, RUN};
 
-/// What starts the timer: the address, and the value.
+/// What starts the timer: the address of a register, and the value to write.
 pub(super) const START: usize = if cfg!(feature = "printer") { 0x91 } else { 0xB1 };
 pub(super) const STARTED: u8 = RUN;
-/// The interrupt at the compare value.
+/// Enables the interrupt at the compare value.
 const OCIE: u8 = 1 << 1;
 
-/// The last count of a period of `us` microseconds.
+/// Returns the last count of a period of `us` microseconds.
 const fn top(us: u32) -> u8 {
     (us * (ACTIVE.clock_hz / 1_000_000) / 8 - 1) as u8
 }
 
-/// The interrupts to enable: EIMSK, and the PCMSKs.
+/// The interrupts to enable: the values of EIMSK and of the PCMSK registers.
 pub(super) const MASKS: (u8, [u8; 3]) = {
     let (mut external, mut change) = (0, [0; 3]);
     let mut i = 0;
@@ -99,7 +101,7 @@ pub(super) const MASKS: (u8, [u8; 3]) = {
     (external, change)
 };
 
-/// Does the same for each input of the board, with its pin as a constant.
+/// Repeats code for each input of the board, with its pin as a constant.
 macro_rules! each_input {
     ($i:ident, $pin:ident => $body:expr) => {
         each_input!(@ $i, $pin, $body, 0 1 2 3 4 5 6 7 8 9 10)
@@ -113,16 +115,16 @@ macro_rules! each_input {
     )+};
 }
 
-/// What sampling knows and is told.
+/// The state of the sampling interrupt, and what thread mode tells it.
 struct State {
     switches: Switches,
     /// Inputs that are read, as bits. The pins of the others belong to an encoder.
     used: u16,
-    /// Inputs that are active when low.
+    /// Inputs that are active low.
     low: u16,
     /// Inputs that stop the steps.
     stops: u16,
-    /// Inputs that have stopped the steps since they were asked for last.
+    /// Inputs that have stopped the steps since [`take_hits`] took them last.
     hits: u16,
     /// `stops` without the ends that are ignored for now.
     live: u16,
@@ -130,12 +132,12 @@ struct State {
     /// Inputs that end a move, and in `awaited` the state of each that ends it.
     armed: u16,
     awaited: u16,
-    /// The next sample is to believe what it finds.
+    /// The next sample is adopted without being filtered.
     fresh: bool,
 }
 
 impl State {
-    /// The inputs that look worked.
+    /// Returns the inputs that look active now.
     #[inline(always)]
     fn found(&self) -> u16 {
         (levels() ^ self.low) & self.used
@@ -144,7 +146,8 @@ impl State {
 
 struct Shared(UnsafeCell<State>);
 
-// SAFETY: the sampling interrupt, which does not nest, and thread mode with interrupts off, see `with`.
+// SAFETY: only two use it: the sampling interrupt, which does not nest, and thread mode with interrupts off, see
+// `with`.
 unsafe impl Sync for Shared {}
 
 static STATE: Shared = Shared(UnsafeCell::new(State {
@@ -160,18 +163,18 @@ static STATE: Shared = Shared(UnsafeCell::new(State {
     fresh: true,
 }));
 
-/// Thread mode's way to the state: a few cycles each.
+/// Gives thread mode access to the state. Each access takes a few cycles, with interrupts off.
 fn with<R>(what: impl FnOnce(&mut State) -> R) -> R {
-    // SAFETY: interrupts are off, and no look is under way in thread mode.
+    // SAFETY: interrupts are off, and no sample is under way while thread mode runs.
     avr_device::interrupt::free(|_| what(unsafe { &mut *STATE.0.get() }))
 }
 
-/// Sets pins and interrupts up. Before interrupts are on.
+/// Sets up the pins and the interrupts. Before interrupts are on.
 pub fn start() {
     each_input!(I, pin => super::gpio::high(pin));
     super::encoder::start();
     let (external, change) = MASKS;
-    // SAFETY: start-up; these registers are nobody else's.
+    // SAFETY: start-up; nobody else uses these registers.
     unsafe {
         // Any edge of any INT.
         EICRA.write_volatile(0b0101_0101);
@@ -188,37 +191,37 @@ pub fn start() {
     }
 }
 
-/// Which inputs are worked when low, and which of them stop the steps. Thread mode.
+/// Sets which inputs are active low, and which inputs stop the steps. Thread mode.
 pub fn set_up(low: u16, stops: u16) {
     with(|state| {
         state.stops = stops;
         state.live = stops & !u16::from(state.spared);
     });
-    // In two pieces: a step waits for 31 cycles at most.
+    // In two pieces, so that a step waits for 31 cycles at most.
     with(|state| {
         if state.low != low {
             (state.low, state.fresh) = (low, true);
-            // SAFETY: starts a sample; one that is due does it all the same.
+            // SAFETY: starts a sample; if one is due already, it serves as well.
             unsafe { CONTROL_B.write_volatile(RUN) };
         }
     });
 }
 
-/// The pins of these inputs are an encoder's from now on. Thread mode.
+/// Leaves the pins of these inputs to an encoder from now on. Thread mode.
 pub(super) fn leave_out(inputs: u16) {
     with(|state| {
         (state.used, state.fresh) = (!inputs, true);
-        // SAFETY: starts a sample; one that is due does it all the same.
+        // SAFETY: starts a sample; if one is due already, it serves as well.
         unsafe { CONTROL_B.write_volatile(RUN) };
     });
 }
 
-/// The inputs that are not read because an encoder has their pins. Thread mode.
+/// Returns the inputs that are not read because an encoder uses their pins. Thread mode.
 pub fn left_out() -> u16 {
     with(|state| !state.used)
 }
 
-/// These ends are no limits for now. Thread mode.
+/// Sets the ends of axes that are not limits for now. Thread mode.
 pub fn spare(ends: u8) {
     with(|state| {
         state.spared = ends;
@@ -226,26 +229,26 @@ pub fn spare(ends: u8) {
     });
 }
 
-/// Has the first of the inputs `armed` that comes to be as in `awaited` end the move
-/// ([`contact`](crate::dda::contact)); none if `armed` is 0. Thread mode.
+/// Arms the end of a move: the first input of `armed` whose state becomes that in `awaited` ends the move
+/// ([`contact`](crate::dda::contact)). 0 disarms. Thread mode.
 pub fn arm(armed: u16, awaited: u16) {
     with(|state| (state.armed, state.awaited) = (armed, awaited));
 }
 
-/// The inputs that are worked. Thread mode.
+/// Returns the inputs that are active. Thread mode.
 pub fn worked() -> u16 {
     with(|state| state.switches.worked())
 }
 
-/// What has stopped the steps since the last call. Thread mode.
+/// Takes the inputs that have stopped the steps since the last call. Thread mode.
 pub fn take_hits() -> u16 {
     with(|state| core::mem::take(&mut state.hits))
 }
 
-/// The inputs whose pins are high.
+/// Returns the inputs whose pins are high.
 #[inline(never)]
 fn levels() -> u16 {
-    // In bytes, for shifts of words are long.
+    // In bytes, because shifts of words take long.
     let mut bytes = [0; 2];
     each_input!(I, pin => {
         let register = (pin.port.address() - 2) as *const u8;
@@ -257,16 +260,18 @@ fn levels() -> u16 {
     u16::from_le_bytes(bytes)
 }
 
-/// Waits until [`SOON_US`] after the interrupt was due. A sample so soon is not worth another interrupt.
+/// Waits until [`SOON_US`] after the interrupt was due. The second sample comes so soon that another interrupt is not
+/// worth it.
 fn wait() {
-    // SAFETY: the timer is this interrupt's; it counts from 0 since it was due.
+    // SAFETY: the timer belongs to this interrupt; it has counted from 0 since the interrupt was due.
     unsafe {
         COMPARE.write_volatile(u8::MAX.into());
         while COUNT.read_volatile() < top(SOON_US).into() {}
     }
 }
 
-/// There may be a contact. Out of line: what it needs of registers and stack, a limit has no time to put away.
+/// Records a possible contact. Out of line: its registers would have to be saved on every sample, and a limit has no
+/// time for that.
 #[cold]
 #[inline(never)]
 fn mark() {
@@ -274,7 +279,7 @@ fn mark() {
     contact::mark(&dda, tail);
 }
 
-/// A sample, or two.
+/// Takes a sample, and a second one if something has changed.
 extern "C" fn sample() {
     // SAFETY: the sampling interrupt, which does not nest, runs this alone.
     let state = unsafe { &mut *STATE.0.get() };
@@ -285,13 +290,13 @@ extern "C" fn sample() {
     }
     if state.switches.is_news(now) {
         state.switches.note(now);
-        // As near to the edge as may be: the rest takes long where the step interrupt does.
+        // As near to the edge as possible: the rest takes long while the step interrupt is busy.
         if state.armed != 0 {
             mark();
         }
         wait();
         now = state.found();
-        // Before anything else: each cycle counts, and only two in five are ours.
+        // Before anything else: each cycle counts, and the step interrupt leaves only two cycles in five.
         if state.switches.changed(now) & now & state.live != 0 {
             stepper::stop();
         }
@@ -310,7 +315,7 @@ extern "C" fn sample() {
         flags::set(Event::Realtime);
     }
     plan(next);
-    // An edge before the timer stood still has started nothing.
+    // An edge that came before the timer was stopped has not started it.
     if next == Next::Edge && state.found() != now {
         // SAFETY: starts a sample.
         unsafe { CONTROL_B.write_volatile(RUN) };
@@ -319,12 +324,12 @@ extern "C" fn sample() {
 
 /// Sets the timer for the next sample.
 fn plan(next: Next) {
-    // SAFETY: these registers belong to the sampling interrupt, but for starts.
+    // SAFETY: these registers belong to the sampling interrupt; other code only starts the timer.
     unsafe {
         if next == Next::Edge {
             CONTROL_B.write_volatile(0);
         }
-        // In this order: a count that is past its top already would go all the way round.
+        // In this order, compare value before count: a count that is past its top already would go all the way round.
         let top = match next {
             Next::Edge => top(FIRST_US),
             Next::Soon => top(SOON_US),
@@ -339,9 +344,9 @@ fn plan(next: Next) {
 #[cfg_attr(not(feature = "printer"), unsafe(export_name = "__vector_13"))]
 #[cfg_attr(feature = "printer", unsafe(export_name = "__vector_32"))]
 extern "C" fn look_is_due() -> ! {
-    // SAFETY: it restores what it changes and what a called function may change, and returns by
-    // `reti`. Its own source is off, so it does not nest. What it does to `CLOSED` is what `exec::lock`
-    // does, and nothing where that is closed already.
+    // SAFETY: it restores what it changes and what a called function may change, and returns by `reti`. Its own
+    // source is off, so it does not nest. It changes `CLOSED` as `exec::lock` does, and leaves it closed if it was
+    // closed already.
     unsafe {
         asm!(
             "push r24",
@@ -382,8 +387,8 @@ extern "C" fn look_is_due() -> ! {
             "pop  r1",
             "pop  r0",
             "pop  r25",
-            // Lets exec in again if it was not closed before. Not before samples may come again: it
-            // runs for milliseconds.
+            // Lets exec in again if it was let in before. Only after samples may come again, because exec runs for
+            // milliseconds.
             "ldi  r24, {unmask}",
             "tst  r25",
             "brne 1f",
@@ -402,7 +407,7 @@ extern "C" fn look_is_due() -> ! {
             "pop  r25",
             "pop  r24",
             "reti",
-            // As it was: the tick counts it up while exec runs.
+            // Restores the value: the tick counts `CLOSED` up while exec runs.
             "1:",
             "cli",
             "sts  {mask}, r24",

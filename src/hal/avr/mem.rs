@@ -1,16 +1,16 @@
-//! `memcpy` and `memset`, which the compiler calls for each struct of more than a few bytes: eight bytes
-//! at a time, half the cycles of avr-libc's, byte by byte.
+//! `memcpy` and `memset`, which the compiler calls for each struct of more than a few bytes. They move eight bytes at
+//! a time, in half the cycles of the functions of avr-libc, which move byte by byte.
 //!
-//! Called from any level. Cost: 20 cycles, and 4.6 for each byte to copy, 2.6 for each to fill. No units;
-//! nothing can fail. The C calling convention: where to in r25:24, which is also the result; where from in
-//! r23:22, or the byte to fill with in r22; how many in r21:20. r0, r18 to r27, r30 and r31 may change.
+//! Called from any level. Cost: 20 cycles, and 4.6 for each byte to copy, 2.6 for each byte to fill. They cannot
+//! fail. The C calling convention: r25:24 is the destination, and also the result; r23:22 is the source, or r22 the
+//! byte to fill with; r21:20 is the number of bytes. r0, r18 to r27, r30 and r31 may change.
 
 use core::arch::asm;
 
-/// C's own, though for Rust it looks otherwise: its arguments are the business of the assembly.
+/// `memcpy` of the C library. To Rust it has no arguments; the assembly takes them by the C calling convention.
 #[unsafe(no_mangle)]
 extern "C" fn memcpy() -> ! {
-    // SAFETY: copies what the caller asks for, changes no register but those above, and returns.
+    // SAFETY: copies what the caller asks for, changes no register except those listed above, and returns.
     unsafe {
         asm!(
             "movw r30, r22",
@@ -25,7 +25,7 @@ extern "C" fn memcpy() -> ! {
             "subi r20, 8",
             "sbci r21, 0",
             "brcc 1b",
-            // Less than eight are left, and the lower three bits still say how many.
+            // Less than eight bytes are left, and the lower three bits of the count still say how many.
             "sbrs r20, 2",
             "rjmp 3f",
             ".rept 4",
@@ -50,10 +50,10 @@ extern "C" fn memcpy() -> ! {
     }
 }
 
-/// `memset` of the C library, by its calling convention.
+/// `memset` of the C library, by the C calling convention.
 #[unsafe(no_mangle)]
 extern "C" fn memset() -> ! {
-    // SAFETY: fills what the caller asks for, changes no register but those above, and returns.
+    // SAFETY: fills what the caller asks for, changes no register except those listed above, and returns.
     unsafe {
         asm!(
             "movw r26, r24",

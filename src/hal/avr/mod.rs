@@ -5,7 +5,7 @@
 //! | TIMER1_COMPA | `step_isr` | 0 | one tick of the step generator |
 //! | USART0_RX, USART0_UDRE | `uart` | 1 | bytes between the line and the rings |
 //! | TIMER0_COMPA | [`avr_embassy::time`] | 1 | counts milliseconds |
-//! | INT, PCINT, TIMER2_COMPA or TIMER3_COMPA | `edges`, `inputs` | 1 | looks at the switches when one moves |
+//! | INT, PCINT, TIMER2_COMPA or TIMER3_COMPA | `edges`, `inputs` | 1 | samples the switches when one moves |
 //! | INT, PCINT of the encoder's pins | `edges`, `encoder` | 1 | takes the time of a pulse |
 //! | ADC | `heaters` | 1 | adds up a reading of a temperature |
 //! | WDT | `watchdog` | 0 | resets a machine that has got stuck |
@@ -56,18 +56,19 @@ pub mod text_functions {
     pub use super::text::copy_printing;
 }
 
-/// Starts the firmware anew, as if the reset button had been pressed: by the watchdog, in 15 ms.
+/// Restarts the firmware, as if the reset button had been pressed: the watchdog resets the chip in 15 ms.
 pub fn reset() -> ! {
     avr_device::interrupt::disable();
     stepper::kill();
     watchdog::reset(Mark::ASKED)
 }
 
-/// Starts the boot loader, if the board has one; else starts the firmware anew.
+/// Starts the boot loader, if the board has one; else restarts the firmware.
 ///
-/// A jump, not a reset: loaders of common boards pass a reset by the watchdog on to the firmware at once. They find
-/// the chip as after a reset by the button as far as they look: no cause of reset noted, interrupts off, the timers
-/// still. Outputs are off as after a panic. The loader is where the fuses of these boards have it, in the last 8 KiB.
+/// This is a jump, not a reset: after a reset by the watchdog the loaders of common boards start the firmware at
+/// once. In all that a loader looks at, it finds the chip as after a reset by the button: no cause of reset noted,
+/// interrupts off, timers stopped. Outputs are off as after a panic. The loader lies where the fuses of these boards
+/// put it, in the last 8 KiB.
 pub fn boot() -> ! {
     avr_device::interrupt::disable();
     if !has_boot_loader() {
@@ -75,7 +76,7 @@ pub fn boot() -> ! {
     }
     panic::make_safe();
     watchdog::off();
-    // SAFETY: nothing of the firmware runs after this; the loader makes a stack of its own.
+    // SAFETY: nothing of the firmware runs after this; the loader sets up its own stack.
     unsafe {
         uart::stop();
         core::arch::asm!(
@@ -90,10 +91,10 @@ pub fn boot() -> ! {
     }
 }
 
-/// Whether the boot section, from 0x3E000 on, holds anything.
+/// Whether the boot section, from 0x3E000 on, holds a program.
 fn has_boot_loader() -> bool {
     let (low, high): (u8, u8);
-    // SAFETY: reads two bytes of flash. RAMPZ is nobody's else: interrupts are off.
+    // SAFETY: reads two bytes of flash. Nobody else uses RAMPZ meanwhile: interrupts are off.
     unsafe {
         core::arch::asm!(
             "ldi  r24, 3",

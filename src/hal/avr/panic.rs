@@ -1,10 +1,10 @@
-//! The last resort. No panic is meant to be reachable after start-up; should one be, motion and
-//! outputs stop and the machine stays still until it is reset.
+//! The last resort. No panic is meant to be reachable after start-up. If one happens all the same, motion and outputs
+//! stop and the machine stays still until it is reset.
 
 use super::gpio::{self, each};
 use crate::boards::ACTIVE;
 
-/// Stops the step timer, switches drivers and hazardous outputs off, and stays.
+/// Stops the step timer, switches drivers and hazardous outputs off, and never returns.
 pub fn halt() -> ! {
     avr_device::interrupt::disable();
     make_safe();
@@ -14,7 +14,7 @@ pub fn halt() -> ! {
     }
 }
 
-/// Stops the step timer, switches drivers and hazardous outputs off. Interrupts are off.
+/// Stops the step timer, and switches drivers and hazardous outputs off. Interrupts are off.
 pub fn make_safe() {
     super::stepper::kill();
     super::pwm::kill();

@@ -1,23 +1,23 @@
 //! The spindle's pulse-width output: a 16-bit timer that counts up and down, and its pin.
 //!
-//! Phase and frequency correct (mode 8): the pin is high while the count is below the compare value, so that a share
-//! of nothing and one of all are without pulses, and a new value counts from the next period on. The timer has no
-//! interrupt. Exec, or thread mode while exec cannot run. On a board without one nothing happens.
+//! Phase and frequency correct (mode 8): the pin is high while the count is below the compare value. So a share of 0
+//! and a full share have no pulses, and a new value takes effect with the next period. The timer has no interrupt.
+//! Exec, or thread mode while exec cannot run. On a board without a PWM output nothing happens.
 
 use crate::boards::{ACTIVE, Pwm};
 use crate::spindle::{WHOLE, divide};
 
-/// Registers behind the timer's first.
+/// Offsets of registers from the timer's first.
 const CONTROL_B: usize = 1;
 const COUNT: usize = 4;
 const TOP: usize = 6;
 const COMPARE: usize = 8;
-/// Mode 8, in the second register.
+/// Bits of mode 8, in the second control register.
 const MODE: u8 = 1 << 4;
 
 #[small]
 impl Pwm {
-    /// What connects the pin: clear it on the way up, set it on the way down.
+    /// Returns the bits that connect the pin: clear it on the way up, set it on the way down.
     const fn connected(self) -> u8 {
         1 << (7 - 2 * self.channel)
     }
@@ -31,13 +31,13 @@ impl Pwm {
     }
 }
 
-/// Sets the frequency, in thousandths of a Hz. The share has to be set again; until then it is 0.
+/// Sets the frequency, in thousandths of a Hz. The share becomes 0 and has to be set again.
 #[small]
 pub fn set_frequency(millihertz: u32) {
     let Some(pwm) = ACTIVE.pwm else { return };
     let (prescaler, top) = divide(ACTIVE.clock_hz, millihertz);
-    // SAFETY: the registers of the timer are this module's; it stands still in mode 0, where a compare value is
-    // taken over at once, while it is set up.
+    // SAFETY: the registers of the timer are this module's. While it is set up the timer stands still in mode 0,
+    // where a compare value is taken over at once.
     unsafe {
         pwm.byte(CONTROL_B).write_volatile(0);
         pwm.byte(0).write_volatile(0);
@@ -49,12 +49,13 @@ pub fn set_frequency(millihertz: u32) {
     }
 }
 
-/// Sets what part of the period the pin is high, in thousandths.
+/// Sets the share of the period for which the pin is high, in thousandths.
 #[inline(never)]
 #[small]
 pub fn set_share(share: f32) {
     let Some(pwm) = ACTIVE.pwm else { return };
-    // SAFETY: as in `set_frequency`. The high byte of a word waits in a register of this timer, which nobody else uses.
+    // SAFETY: as in `set_frequency`. The high byte of a word is latched in a register of this timer, which nobody
+    // else uses.
     unsafe {
         let top = pwm.word(TOP).read_volatile();
         let counts = share * (1.0 / WHOLE as f32) * f32::from(top) + 0.5;
@@ -62,7 +63,7 @@ pub fn set_share(share: f32) {
     }
 }
 
-/// Disconnects the pin, which is low from then on. For the panic handler.
+/// Disconnects the pin from the timer; it is low from then on. For the panic handler.
 #[small]
 pub fn kill() {
     if let Some(pwm) = ACTIVE.pwm {

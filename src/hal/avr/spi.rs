@@ -1,7 +1,7 @@
 //! SPI as a master: one byte out, one byte in.
 //!
-//! Owned by thread mode; no interrupt. An exchange of a byte waits for it: 8 clocks of [`Clock`], and a few cycles. MISO has a pull-up, so that
-//! of nothing ones are read. On a board without anything on SPI nothing happens.
+//! Owned by thread mode; no interrupt. An exchange waits for its byte: 8 clocks of [`Clock`], and a few cycles. MISO
+//! has a pull-up, so ones are read when nothing is connected. On a board without anything on SPI nothing happens.
 
 use super::gpio;
 use crate::boards::{ACTIVE, SPI};
@@ -9,25 +9,26 @@ use crate::boards::{ACTIVE, SPI};
 const SPCR: *mut u8 = 0x4C as *mut u8;
 const SPSR: *mut u8 = 0x4D as *mut u8;
 const SPDR: *mut u8 = 0x4E as *mut u8;
-/// On, as master, with mode 0.
+/// Switched on, as master, with mode 0.
 const MASTER: u8 = 1 << 6 | 1 << 4;
 const DONE: u8 = 1 << 7;
-/// Looks until a byte counts as sent whatever the chip says: the slowest clock takes half as many.
+/// How often an exchange looks whether its byte has been sent. Then it goes on in any case; the slowest clock takes
+/// half as many looks.
 const PATIENCE: u16 = 400;
 
-/// How fast bits go.
+/// The clock of SPI.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub enum Clock {
     /// 4 MHz: 4 cycles a bit.
     Mhz4 = 0b00,
-    /// A MHz: 16 cycles a bit.
+    /// 1 MHz: 16 cycles a bit.
     Mhz1 = 0b01,
     /// 250 kHz: 64 cycles a bit.
     Khz250 = 0b10,
 }
 
-/// Makes outputs of the pins. Start-up.
+/// Sets the pins up. Start-up.
 pub fn start() {
     if !ACTIVE.has_spi() {
         return;
@@ -40,13 +41,13 @@ pub fn start() {
     gpio::high(input);
 }
 
-/// Has the exchanges that follow use a clock. Thread mode.
+/// Sets the clock of the exchanges that follow. Thread mode.
 pub fn set_clock(clock: Clock) {
     // SAFETY: the registers are this module's.
     unsafe { SPCR.write_volatile(MASTER | clock as u8) };
 }
 
-/// Sends a byte; what came meanwhile. Thread mode. Cost: 8 bits and 30 cycles.
+/// Sends a byte and returns the byte received meanwhile. Thread mode. Cost: 8 bits and 30 cycles.
 #[inline(never)]
 #[small]
 pub fn exchange(byte: u8) -> u8 {

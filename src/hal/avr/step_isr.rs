@@ -8,18 +8,20 @@
 //! | all moving motors step on every tick (lockstep) | 92, and up to `settle` |
 //! | a segment is loaded | 100 more, 120 for more than two motors; 20 for each direction that changes |
 //!
-//! A pin on ports H to L adds 2 cycles a motor. Step and direction pins are toggled by writing ones to
-//! PIN registers: one instruction, which disturbs no other pin of the port and whose time does not
-//! depend on whether the pin toggles. That makes pulses of all motors as exact as the tick, and the
-//! idle level (polarity) a matter of how the pins stand when nothing moves.
+//! A pin on ports H to L adds 2 cycles for each motor. Step and direction pins are toggled by writing ones to PIN
+//! registers. That is one instruction, it disturbs no other pin of the port, and its time does not depend on whether
+//! the pin toggles. So the pulses of all motors are as exact as the tick, and their polarity is given by the levels
+//! of the pins while nothing moves.
 //!
-//! Pulses rise at `settle`. If the interrupt comes early, as it mostly does, it counts the tick and moves the first motor on
-//! before they rise; of a segment's last tick it only counts. What it does then comes before or behind the pulses, but their times are the same.
+//! Pulses rise when the timer's count reaches `settle`. If the interrupt has time before that, as it mostly has, it
+//! counts the tick and advances the first motor before the pulses rise; in a segment's last tick it only counts. This
+//! work is done before or after the pulses, but the times of the pulses are the same.
 //!
-//! The interrupts of serial ports call it where a tick is due ([`uart`](super::uart)): it expects interrupts off, and its return address on the stack.
+//! The interrupts of serial ports call this handler when a tick is due ([`uart`](super::uart)). It expects interrupts
+//! off, and its return address on the stack.
 //!
-//! It saves what it uses: r24 to r27 and SREG, and r30 and r31 to load a segment. The count of ticks is in
-//! general-purpose I/O registers 1 and 2, which are nobody else's.
+//! It saves the registers that it uses: r24 to r27 and SREG, and r30 and r31 when it loads a segment. The count of
+//! ticks is in general-purpose I/O registers 1 and 2, which nobody else uses.
 
 use core::arch::asm;
 use core::mem::{offset_of, size_of};
@@ -37,8 +39,8 @@ const _: () = assert!(SEGMENTS.is_power_of_two() && SEGMENTS <= 16, "see above")
 
 type Segments = Ring<Segment, SEGMENTS>;
 
-/// From the first look at the counter to the second, cycles, where a tick is counted and a motor is added in between: so much
-/// time must be left.
+/// Cycles from the first read of the counter to the second, where a tick is counted and a motor is advanced in
+/// between. That work is begun only if so much time is left.
 const AHEAD: u8 = 38;
 
 const fn pin_register(pin: Pin) -> usize {
@@ -51,12 +53,12 @@ const fn mask(pin: Pin) -> u8 {
 
 /// TIMER1_COMPA.
 ///
-/// Its body is one assembly block that uses no operand in a register, so the compiler adds nothing
-/// before or behind it: a naked function, on every toolchain.
+/// Its body is one assembly block without an operand in a register, so the compiler adds nothing before or after the
+/// block: a naked function, on every toolchain.
 #[unsafe(no_mangle)]
 pub(super) extern "C" fn __vector_17() -> ! {
-    // SAFETY: every register it changes is restored; it returns by `reti` with the stack as it was. It
-    // alone touches the generator's state and takes segments while interrupts are on.
+    // SAFETY: every register it changes is restored; it returns by `reti` with the stack as it was. While interrupts
+    // are on, nothing else touches the generator's state or takes segments.
     unsafe {
         asm!(
             // Toggles a pin if the motor's bit is set; 3 cycles, or 4 on ports that need `sts`.
@@ -78,15 +80,15 @@ pub(super) extern "C" fn __vector_17() -> ! {
             "    KERF_TOGGLE r26, 2, {step2}, {step_mask2}",
             "    KERF_TOGGLE r26, 3, {step3}, {step_mask3}",
             ".endm",
-            // How long it is until the counter is at `settle`, cycles, in r25; carry if that is over.
+            // Sets r25 to the cycles that are left until the counter is at `settle`; carry if `settle` has passed.
             ".macro KERF_TO_SETTLE",
             "    lds  r25, {state} + {settle}",
             "    lds  r24, 0x84",
             "    sub  r25, r24",
             ".endm",
-            // Waits for so long, to the cycle.
+            // Waits for r25 cycles, exactly.
             ".macro KERF_WAIT",
-            // A cycle for bit 0, two for bit 1, four for each of the rest.
+            // One cycle for bit 0 of r25, two for bit 1, and four for each count of the bits above.
             "    lsr  r25",
             "    brcs 70f",
             "70:",
@@ -104,14 +106,14 @@ pub(super) extern "C" fn __vector_17() -> ! {
             ".macro KERF_SETTLE",
             "    KERF_TO_SETTLE",
             "    brcs 77f",
-            // As long as it takes to decide between waiting and working.
+            // Takes as long as the decision between waiting and working below.
             "    nop",
             "    rjmp 78f",
             "78:",
             "    KERF_WAIT",
             "77:",
             ".endm",
-            // Waits as well, or goes where something is done meanwhile, if there is the time for it.
+            // Waits for `settle` as well, or jumps to `work`, which uses the time, if there is enough of it.
             ".macro KERF_SETTLE_OR work",
             "    KERF_TO_SETTLE",
             "    brcs 13f",
@@ -122,7 +124,7 @@ pub(super) extern "C" fn __vector_17() -> ! {
             "    KERF_WAIT",
             "13:",
             ".endm",
-            // Counts a tick, or goes where the segment is used up.
+            // Counts a tick, or jumps to `used_up` at the end of the segment.
             ".macro KERF_COUNT used_up",
             "    in   r24, 0x2A",
             "    in   r25, 0x2B",
@@ -133,7 +135,7 @@ pub(super) extern "C" fn __vector_17() -> ! {
             "    out  0x2A, r24",
             "    out  0x2B, r25",
             ".endm",
-            // Adds the increment to a phase; bit 15 of the sum becomes the motor's bit of r27.
+            // Adds the increment to a phase. Bit 15 of the sum becomes the motor's bit of r27.
             ".macro KERF_ADD motor",
             "    lds  r24, {state} + {phase} + 2 * \\motor",
             "    lds  r25, {state} + {increment} + 2 * \\motor",
@@ -153,7 +155,7 @@ pub(super) extern "C" fn __vector_17() -> ! {
             "    sts  {state} + {increment} + 2 * \\motor, r24",
             "    sts  {state} + {increment} + 2 * \\motor + 1, r25",
             ".endm",
-            // Reverses a motor if its bit of r27 is set: the pin, and the phase by its complement.
+            // Reverses a motor if its bit of r27 is set: toggles the pin, and complements the phase.
             ".macro KERF_TURN motor, pin, mask",
             "    sbrs r27, \\motor",
             "    rjmp 74f",
@@ -216,7 +218,7 @@ pub(super) extern "C" fn __vector_17() -> ! {
             "    KERF_STEP_TWO_PINS",
             "15:",
             "    KERF_RETURN",
-            // There is more than a little time until then: half of the work is done in it.
+            // There is enough time until `settle`: half of the work is done before the pulses.
             "50:",
             "    KERF_COUNT 61f",
             "    clr  r27",
@@ -227,7 +229,7 @@ pub(super) extern "C" fn __vector_17() -> ! {
             "    sts  {state} + {due}, r27",
             "    KERF_WIDEN {short_width}",
             "    rjmp 17b",
-            // Lockstep: what was due is due again.
+            // Lockstep: the motors that were due are due again.
             "1:",
             "    KERF_SETTLE",
             "    KERF_STEP_PINS",
@@ -268,7 +270,7 @@ pub(super) extern "C" fn __vector_17() -> ! {
             "61:",
             "    KERF_SETTLE",
             "    KERF_STEP_PINS",
-            // The segment is used up: where is the next?
+            // The segment is used up: take the next one.
             "20:",
             "    push r30",
             "    push r31",
@@ -285,13 +287,14 @@ pub(super) extern "C" fn __vector_17() -> ! {
             "    ldi  r31, 0",
             "    subi r30, lo8(-({segments} + {slots}))",
             "    sbci r31, hi8(-({segments} + {slots}))",
-            // The period first: the counter runs towards the old top.
+            // The period is set first, because the counter is running towards the old top.
             "    ldd  r24, Z + {s_period}",
             "    ldd  r25, Z + {s_period} + 1",
             "    sbiw r24, 1",
             "    sts  0x89, r25",
             "    sts  0x88, r24",
-            // Should it be past the new top, this tick starts anew, or it would run to the end.
+            // If the counter is past the new top already, it restarts at 0. Otherwise it would run on to its highest
+            // value.
             "    lds  r27, 0x84",
             "    cp   r24, r27",
             "    lds  r27, 0x85",
@@ -301,7 +304,7 @@ pub(super) extern "C" fn __vector_17() -> ! {
             "    sts  0x85, r24",
             "    sts  0x84, r24",
             "22:",
-            // A slot is free: exec may fill it.
+            // A slot is free, which exec may fill.
             "    ldi  r24, {pended}",
             "    sts  {pend}, r24",
             "    ldd  r24, Z + {s_settle}",
@@ -336,15 +339,15 @@ pub(super) extern "C" fn __vector_17() -> ! {
             "    pop  r31",
             "    pop  r30",
             "    rjmp 42b",
-            // Lockstep: the low bits say who is due.
+            // Lockstep: the low bits of the mode say which motors are due.
             "25:",
             "    andi r27, 0x0F",
             "26:",
             "    pop  r31",
             "    pop  r30",
             "    rjmp 43b",
-            // Two motors at most: a short way, lest the tick behind this one is late. Pins of the others may have to fall
-            // yet.
+            // Two motors at most: a short path, so that the tick after this one is not late. The other motors do not
+            // move, but their pins may still have to fall.
             "27:",
             "    clr  r27",
             "    sts  {state} + {increment} + 4, r27",
@@ -354,7 +357,7 @@ pub(super) extern "C" fn __vector_17() -> ! {
             "    KERF_ADD 0",
             "    KERF_ADD 1",
             "    rjmp 26b",
-            // There is none: no more ticks.
+            // There is no next segment: stop the ticks.
             "30:",
             "    ldi  r24, {halt}",
             "    sts  0x81, r24",

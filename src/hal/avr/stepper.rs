@@ -1,8 +1,8 @@
-//! The step timer and what the step interrupt works on.
+//! The step timer, and the data that the step interrupt works on.
 //!
-//! Timer 1 counts CPU cycles up to the segment's tick period (CTC), so ticks are exact to the cycle
-//! whatever the interrupt takes. The interrupt (`step_isr`) is level 0: it runs with interrupts off and
-//! owns the step generator and the pins. Everything else here is for thread mode and exec.
+//! Timer 1 counts CPU cycles up to the tick period of the segment (CTC mode), so ticks are exact to the cycle however
+//! long the interrupt takes. The interrupt (`step_isr`) is level 0: it runs with interrupts off and owns the step
+//! generator and the pins. All other functions here are for thread mode and exec.
 
 use core::cell::UnsafeCell;
 use kerf_macros::small;
@@ -22,7 +22,7 @@ const TCNT1: *mut u16 = 0x84 as *mut u16;
 const OCR1A: *mut u16 = 0x88 as *mut u16;
 const TIFR1: *mut u8 = (FLAGS + 0x20) as *mut u8;
 const TIMSK1: *mut u8 = 0x6F as *mut u8;
-/// General-purpose registers 1 and 2: the ticks left of the segment.
+/// General-purpose registers 1 and 2: the ticks that are left of the segment.
 const TICKS: [*mut u8; 2] = [0x4A as *mut u8, 0x4B as *mut u8];
 /// CTC with OCR1A as top, clock not divided.
 const RUN: u8 = 1 << 3 | 1;
@@ -31,7 +31,7 @@ pub(super) const HALT: u8 = 1 << 3;
 const OCF1A: u8 = 1 << DUE;
 /// The timer's flags, in the I/O space.
 pub(super) const FLAGS: usize = 0x16;
-/// The bit of [`FLAGS`] that says that a tick is due, and the one of [`TIMSK1`] that lets it interrupt.
+/// The bit of [`FLAGS`] that says that a tick is due. In [`TIMSK1`] the same bit enables the interrupt.
 pub(super) const DUE: u8 = 1;
 const GPIOR1: *const u8 = 0x4A as *const u8;
 const GPIOR2: *const u8 = 0x4B as *const u8;
@@ -44,22 +44,24 @@ pub(super) static RUNNING: SharedByte = SharedByte::new(0);
 /// Set by [`stop`].
 static STOPPED: SharedByte = SharedByte::new(0);
 
-/// How long pulses last, cycles, that no turn of a loop widens: in lockstep, with one motor left to add, and else.
+/// Length of a pulse in cycles, without the loop that widens it: in lockstep. [`SHORT_CYCLES`] is the length if one
+/// motor is left to advance, [`CYCLES`] the length in all other cases.
 const LOCKSTEP_CYCLES: u16 = 21;
 /// See [`LOCKSTEP_CYCLES`].
 const SHORT_CYCLES: u16 = 26;
 /// See [`LOCKSTEP_CYCLES`].
 const CYCLES: u16 = 49;
 
-/// Turns of a loop of 3 cycles that widen a pulse, at least 1: in lockstep, with one motor left to add, and else.
+/// Turns of the loop of 3 cycles that widens a pulse, at least 1: in lockstep. [`SHORT_WIDTH`] is for ticks with one
+/// motor left to advance, [`WIDTH`] for all others.
 pub(super) static LOCKSTEP_WIDTH: SharedByte =
     SharedByte::new(width_turns(Drivers::USUAL.pulse_us, LOCKSTEP_CYCLES));
-/// See [`LOCKSTEP_WIDTH`]. [`set_step_output`] sets it at start-up: a first value would lie in flash as well.
+/// See [`LOCKSTEP_WIDTH`]. [`set_step_output`] sets it at start-up; an initial value would cost flash.
 pub(super) static SHORT_WIDTH: SharedByte = SharedByte::new(0);
 /// See [`LOCKSTEP_WIDTH`].
 pub(super) static WIDTH: SharedByte = SharedByte::new(width_turns(Drivers::USUAL.pulse_us, CYCLES));
 
-/// The turns for pulses of `us` microseconds that last `cycles` without any.
+/// Returns the turns for pulses of `us` microseconds that last `cycles` without the loop.
 const fn width_turns(us: u8, cycles: u16) -> u8 {
     let wanted = us as u16 * (ACTIVE.clock_hz / 1_000_000) as u16;
     let turns = wanted.saturating_sub(cycles).div_ceil(3);
@@ -71,16 +73,17 @@ static INVERTED: SharedByte = SharedByte::new(0);
 /// Bit m: motor m's step pin rests high.
 static STEP_INVERTED: SharedByte = SharedByte::new(0);
 
-/// What the step interrupt owns.
+/// The state that the step interrupt owns.
 #[repr(transparent)]
 pub(super) struct Owned(UnsafeCell<Dda>);
 
-// SAFETY: touched by the step interrupt only, and by exec while that is stopped.
+// SAFETY: only the step interrupt touches it, and exec while that interrupt is stopped.
 unsafe impl Sync for Owned {}
 
 pub(super) static STATE: Owned = Owned(UnsafeCell::new(Dda::new()));
 
-/// Sets the timer up. Before interrupts are on; `None` after the first time.
+/// Sets the timer up and returns the filling end of the segment ring. Before interrupts are on; `None` after the
+/// first time.
 pub fn start() -> Option<Producer<Segment, SEGMENTS>> {
     // The interrupt is the consumer.
     let (producer, _) = SEGMENT_RING.split()?;
@@ -92,16 +95,16 @@ pub fn start() -> Option<Producer<Segment, SEGMENTS>> {
     Some(producer)
 }
 
-/// Whether ticks interrupt: always, behind [`start`].
+/// Whether the interrupt of the ticks is enabled: always true after [`start`].
 #[inline(always)]
 pub(super) fn is_on() -> bool {
-    // SAFETY: `start` alone writes it.
+    // SAFETY: only `start` writes this register.
     unsafe { TIMSK1.read_volatile() & 1 << DUE != 0 }
 }
 
-/// Starts the ticks if they have stopped. For exec, after it has queued a segment.
+/// Starts the ticks if they have stopped. Exec calls it after it has queued a segment.
 ///
-/// A function of its own in the image: the bench counts segments by it.
+/// It is never inlined, because the bench counts segments by its calls.
 #[inline(never)]
 pub fn go() {
     if RUNNING.get() != 0 {
@@ -114,7 +117,7 @@ pub fn go() {
         OCR1A.write_volatile(FIRST_TICK);
         TIFR1.write_volatile(OCF1A);
     }
-    // A stop that comes in between would be undone.
+    // Interrupts are off, or a stop that comes in between would be undone.
     avr_device::interrupt::free(|_| {
         if STOPPED.get() == 0 {
             // SAFETY: as above.
@@ -123,18 +126,18 @@ pub fn go() {
     });
 }
 
-/// Stops the ticks at once and until [`release`], wherever the motors are. Any level.
+/// Stops the ticks at once, wherever the motors are; they stay stopped until [`release`]. Any level.
 pub fn stop() {
     STOPPED.set(1);
     kill();
 }
 
-/// Whether they have been stopped.
+/// Whether [`stop`] has stopped the ticks and nothing has released them.
 pub fn is_stopped() -> bool {
     STOPPED.get() != 0
 }
 
-/// Ticks may come again. Thread mode, when the motors have [settled](settle).
+/// Allows ticks again after a stop. Thread mode, when the motors have [settled](settle).
 pub fn release() {
     STOPPED.set(0);
 }
@@ -144,7 +147,7 @@ pub fn running() -> bool {
     RUNNING.get() != 0 && !is_stopped()
 }
 
-/// How long the segment that runs takes yet, CPU cycles. Exec.
+/// Returns how long the running segment still takes, in CPU cycles. Exec.
 pub fn left() -> u32 {
     let (ticks, top) = super::mask(|| {
         // SAFETY: reading has no effect.
@@ -153,17 +156,18 @@ pub fn left() -> u32 {
     product(u16::from_le_bytes(ticks), top)
 }
 
-/// Every motor is where its last pulse has put it; nothing is left of the segments, of which `held` would have
-/// come first after those that are queued. What they lack is taken off `position`. For exec, while no ticks come.
+/// Drops the rest of all segments after a stop, so that every motor stands where its last pulse has put it. `held` is
+/// the segment that would have come next after the queued ones. Subtracts the steps that were not made from
+/// `position`. Exec, while no ticks come.
 #[inline(never)]
 #[small]
 pub fn settle(mut held: Option<Segment>, position: &mut [i32; MOTORS]) {
     if running() {
         return;
     }
-    // SAFETY: the timer stands still, so its interrupt does not run; exec alone starts it.
+    // SAFETY: the timer stands still, so its interrupt does not run; only exec starts the timer.
     let (dda, mut segments) = unsafe { (&mut *STATE.0.get(), SEGMENT_RING.stand_in()) };
-    // SAFETY: as above: these are the interrupt's as well.
+    // SAFETY: as above; these registers belong to the interrupt, too.
     dda.ticks = u16::from_le_bytes(TICKS.map(|register| unsafe { register.read_volatile() }));
     dda.settle(|| segments.pop().or_else(|| held.take()), position);
     for register in TICKS {
@@ -173,8 +177,8 @@ pub fn settle(mut held: Option<Segment>, position: &mut [i32; MOTORS]) {
     RUNNING.set(0);
 }
 
-/// Where the generator is right now, between two ticks, and the slot of its segment. For the sampling interrupt, which
-/// holds exec off.
+/// Returns the state of the generator between two ticks, and the slot of its segment. Only for the sampling
+/// interrupt, which holds exec off.
 pub fn moment() -> (Dda, u8) {
     let mut dda = Dda::new();
     let mut tail = 0;
@@ -187,15 +191,15 @@ pub fn moment() -> (Dda, u8) {
         tail = SEGMENT_RING.tail();
     });
     if dda.ticks > 0 {
-        // In lockstep the state has no increments, but the segment has.
-        // SAFETY: one has been taken. Another may have been since, but exec, which is held off, has not refilled
-        // the slot.
+        // In lockstep the state has no increments, so they are read from the segment.
+        // SAFETY: a segment has been taken from this slot. Another may have been taken since, but exec, which is held
+        // off, has not refilled the slot.
         dda.increment = unsafe { SEGMENT_RING.at(tail) }.increment;
     }
     (dda, tail)
 }
 
-/// Which direction pins are inverted: bit m for motor m. For thread mode, while nothing runs.
+/// Sets which direction pins are inverted: bit m for motor m. Thread mode, while nothing runs.
 pub fn set_inverted(motors: u8) {
     let changed = motors ^ INVERTED.get();
     INVERTED.set(motors);
@@ -204,15 +208,15 @@ pub fn set_inverted(motors: u8) {
     });
 }
 
-/// How wide a step pulse is, in microseconds, and which step pins rest high (bit m for motor m). For
-/// thread mode; a change only while nothing runs.
+/// Sets the width of a step pulse, in microseconds, and which step pins rest high (bit m for motor m). Thread mode;
+/// the values may change only while nothing runs.
 pub fn set_step_output(pulse_us: u8, inverted: u8) {
     LOCKSTEP_WIDTH.set(width_turns(pulse_us, LOCKSTEP_CYCLES));
     SHORT_WIDTH.set(width_turns(pulse_us, SHORT_CYCLES));
     WIDTH.set(width_turns(pulse_us, CYCLES));
     let changed = inverted ^ STEP_INVERTED.get();
     STEP_INVERTED.set(inverted);
-    // The interrupt toggles pins, so that the level at rest is all there is to polarity.
+    // The interrupt toggles pins, so the level at rest determines the polarity of the pulses.
     each_motor!(M => if changed & (1 << M) != 0 {
         gpio::toggle(ACTIVE.motors[M].step);
     });

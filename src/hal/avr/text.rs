@@ -1,11 +1,12 @@
-//! Text by hand, where the compiler's loops take twice as long: what is received is copied, numbers are read.
+//! Text functions in assembly, where the compiler's loops take twice as long: they copy received text and read
+//! numbers.
 
 use core::marker::PhantomData;
 
 use kerf_macros::small;
 
-/// Copies from the beginning of `from` to `to`, up to the first byte below a blank, the end of either, or 255
-/// bytes. Returns how many. Cost: 9 cycles a byte.
+/// Copies from the beginning of `from` to `to`, up to the first byte below a blank, the end of either, or 255 bytes.
+/// Returns how many bytes it has copied. Cost: 9 cycles a byte.
 #[inline(always)]
 #[small]
 pub fn copy_printing(from: &[u8], to: &mut [u8]) -> u8 {
@@ -37,23 +38,23 @@ pub fn copy_printing(from: &[u8], to: &mut [u8]) -> u8 {
 
 /// A place in a line.
 pub struct Cursor<'a> {
-    /// The byte to look at; 0 at the end.
+    /// The current byte; 0 at the end of the line.
     pub byte: u8,
-    /// The byte behind it, of `left`.
+    /// The next byte, the first of `left` bytes.
     at: *const u8,
     left: u8,
     line: PhantomData<&'a [u8]>,
 }
 
 impl<'a> Cursor<'a> {
-    /// At `byte`, with `rest` behind it: 255 bytes at most.
+    /// Makes a place at `byte`, with `rest` behind it: 255 bytes at most.
     #[inline(always)]
     pub fn new(byte: u8, rest: &'a [u8]) -> Self {
         let left = u8::try_from(rest.len()).unwrap_or(u8::MAX);
         Cursor { byte, at: rest.as_ptr(), left, line: PhantomData }
     }
 
-    /// How many bytes there are behind `byte`.
+    /// Returns how many bytes there are behind `byte`.
     #[inline(always)]
     pub fn left(&self) -> u8 {
         self.left
@@ -73,7 +74,8 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// Takes up to four digits. Their number, and how many are missing to four. Cost: 22 cycles a digit.
+    /// Takes up to four digits. Returns their number, and how many digits are missing to four. Cost: 22 cycles a
+    /// digit.
     #[inline(always)]
     pub fn four(&mut self) -> (u16, u8) {
         let (mut value, mut missing) = (0u16, 4u8);

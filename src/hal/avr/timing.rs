@@ -1,4 +1,4 @@
-//! How fast the ATmega2560 is. `host` stands for it, and has this file, too.
+//! How fast the ATmega2560 is. The host stands in for this chip and uses this file, too.
 
 use super::Chip;
 use crate::boards::{ACTIVE, MOTORS};

@@ -1,14 +1,14 @@
-//! The serial ports: bytes between their lines and two rings each.
+//! The serial ports: they move bytes between their lines and two rings each.
 //!
-//! USB is USART0. The other port, on boards that have it, is USART1 or USART3, as the board says; its receive
-//! ring is shorter and everything else is the same. The interrupts are in `interrupts`.
+//! USB is USART0. The second port, on boards that have one, is USART1 or USART3, as the board says. Its receive ring
+//! is shorter; everything else is the same. The interrupts are in `interrupts`.
 //!
-//! Where bytes are lost, because a ring was full or the hardware overran, a mark says so to the
-//! reader: see [`serial`](crate::hal::serial).
+//! Where bytes are lost, because a ring was full or the hardware overran, a mark tells the reader: see
+//! [`serial`](crate::hal::serial).
 //!
-//! On a bus (RS-485) the driver is enabled by [`kick`] and let go when the last byte has left. While the
-//! other side may stop us by pin, the transmit interrupt looks at that pin before each byte, and [`look`]
-//! each millisecond for the time after it.
+//! On a bus (RS-485) [`kick`] enables the driver of the bus, and the interrupt at the end of the last byte disables
+//! it. While the other side may stop us by pin (CTS), the transmit interrupt reads that pin before each byte. When
+//! CTS has stopped it, [`look`] starts it again, within a millisecond.
 
 mod interrupts;
 
@@ -23,7 +23,7 @@ use crate::hal::serial::{
 };
 use crate::realtime::{self, Asked};
 
-/// What the interrupts of a port and thread mode share.
+/// The state that the interrupts of a port share with thread mode.
 #[repr(C)]
 struct Shared<const N: usize> {
     rx: Ring<u8, N>,
@@ -31,46 +31,48 @@ struct Shared<const N: usize> {
     flags: Flags,
 }
 
-/// The parts of [`Shared`] whose size does not depend on the ring's.
+/// The fields of [`Shared`] whose size does not depend on the ring's.
 #[repr(C)]
 struct Flags {
     /// Counts line ends that were lost, low byte first. The receive interrupt writes it.
     lost_ends: [SharedByte; 2],
     /// Real-time characters, as bits. The receive interrupt sets them, `take_realtime` clears them.
     realtime: SharedByte,
-    /// A byte to send before all others, if it is not 0; [`WAIT_MS`] and above: when the line that is being sent is at
-    /// its end. Then `held` has [`AHEAD`].
+    /// A byte to send before all others, if it is not 0. From [`WAIT_MS`] on the byte waits for the end of the line
+    /// that is being sent. While there is such a byte `held` has [`AHEAD`].
     ahead: SharedByte,
-    /// Why what the ring holds may have to wait: [`STOPPED`], [`HEEDS_CTS`], [`HEEDS_XOFF`], [`AHEAD`]; and [`PLAIN`]. The receive interrupt
-    /// changes the first, the transmit interrupt takes [`AHEAD`] away: who keeps their bits changes it with interrupts off.
+    /// Bits: reasons why the bytes in the ring may have to wait ([`STOPPED`], [`HEEDS_CTS`], [`HEEDS_XOFF`],
+    /// [`AHEAD`]), and [`PLAIN`]. The receive interrupt changes [`STOPPED`], the transmit interrupt clears [`AHEAD`].
+    /// Code that keeps these two bits has to change this byte with interrupts off.
     held: SharedByte,
-    /// Not 0 if the sender has been stopped by XOFF. Exec sets it too, thread mode clears it.
+    /// Not 0: XOFF has stopped the sender. Exec may set it, too; thread mode clears it.
     stopped: SharedByte,
     /// An [`Asked`], byte for byte. The receive interrupt adds to it, `take_asked` clears it.
     asked: [SharedByte; 3],
 }
 
-/// The other side has sent XOFF.
+/// The other side has sent XOFF, so that nothing may be sent.
 const STOPPED: u8 = 1 << 0;
-/// CTS decides.
+/// The pin CTS decides whether bytes may be sent.
 const HEEDS_CTS: u8 = 1 << 1;
-/// XOFF and XON are obeyed.
+/// XOFF and XON from the other side are obeyed.
 const HEEDS_XOFF: u8 = 1 << 2;
-/// Real-time characters that print are text.
+/// Printable real-time characters are text.
 const PLAIN: u8 = 1 << 3;
-/// There may be a byte to send before all others.
+/// There may be a byte in `ahead`.
 const AHEAD: u8 = 1 << 4;
 
 impl Flags {
-    /// Has a byte sent before all others. Thread mode, and exec.
+    /// Has `byte` sent before all others. Thread mode, and exec.
     fn send_ahead(&self, byte: u8) {
         self.ahead.set(byte);
         avr_device::interrupt::free(|_| self.held.set(self.held.get() | AHEAD));
     }
 
-    /// What the ring holds may have to wait for this from now on. Thread mode.
+    /// Sets the reasons for which the bytes in the ring may have to wait from now on. Thread mode.
     fn hold(&self, why: u8) {
-        // Exec may have a byte sent ahead meanwhile: the transmit interrupt looks whether there is one.
+        // `AHEAD` is set in any case, because exec may have a byte sent ahead meanwhile. The transmit interrupt
+        // checks whether there is one.
         self.held.set(why | AHEAD);
     }
 }
@@ -91,7 +93,7 @@ impl<const N: usize> Shared<N> {
         }
     }
 
-    /// The ends that tasks have. The others are the interrupts', which push and pop in assembly.
+    /// Hands out the ends that tasks have. The other ends belong to the interrupts, which push and pop in assembly.
     fn split(&'static self) -> Option<Ends> {
         let (_, rx) = self.rx.split()?;
         let (tx, _) = self.tx.split()?;
@@ -113,8 +115,8 @@ const UDRIE: u8 = 1 << 5;
 /// Ready to receive and to send, and nothing to send.
 const IDLE: u8 = RXCIE | 1 << 4 | 1 << 3;
 
-/// The register at this distance from a port's first. Out of the constants of the board, so that it costs
-/// nothing beyond the choice of the port.
+/// Returns the register at a distance from a port's first register. Computed from constants of the board, so that it
+/// costs nothing except the choice of the port.
 #[inline(always)]
 fn register(port: u8, offset: usize) -> *mut u8 {
     const fn base(port: u8) -> usize {
@@ -137,7 +139,7 @@ fn tx(port: u8) -> &'static Ring<u8, TX_RING> {
     if PORTS > 1 && port == AUX { &AUX_SHARED.tx } else { &USB_SHARED.tx }
 }
 
-/// Starts the lines, 8N1: USB at `rate` bits a second, the other at the board's. Before interrupts are on;
+/// Starts the lines, 8N1: USB at `rate` bits a second, the second port at the board's rate. Before interrupts are on;
 /// `None` after the first time.
 pub fn start(rate: u32) -> Option<AllEnds> {
     let usb = USB_SHARED.split()?;
@@ -161,18 +163,18 @@ fn start_port(port: u8, rate: u32) {
     }
 }
 
-/// Goes on at `rate` bits a second. A byte on the line meanwhile, in either direction, is spoilt. Thread
-/// mode.
+/// Changes the rate to `rate` bits a second. A byte that is on the line at that moment, in either direction, is
+/// spoilt. Thread mode.
 pub fn set_rate(port: u8, rate: u32) {
     let [low, high] = baud::divisor(rate).to_le_bytes();
-    // SAFETY: thread mode alone writes these two; the lower half takes effect.
+    // SAFETY: only thread mode writes these two registers; the write of the lower one takes effect.
     unsafe {
         register(port, 5).write_volatile(high);
         register(port, 4).write_volatile(low);
     }
 }
 
-/// Ends the lines of which a part has been sent; what else the rings hold is never sent.
+/// Ends the lines of which a part has been sent. The rest of what the rings hold is never sent.
 ///
 /// # Safety
 /// Thread mode; interrupts are off, and stay so.
@@ -189,17 +191,17 @@ pub unsafe fn end_lines() {
     }
 }
 
-/// Sends what the ring holds. Thread mode, or exec on a port that is no bus.
+/// Starts sending what the ring holds. Thread mode, or exec on a port that is no bus.
 pub fn kick(port: u8) {
     if is_shared(port) {
         return kick_bus(port);
     }
-    // SAFETY: the register has two values after start-up, written whole.
+    // SAFETY: after start-up this register has one of two values, and it is written whole.
     unsafe { register(port, 1).write_volatile(IDLE | UDRIE) };
 }
 
-/// Sends what the ring holds, on a bus. Both transmit interrupts are off while the driver of the bus is switched on: the
-/// interrupt at the end of an earlier transmission would switch it off again.
+/// Starts sending what the ring holds, on a bus. Both transmit interrupts are off while the driver of the bus is
+/// switched on: otherwise the interrupt at the end of an earlier transmission would switch the driver off again.
 fn kick_bus(port: u8) {
     let control = register(port, 1);
     // SAFETY: written whole.
@@ -214,7 +216,7 @@ fn kick_bus(port: u8) {
     unsafe { control.write_volatile(IDLE | next) };
 }
 
-/// Does something with the pin that enables the driver of a port, as a constant.
+/// Calls `act` with the pin that enables the driver of a port, as a constant.
 #[inline(always)]
 fn each_driver(port: u8, act: impl Fn(Pin)) {
     if let Some(Serial { driver_enable: Some(pin), .. }) = const { hardware(USB) }
@@ -229,17 +231,18 @@ fn each_driver(port: u8, act: impl Fn(Pin)) {
     }
 }
 
-/// Stops the sender, or lets it go on, in the way they have agreed upon; by a pin the receive interrupt does so
-/// too. A character may wait for the end of a line if it `waits`. Thread mode.
+/// Stops the sender or lets it go on, by the flow control that the two sides have agreed on. With `Flow::Pins` the
+/// receive interrupt also stops the sender. If `waits`, XOFF or XON may wait for the end of the line that is being
+/// sent. Thread mode.
 pub fn stop_sender(port: u8, flow: Flow, stop: bool, waits: bool) {
     match flow {
         Flow::None => {}
         Flow::Characters => {
-            // SAFETY: thread mode alone writes it.
+            // SAFETY: only thread mode writes this register.
             let divisor = unsafe { register(port, 4).read_volatile() };
             let wait = if waits { WAIT_MS * wait_ms(port, divisor) } else { 0 };
             let flags = flags(port);
-            // In an order that exec may come between: see `stop_late`.
+            // Exec may call `stop_late` between any two of these lines; their order allows that.
             if stop {
                 flags.stopped.set(1);
             }
@@ -251,13 +254,13 @@ pub fn stop_sender(port: u8, flow: Flow, stop: bool, waits: bool) {
     }
 }
 
-/// Whether the sender has been stopped by XOFF, by thread mode or by [`stop_late`].
+/// Whether XOFF has stopped the sender, sent by thread mode or by [`stop_late`].
 pub fn is_stopped(port: u8) -> bool {
     flags(port).stopped.get() != 0
 }
 
-/// Stops the sender of the second port by XOFF if its ring fills while thread mode has no turn. Exec, which never runs within an
-/// interrupt of a port. Cost: 12 cycles.
+/// Stops the sender of the second port by XOFF if its receive ring fills while thread mode has no turn. Exec, which
+/// never runs within an interrupt of a port. Cost: 12 cycles.
 #[inline(always)]
 pub fn stop_late() {
     if PORTS > 1 && AUX_SHARED.rx.used() >= LATE {
@@ -269,7 +272,7 @@ pub fn stop_late() {
 #[inline(never)]
 fn stop_now() {
     let flags = flags(AUX);
-    // One that waits for the end of a line waits no more.
+    // An XOFF that waits for the end of a line is sent at once.
     let waits = flags.ahead.get() > WAIT_MS + XON;
     if flags.held.get() & HEEDS_XOFF != 0 && (flags.stopped.get() == 0 || waits) {
         flags.stopped.set(1);
@@ -291,16 +294,16 @@ fn set_rts(port: u8, stop: bool) {
     }
 }
 
-/// Whether `!`, `~`, `%` and bytes above 0x7F are text, from now on. Thread mode.
+/// Sets whether `!`, `~`, `%` and bytes above 0x7F are plain text from now on. Thread mode.
 pub fn set_plain(port: u8, plain: bool) {
-    // XOFF does not count on such a port, so that the receive interrupt writes nothing here.
+    // XOFF does not count on such a port, so the receive interrupt does not write `held`.
     if plain {
         flags(port).hold(PLAIN);
         kick(port);
     }
 }
 
-/// How the other side may hold it back from now on. Thread mode.
+/// Sets how the other side may stop this port's transmitter from now on. Thread mode.
 pub fn set_flow(port: u8, flow: Flow) {
     let heeds = match flow {
         Flow::None => 0,
@@ -310,14 +313,14 @@ pub fn set_flow(port: u8, flow: Flow) {
     let held = flags(port).held.get();
     let heeds = if cfg!(feature = "dialect-reprap") { heeds | held & PLAIN } else { heeds };
     if held & !(STOPPED | AHEAD) != heeds {
-        // An XOFF that has come does not count any more.
+        // An XOFF that came before does not count any more.
         flags(port).hold(heeds);
         set_rts(port, false);
         kick(port);
     }
 }
 
-/// Sends on what CTS has held back, and XOFF or XON that has waited for long enough. Each millisecond, in thread mode.
+/// Sends what CTS has held back, and XOFF or XON that has waited long enough. Thread mode, each millisecond.
 #[inline(always)]
 pub fn look() {
     for port in 0..PORTS as u8 {
@@ -331,12 +334,12 @@ pub fn look() {
     }
 }
 
-/// A millisecond of what XOFF or XON waits for is over.
+/// Takes one millisecond off the time that XOFF or XON waits.
 #[inline(never)]
 fn wait_less(port: u8) {
     super::mask(|| {
         let ahead = &flags(port).ahead;
-        // The transmit interrupt may have sent it, or exec ordered one that does not wait.
+        // The transmit interrupt may have sent the byte meanwhile, or exec may have ordered one that does not wait.
         if let Some(less) = ahead.get().checked_sub(WAIT_MS) {
             ahead.set(less);
         }
@@ -347,22 +350,22 @@ fn wait_less(port: u8) {
 /// Does nothing: bytes that find no room in the ring are lost.
 pub fn go_on() {}
 
-/// It does not: to open the port resets it.
+/// Always false: opening the port resets this chip, so there is nothing to notice.
 pub fn sees_opening() -> bool {
     false
 }
 
-/// Never: see [`sees_opening`].
+/// Always false: see [`sees_opening`].
 pub fn take_opened() -> bool {
     false
 }
 
-/// Never: see [`sees_opening`].
+/// Always false: see [`sees_opening`].
 pub fn take_closed() -> bool {
     false
 }
 
-/// Line ends lost since start-up, modulo 2^16.
+/// Returns how many line ends have been lost since start-up, modulo 2^16.
 pub fn lost_ends(port: u8) -> u16 {
     let [low, high] = &flags(port).lost_ends;
     loop {
@@ -374,7 +377,7 @@ pub fn lost_ends(port: u8) -> u16 {
     }
 }
 
-/// Bytes that may come before any is lost, at most 254: one less than the receive ring has room for.
+/// Returns how many bytes may come before one is lost, at most 254: one less than the receive ring has room for.
 pub fn room(port: u8) -> u8 {
     let (size, used) = if PORTS > 1 && port == AUX {
         (AUX_RING, AUX_SHARED.rx.used())
@@ -384,27 +387,27 @@ pub fn room(port: u8) -> u8 {
     (size - 2).saturating_sub(used) as u8
 }
 
-/// Whether half of the second port's receive ring is full: the other half lasts 3 ms, so that whoever has much to do gives
-/// way to the reader. Thread mode.
+/// Whether half of the second port's receive ring is full. The other half lasts 3 ms, so a task with much to do then
+/// gives way to the reader. Thread mode.
 pub fn presses() -> bool {
     PORTS > 1 && AUX_SHARED.rx.used() >= AUX_RING / 2
 }
 
-/// Whether the reader is to have its turn before a line that waits is carried out: see [`serial::calls_reader`]; on the second port
-/// any byte says so. Thread mode.
+/// Whether the reader has to have its turn before the next waiting line is carried out: see [`serial::calls_reader`].
+/// On the second port any waiting byte is a reason. Thread mode.
 pub fn calls_reader() -> bool {
     // SAFETY: the reader does not run meanwhile.
     let ring = unsafe { USB_SHARED.rx.window() };
     PORTS > 1 && AUX_SHARED.rx.used() > 0 || serial::calls_reader(&ring)
 }
 
-/// The slot of the receive ring with the byte that came last, if it still waits there. Thread mode.
+/// Returns the slot of the receive ring that holds the newest byte; `None` if that byte has been read. Thread mode.
 pub fn newest(port: u8) -> Option<u8> {
     if PORTS > 1 && port == AUX { AUX_SHARED.rx.newest() } else { USB_SHARED.rx.newest() }
 }
 
-/// The slot of the mark that stands for the last `%` or `^d`, if it has not been read. Thread mode. Cost: 12 cycles a byte
-/// that waits.
+/// Returns the slot of the mark that stands for the last `%` or `^d`; `None` if no such mark waits. Thread mode.
+/// Cost: 12 cycles for each byte that waits.
 pub fn last_cut(port: u8) -> Option<u8> {
     // SAFETY: the reader does not run meanwhile.
     let ring = unsafe {
@@ -413,7 +416,7 @@ pub fn last_cut(port: u8) -> Option<u8> {
     last_mark(&ring)
 }
 
-/// Leaves the lines to others, for good.
+/// Switches the ports off for good, so that the boot loader can use them.
 ///
 /// # Safety
 /// Interrupts are off, and stay so.
@@ -424,20 +427,21 @@ pub unsafe fn stop() {
     }
 }
 
-/// Whether an exclamation mark has come that nobody has taken yet, on any port. Any level.
+/// Whether a `!` has come, on any port, that nobody has taken yet. Any level.
 #[inline(always)]
 pub fn asks_hold() -> bool {
     (0..PORTS as u8).any(|port| flags(port).realtime.get() & realtime::HOLD != 0)
 }
 
-/// What characters have asked of overrides since the last call.
+/// Takes the override requests that characters have made since the last call.
 #[inline(never)]
 pub fn take_asked(port: u8) -> Asked {
     let [feed, spindle, fixed] = &flags(port).asked;
     if feed.get() | spindle.get() | fixed.get() == 0 {
         return Asked::NOTHING;
     }
-    // One after the other: a character in between counts with what is taken later, in its order.
+    // Taken one after the other. A character that comes in between counts with the bytes that are taken later, so the
+    // order is kept.
     let taken = |byte: &SharedByte| {
         avr_device::interrupt::free(|_| {
             let value = byte.get();
@@ -449,7 +453,7 @@ pub fn take_asked(port: u8) -> Asked {
     Asked { percent: [taken(feed) as i8, taken(spindle) as i8], fixed }
 }
 
-/// The real-time characters since the last call, as bits (see [`realtime`](crate::realtime)).
+/// Takes the real-time characters since the last call, as bits (see [`realtime`](crate::realtime)).
 pub fn take_realtime(port: u8) -> u8 {
     let realtime = &flags(port).realtime;
     avr_device::interrupt::free(|_| {

@@ -1,8 +1,9 @@
 //! The watchdog, and why the machine has started.
 //!
-//! [`start`] gives the firmware [`TIME`] between two calls of [`feed`]. If it is late, the watchdog's interrupt makes
-//! the machine safe and resets it; should interrupts be off for good, the chip resets by itself after as long again.
-//! After a reset by the watchdog it is on, with its shortest time: [`begin`] comes first at start-up.
+//! After [`start`] the firmware has [`TIME`] between two calls of [`feed`]. If it is late, the watchdog's interrupt
+//! makes the machine safe and resets it. If interrupts are off for good, the chip resets by itself after the same
+//! time once more. After a reset by the watchdog the watchdog is on, with its shortest time, so [`begin`] comes first
+//! at start-up.
 
 use core::arch::asm;
 
@@ -18,17 +19,18 @@ const TIME: u8 = 1 << 6 | 1 << 3 | 0b101;
 const SHORTEST: u8 = 1 << 3;
 
 unsafe extern "C" {
-    /// What lies behind all statics, which start-up does not clear: the deepest stack ends above it.
+    /// Marks the end of all statics. Start-up does not clear what lies behind it, and even the deepest stack ends
+    /// above it.
     static mut _end: u16;
 }
 
 #[small]
 fn leave(mark: Mark) {
-    // SAFETY: nothing else is there (`xtask size` keeps 400 bytes free). Written at start-up, and before a reset.
+    // SAFETY: nothing else lies there (`xtask size` keeps 400 bytes free). Written at start-up, and before a reset.
     unsafe { (&raw mut _end).write_volatile(mark.0) };
 }
 
-/// The timed sequence of the data sheet (13.5). Interrupts are off.
+/// Writes the control register by the timed sequence of the data sheet (13.5). Interrupts are off.
 #[small]
 fn set(value: u8) {
     // SAFETY: nobody else uses the register, and no interrupt comes in between.
@@ -36,15 +38,16 @@ fn set(value: u8) {
         asm!("wdr", options(nostack));
         WDTCSR.write_volatile(CHANGE);
         WDTCSR.write_volatile(value);
-        // From now on.
+        // The new time counts from now on.
         asm!("wdr", options(nostack));
     }
 }
 
-/// Takes the watchdog off, and notes why the machine has started. First thing at start-up.
+/// Switches the watchdog off, and notes why the machine has started. First thing at start-up.
 #[small]
 pub fn begin() {
-    // SAFETY: start-up, with interrupts off. The watchdog cannot be taken off while the chip notes that it has reset it.
+    // SAFETY: start-up, with interrupts off. The flag in MCUSR is cleared first: while it says that the watchdog has
+    // reset the chip, the watchdog cannot be switched off.
     let (chip, mark) = unsafe {
         let chip = MCUSR.read_volatile();
         MCUSR.write_volatile(0);
@@ -54,7 +57,7 @@ pub fn begin() {
     leave(Mark::running(resets::cause(chip, mark)));
 }
 
-/// Why the machine has started.
+/// Returns why the machine has started.
 #[small]
 pub fn cause() -> Cause {
     // SAFETY: written at start-up, and before a reset.
@@ -62,30 +65,32 @@ pub fn cause() -> Cause {
     Mark(mark).cause().unwrap_or(Cause::PowerOn)
 }
 
-/// Has the watchdog on from now on. Interrupts are off.
+/// Switches the watchdog on. Interrupts are off.
 #[small]
 pub fn start() {
     set(TIME);
 }
 
-/// All is well, unless the step interrupt is off: serial ports would have the motors crawl from byte to byte. Thread mode, and exec. Cost: 4 cycles.
+/// Restarts the time of the watchdog: all is well. Not if the step interrupt is off, because then ticks would come
+/// only from the interrupts of serial ports, and motors would crawl from byte to byte. Thread mode, and exec. Cost: 4
+/// cycles.
 #[inline(never)]
 #[small]
 pub fn feed() {
     if stepper::is_on() {
-        // SAFETY: it changes nothing but the watchdog's counter.
+        // SAFETY: this instruction changes nothing but the watchdog's counter.
         unsafe { asm!("wdr", options(nostack)) };
     }
 }
 
-/// Takes it off. Interrupts are off.
+/// Switches the watchdog off. Interrupts are off.
 #[small]
 pub fn off() {
     set(0);
 }
 
-/// Resets the chip in 15 ms, noting why. Meanwhile the line that is being sent ends, lest a sender read the greeting
-/// as the rest of it. Interrupts are off.
+/// Leaves the mark `why` and resets the chip in 15 ms. Before that it ends the line that is being sent, so that a
+/// sender does not read the greeting as the rest of that line. Interrupts are off.
 #[small]
 pub fn reset(why: Mark) -> ! {
     leave(why);
@@ -97,16 +102,16 @@ pub fn reset(why: Mark) -> ! {
     }
 }
 
-/// WDT: something has got stuck. It never returns, so it saves nothing.
+/// WDT: something has got stuck. It never returns, so it saves no registers.
 #[unsafe(no_mangle)]
 extern "C" fn __vector_12() -> ! {
-    // SAFETY: interrupts are off; r1 is 0 for what is called.
+    // SAFETY: interrupts are off; r1 is 0, as the called function expects.
     unsafe { asm!("clr r1", "jmp {starved}", starved = sym starved, options(noreturn)) }
 }
 
 extern "C" fn starved() -> ! {
     panic::make_safe();
-    // Should this get stuck as well, then the watchdog, which is on, resets the chip.
+    // If this code gets stuck as well, the watchdog, which is on, resets the chip.
     set(TIME & !(1 << 6));
     reset(Mark::STARVED)
 }

@@ -1,8 +1,8 @@
-//! What `avr/arithmetic.rs` does, as the language does it.
+//! The functions of `avr/arithmetic.rs` in plain Rust.
 
 use avr_embassy::ring::Index;
 
-/// `a / b` and `a % b` if the quotient fits 16 bits: `a >> 16 < b`. Else what the chip makes of it.
+/// Returns `a / b` and `a % b` if the quotient fits 16 bits: `a >> 16 < b`. Otherwise the same result as on the chip.
 pub fn divide(a: u32, b: u16) -> (u16, u16) {
     let mut rest = (a >> 16) as u16;
     let mut low = a as u16;
@@ -18,7 +18,7 @@ pub fn divide(a: u32, b: u16) -> (u16, u16) {
     (low, rest)
 }
 
-/// `a / b` if the quotient fits 32 bits: `a >> 32 < b`. Else what the chip makes of it.
+/// Returns `a / b` if the quotient fits 32 bits: `a >> 32 < b`. Otherwise the same result as on the chip.
 pub fn wide_quotient(a: u64, b: u32) -> u32 {
     let mut rest = (a >> 32) as u32;
     let mut low = a as u32;
@@ -54,19 +54,20 @@ pub fn root(x: u32) -> u16 {
     x.isqrt() as u16
 }
 
-/// 2^23 over the square root of a number from 2^14 on, 0.006 % exact. Of a smaller one something.
+/// Returns 2^23 over the square root of a number from 2^14 on, 0.006 % exact. For a smaller number the result is
+/// arbitrary.
 pub fn inverse_root(x: u16) -> u16 {
-    // Of the upper byte, by a polynomial of the second degree: 2.9 % exact.
+    // First approximation, from the upper byte, by a polynomial of the second degree: 2.9 % exact.
     let [_, upper] = x.to_le_bytes();
     let slope = 286u16.wrapping_sub(high_product(upper, 204).into()) as u8;
     let first = 338u16
         .wrapping_sub(high_product(upper, slope).into())
         .wrapping_sub(high_product(upper, 126).into()) as u8;
-    // By how much its square is off, in 2^-16, and that in 2^-11.
+    // How far the square of that, times the number, is from 1: in units of 2^-16, then in units of 2^-11.
     let square = u16::from(first) * u16::from(first);
     let error = ((product(x, square) << 2 >> 16) as i16).wrapping_neg();
     let rough = (error >> 5) as i8;
-    // 1 / sqrt(1 - e) = 1 + e / 2 + e^2 (3 + 5/2 e) / 8: all but the first term, in 2^-16.
+    // 1 / sqrt(1 - e) = 1 + e / 2 + e^2 (3 + 5/2 e) / 8: all terms except the first, in units of 2^-16.
     let squared = (i16::from(rough) * i16::from(rough)) as u16 >> 6;
     let third = 97i8.wrapping_add(rough >> 5) as u8;
     let more = (error >> 1) + i16::from(high_product(squared as u8, third)) + 1;
@@ -75,21 +76,22 @@ pub fn inverse_root(x: u16) -> u16 {
     (u16::from(first) << 8).wrapping_add_signed(part)
 }
 
-/// How many pairs of a mark and a value come before the first whose mark has its highest bit set, or whose value is below `least`; all of
-/// them, at most [`Index::MAX`], if there is none.
+/// Returns how many pairs of a mark and a value come before the first pair whose mark has its highest bit set or
+/// whose value is below `least`. If there is no such pair, returns the number of all pairs, at most [`Index::MAX`].
 pub fn passed_over(marks: &[Index], values: &[u16], least: u16) -> Index {
     let passes = |(mark, value): &(&Index, &u16)| **mark <= Index::MAX >> 1 && **value >= least;
     marks.iter().zip(values).take(Index::MAX.into()).take_while(passes).count() as Index
 }
 
-/// `a / b`. Out of line, because the compiler makes a division where it may be needed, and not only where it is.
+/// Returns `a / b`. Not inlined, because the compiler would otherwise compute the division even on paths that do not
+/// need it.
 #[inline(never)]
 pub fn ratio(a: f32, b: f32) -> f32 {
     a / b
 }
 
-/// A number rounded down; one of 2^31 or more, or below 0, or a NaN, is 2^31.
+/// Returns a number rounded down. For 2^31 or more, for a number below 0 and for a NaN the result is 2^31.
 pub fn whole(x: f32) -> u32 {
-    // As the chip does: -0 is below 0.
+    // As on the chip, -0 counts as below 0.
     if x.to_bits() < 2_147_483_648.0f32.to_bits() { x as u32 } else { 1 << 31 }
 }

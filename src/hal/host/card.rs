@@ -3,23 +3,23 @@
 /// Selects the card.
 pub fn select() {}
 
-/// Lets it go.
+/// Deselects the card.
 pub fn release() {}
 
-/// How fast the clock is to be.
+/// Sets the speed of the clock.
 pub fn set_fast(_: bool) {}
 
-/// Sends a byte; a line that nobody drives is high.
+/// Sends a byte. Returns 0xFF, because a line that nobody drives is high.
 pub fn exchange(_: u8) -> u8 {
     0xFF
 }
 
-/// Reads a block.
+/// Reads a block, all bytes 0xFF.
 pub fn read(block: &mut [u8; 512]) {
     block.fill(0xFF);
 }
 
-/// Whether somebody waits for the lines.
+/// Whether another device waits for the lines: never.
 pub fn is_wanted() -> bool {
     false
 }

@@ -1,4 +1,4 @@
-//! The EEPROM of a machine: bytes, of which a write takes 3.4 ms.
+//! The EEPROM of a machine: bytes, and a write takes 3.4 ms.
 
 use core::cell::{Cell, RefCell};
 use std::vec::Vec;
@@ -10,7 +10,7 @@ use crate::store::program::AREA;
 /// Cycles that a write takes.
 const WRITE_CYCLES: u64 = 54_400;
 
-/// What a machine of this thread finds in its EEPROM, and leaves there.
+/// The EEPROM that a machine of this thread finds at its start, and leaves behind.
 struct Cells {
     bytes: RefCell<Vec<u8>>,
     busy_until: Cell<u64>,
@@ -20,14 +20,14 @@ machine_static! {
     fn cells() -> Cells = Cells { bytes: RefCell::new(Vec::new()), busy_until: Cell::new(0) };
 }
 
-/// What is in the EEPROM of this thread's machine.
+/// Returns the bytes in the EEPROM of this thread's machine.
 pub fn contents() -> Vec<u8> {
     let mut bytes = cells().bytes.borrow().clone();
     bytes.resize(usize::from(Eeprom::SIZE), 0xFF);
     bytes
 }
 
-/// Puts something there before the machine boots.
+/// Puts bytes into the EEPROM before the machine boots.
 pub fn put(contents: &[u8]) {
     *cells().bytes.borrow_mut() = contents.to_vec();
 }
@@ -36,7 +36,7 @@ pub fn put(contents: &[u8]) {
 pub struct Eeprom(());
 
 impl Eeprom {
-    /// The EEPROM of this thread's machine.
+    /// Returns access to the EEPROM of this thread's machine.
     pub fn take() -> Self {
         Self(())
     }

@@ -1,4 +1,5 @@
-//! The sensors of the spindle on the host: edges that tests or a turning spindle make, and the same pulses of them as on the chip.
+//! The sensors of the spindle on the host. Edges come from tests or from a turning spindle, and become the same
+//! pulses as on the chip.
 
 use core::cell::Cell;
 
@@ -6,15 +7,15 @@ use super::{NEVER, inputs, now};
 use crate::boards::{ACTIVE, Pin};
 use crate::encoder::Pulses;
 
-/// CPU cycles of a count.
+/// CPU cycles in a count.
 const COUNT: u64 = 64;
 
 struct Sensors {
     pulses: Cell<Pulses>,
     in_use: Cell<u8>,
-    /// How long contacts bounce, counts.
+    /// How long contacts bounce, in counts.
     bounce: Cell<u16>,
-    /// The level of each pin, and when it has changed last, cycles.
+    /// The level of each pin, and when it changed last, in cycles.
     levels: Cell<[(bool, u64); 2]>,
     /// The level of the second pin of sync.
     second: Cell<bool>,
@@ -23,13 +24,13 @@ struct Sensors {
 /// A spindle that turns by itself.
 #[derive(Clone, Copy)]
 struct Turning {
-    /// Cycles from an edge to the next; 0 while it stands.
+    /// Cycles from an edge to the next; 0 while the spindle stands.
     half: u64,
-    /// It turns backwards.
+    /// The spindle turns backwards.
     reversed: bool,
-    /// Pulses of sync in a turn; with 1 the index alone.
+    /// Pulses of sync in a turn; with 1 only the index is read.
     per_turn: u16,
-    /// Edges of this turn.
+    /// Edges so far in this turn.
     edges: u16,
     next: u64,
 }
@@ -46,7 +47,8 @@ machine_static! {
     };
 }
 
-/// The sensors `lines` are read from now on (bit 0 index, bit 1 sync, bit 2 the second one of sync), whose contacts bounce for so many counts.
+/// Sets which sensors are read from now on (bit 0 index, bit 1 sync, bit 2 the second sync sensor), and for how many
+/// counts their contacts bounce.
 pub fn set_up(lines: u8, bounce: u16) {
     all().in_use.set(lines);
     all().bounce.set(bounce);
@@ -58,12 +60,13 @@ pub fn is_set_up() -> bool {
     all().in_use.get() != 0
 }
 
-/// What the sensors have seen so far.
+/// Returns the pulses counted and timed so far.
 pub fn read() -> Pulses {
     Pulses { now: (now() / COUNT) as u16, ..all().pulses.get() }
 }
 
-/// The spindle turns at `rpm` turns a minute from now on, with `per_turn` pulses of sync in each; backwards below 0.
+/// Turns the spindle at `rpm` turns a minute from now on, with `per_turn` pulses of sync in each turn; backwards
+/// below 0.
 pub(super) fn turn(rpm: f64, per_turn: u16) {
     let per_turn = per_turn.max(1);
     let edges = rpm.abs() * f64::from(per_turn) * 2.0;
@@ -73,17 +76,18 @@ pub(super) fn turn(rpm: f64, per_turn: u16) {
     turning().set(Turning { half, reversed: rpm < 0.0, per_turn, edges, next });
 }
 
-/// When the spindle makes its next edge.
+/// Returns when the spindle makes its next edge.
 pub(super) fn next_edge() -> u64 {
     turning().get().next
 }
 
-/// An edge of the spindle, at its time: each pulse begins with a falling one, the first of a turn with that of the index, too.
+/// Makes an edge of the spindle, at its time. Each pulse begins with a falling edge; the first pulse of a turn comes
+/// with that of the index.
 pub(super) fn advance() {
     let spindle = turning().get();
     let rises = spindle.edges % 2 == 1;
     if spindle.per_turn > 1 {
-        // The second sensor is a quarter of the way to the next mark behind.
+        // The second sensor is a quarter of the distance between two marks behind the first.
         all().second.set(rises == spindle.reversed);
         edge(1, rises);
     }
@@ -94,7 +98,7 @@ pub(super) fn advance() {
     turning().set(Turning { edges, next: now() + spindle.half, ..spindle });
 }
 
-/// A pin is driven.
+/// Sets the level of a pin, if it is a sensor's.
 pub(super) fn drive(pin: Pin, high: bool) {
     let Some(encoder) = ACTIVE.encoder else { return };
     for (line, of) in [encoder.index, encoder.sync].into_iter().enumerate() {
@@ -104,7 +108,7 @@ pub(super) fn drive(pin: Pin, high: bool) {
     }
 }
 
-/// A sensor, 0 index and 1 sync, lets its pin go high, or pulls it low.
+/// Lets a sensor, 0 index or 1 sync, release its pin to high, or pull it low.
 pub(super) fn edge(line: usize, high: bool) {
     let sensors = all();
     let mut levels = sensors.levels.get();

@@ -1,4 +1,4 @@
-//! What `avr/float.rs` takes from avr-libc, of the standard library.
+//! The functions that `avr/float.rs` takes from avr-libc, from the standard library.
 
 /// The square root.
 pub fn sqrtf(x: f32) -> f32 {

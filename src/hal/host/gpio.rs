@@ -16,22 +16,22 @@ pub fn set_outputs(on: u8) {
     switched().set(on);
 }
 
-/// Which outputs are on when they are low: of no account here, where outputs are counted before the pins.
+/// Sets the outputs to `on`. Which outputs are active low has no effect here, because no pins are modelled.
 pub fn set_low(_outputs: u8, on: u8) {
     set_outputs(on);
 }
 
-/// What [`set_outputs`] was told last.
+/// Returns what [`set_outputs`] was told last.
 pub fn outputs() -> u8 {
     switched().get()
 }
 
-/// Switches the drivers of these motors (bits) on, and the others off as far as the board can.
+/// Switches the drivers of these motors (bits) on and the others off, as far as the board can.
 pub fn power(motors: u8) {
     wanted().set(motors);
 }
 
-/// The motors whose drivers are on, as bits.
+/// Returns the motors whose drivers are on, as bits.
 pub fn powered() -> u8 {
     ACTIVE.powered(wanted().get())
 }

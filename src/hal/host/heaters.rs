@@ -1,4 +1,4 @@
-//! Heaters and their sensors: what tests say that the converter reads, and what the firmware has switched.
+//! Heaters and their sensors: tests set what the converter reads, and see what the firmware has switched.
 
 use super::Local;
 use crate::heat::sensor::SAMPLES;
@@ -20,23 +20,23 @@ pub fn begin(heater: u8) {
     begun().set(heater);
 }
 
-/// The reading that has been begun last; the highest if no sensor is there.
+/// Returns the reading that was begun last; the highest one if no sensor is there.
 pub fn reading() -> Option<u16> {
     Some(word(begun().get()).unwrap_or(SAMPLES * 1_023))
 }
 
-/// What a heater's MAX6675 sends, if one is there.
+/// Reads the word of a heater's MAX6675, `None` if none is there.
 pub fn word(heater: u8) -> Option<u16> {
     readings().get().get(usize::from(heater)).copied().flatten()
 }
 
-/// Switches the hot end, the bed and the fan: off with 0.
+/// Switches the hot end, the bed and the fan: off at 0, else on.
 pub fn drive(power: [u8; 3]) {
     let [hot_end, bed, fan] = power.map(|power| u8::from(power != 0));
     switched().set(hot_end | bed << 1 | fan << 2);
 }
 
-/// The converter reads this of a heater's sensor from now on.
+/// Sets what the converter reads of a heater's sensor from now on.
 pub fn set(heater: usize, reading: u16) {
     let mut all = readings().get();
     if let Some(place) = all.get_mut(heater) {
@@ -45,7 +45,7 @@ pub fn set(heater: usize, reading: u16) {
     readings().set(all);
 }
 
-/// What [`drive`] was told last: bits 0 hot end, 1 bed, 2 fan.
+/// Returns what [`drive`] was told last: bits 0 hot end, 1 bed, 2 fan.
 pub fn on() -> u8 {
     switched().get()
 }

@@ -1,4 +1,4 @@
-//! Inputs on the host: levels that tests set, and the same looks at them as on the chip.
+//! Inputs on the host: tests set the levels, and the same filter samples them as on the chip.
 
 use core::cell::{Cell, RefCell};
 
@@ -9,7 +9,7 @@ use crate::hal::event::Event;
 use crate::switches::{FIRST_US, LATER_US, Next, SOON_US, Switches};
 
 struct Inputs {
-    /// High ones.
+    /// Inputs whose pins are high.
     levels: Cell<u16>,
     switches: RefCell<Switches>,
     used: Cell<u16>,
@@ -41,7 +41,7 @@ const fn cycles(us: u32) -> u64 {
     (us * (ACTIVE.clock_hz / 1_000_000)) as u64
 }
 
-/// Which inputs are worked when low, and which of them stop the steps.
+/// Sets which inputs are active low, and which inputs stop the steps.
 pub fn set_up(low: u16, stops: u16) {
     all().stops.set(stops);
     if all().low.replace(low) != low {
@@ -50,40 +50,40 @@ pub fn set_up(low: u16, stops: u16) {
     }
 }
 
-/// The pins of these inputs are an encoder's from now on.
+/// Leaves the pins of these inputs to an encoder from now on.
 pub(super) fn leave_out(inputs: u16) {
     all().used.set(!inputs);
     all().fresh.set(true);
     edge();
 }
 
-/// The inputs that are not read because an encoder has their pins.
+/// Returns the inputs that are not read because an encoder uses their pins.
 pub fn left_out() -> u16 {
     !all().used.get()
 }
 
-/// These ends are no limits for now.
+/// Sets the ends of axes that are not limits for now.
 pub fn spare(ends: u8) {
     all().spared.set(ends);
 }
 
-/// Has the first of the inputs `armed` that comes to be as in `awaited` end the move
-/// ([`contact`]); none if `armed` is 0.
+/// Arms the end of a move: the first input of `armed` whose state becomes that in `awaited` ends the move
+/// ([`contact`]). 0 disarms.
 pub fn arm(armed: u16, awaited: u16) {
     all().armed.set((armed, awaited));
 }
 
-/// The inputs that are worked.
+/// Returns the inputs that are active.
 pub fn worked() -> u16 {
     all().switches.borrow().worked()
 }
 
-/// What has stopped the steps since the last call.
+/// Takes the inputs that have stopped the steps since the last call.
 pub fn take_hits() -> u16 {
     all().hits.take()
 }
 
-/// The pin of an input goes high, or low, from now on.
+/// Sets the level of an input's pin.
 pub(super) fn set(input: usize, high: bool) {
     let pin = ACTIVE.inputs.get(input).copied().flatten();
     let same = |i: &usize| pin.is_some() && ACTIVE.inputs[*i] == pin;
@@ -99,19 +99,19 @@ pub(super) fn set(input: usize, high: bool) {
     }
 }
 
-/// An edge, or what is to be looked at like one.
+/// Plans a sample as after an edge, if none is due.
 fn edge() {
     if all().next_sample.get() == NEVER {
         all().next_sample.set(now() + cycles(FIRST_US));
     }
 }
 
-/// When the next sample is due.
+/// Returns when the next sample is due.
 pub(super) fn next_sample() -> u64 {
     all().next_sample.get()
 }
 
-/// A sample, at its time.
+/// Takes a sample, at its time.
 pub(super) fn sample() {
     let wired = (0..inputs::COUNT).filter(|i| ACTIVE.inputs[*i].is_some());
     let wired = wired.fold(0, |bits, i| bits | 1 << i);

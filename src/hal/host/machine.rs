@@ -16,8 +16,8 @@ pub struct Machine {
 }
 
 impl Machine {
-    /// Makes the machine, with a millisecond count that begins at `ms`, and starts the firmware: `start` spawns its tasks, and says `None` if
-    /// it has been started before.
+    /// Makes the machine, with a millisecond count that begins at `ms`, and starts the firmware. `start` spawns its
+    /// tasks, and returns `None` if it has been started before; then this returns `None`, too.
     pub fn start(ms: u64, start: impl FnOnce(Spawner, Thread) -> Option<()>) -> Option<Self> {
         clock().set(ms * time::CYCLES_PER_MS);
         let runtime = Runtime::new();
@@ -27,99 +27,101 @@ impl Machine {
         Some(machine)
     }
 
-    /// The token of thread mode: between two calls of this nothing else runs.
+    /// Returns the token of thread mode. Nothing else runs between two calls of this machine's functions.
     pub fn thread(&self) -> Thread {
         self.runtime.thread()
     }
 
-    /// The sender goes on at `baud`.
+    /// Sets the rate of the sender to `baud`.
     pub fn set_baud(&self, baud: u32) {
         uart::set_sender_rate(USB, baud);
     }
 
-    /// The sender puts bytes on the line; they take their time.
+    /// Lets the sender put bytes on the line; they take their time.
     pub fn send(&self, bytes: &[u8]) {
         uart::send(USB, bytes);
     }
 
-    /// A program opens the first port, which is not the first to do so.
+    /// Lets a program, not the first, open the first port.
     pub fn open_usb(&self) {
         uart::open_usb();
     }
 
-    /// The program closes the first port.
+    /// Lets the program close the first port.
     pub fn close_usb(&self) {
         uart::close_usb();
     }
 
-    /// The sender puts a byte on the line that arrives damaged.
+    /// Lets the sender put a byte on the line that arrives damaged.
     pub fn send_damaged(&self) {
         uart::send_damaged(USB);
     }
 
-    /// The sender on the second port does.
+    /// Lets the sender on the second port put bytes on the line.
     pub fn send_aux(&self, bytes: &[u8]) {
         uart::send(AUX, bytes);
     }
 
-    /// The sender on the second port holds the machine back by the pin, or lets it go on.
+    /// Lets the sender on the second port stop the machine by its pin (CTS), or let it go on.
     pub fn set_aux_cts(&self, stop: bool) {
         uart::set_cts(AUX, stop);
     }
 
-    /// Whether the firmware holds the sender on the second port back by the pin.
+    /// Whether the firmware stops the sender on the second port by its pin (RTS).
     pub fn aux_rts(&self) -> bool {
         uart::rts(AUX)
     }
 
-    /// What the firmware has sent since the last call.
+    /// Takes what the firmware has sent since the last call.
     pub fn received(&self) -> Vec<u8> {
         uart::received(USB)
     }
 
-    /// What the firmware has sent to the second port since the last call.
+    /// Takes what the firmware has sent on the second port since the last call.
     pub fn received_aux(&self) -> Vec<u8> {
         uart::received(AUX)
     }
 
-    /// What the step pins have done so far.
+    /// Returns what the step pins have done so far.
     pub fn emitted(&self) -> stepper::Emitted {
         stepper::emitted()
     }
 
-    /// The contact at an input, of [`inputs`](crate::boards::inputs), closes: its pin goes low. Or it opens.
+    /// Closes the contact at an input of [`inputs`](crate::boards::inputs), so that its pin goes low, or opens it.
     pub fn set_input(&self, input: usize, closed: bool) {
         inputs::set(input, !closed);
     }
 
-    /// From now on the contact at an input is closed while the motor of its axis is at a step or beyond, or open if it
-    /// `opens` there; that of the probe while the third motor is, or below.
+    /// Makes a motor work the contact at an input from now on. The contact of an end is closed while the motor of its
+    /// axis is at `step` or beyond; the contact of the probe while the third motor is at `step` or below. With
+    /// `opens` it is open there instead.
     pub fn set_near(&self, input: usize, step: i64, opens: bool) {
         stepper::set_near(input, step, opens);
     }
 
-    /// The spindle turns at `rpm` turns a minute, with `per_turn` pulses of its encoder in each, backwards below 0, until it is told otherwise.
+    /// Turns the spindle at `rpm` turns a minute until the next call, with `per_turn` pulses of its encoder in each
+    /// turn; backwards below 0.
     pub fn turn_spindle(&self, rpm: f64, per_turn: u16) {
         encoder::turn(rpm, per_turn);
     }
 
-    /// The converter reads this of a heater's sensor (0 hot end, 1 bed) from now on.
+    /// Sets what the converter reads of a heater's sensor (0 hot end, 1 bed) from now on.
     pub fn set_sensor(&self, heater: usize, reading: u16) {
         heaters::set(heater, reading);
     }
 
-    /// Which heaters are on: bits 0 hot end, 1 bed, 2 fan.
+    /// Returns which heaters are on: bits 0 hot end, 1 bed, 2 fan.
     pub fn heaters_on(&self) -> u8 {
         heaters::on()
     }
 
-    /// Runs for a time.
+    /// Runs for `ms` milliseconds.
     pub fn run_ms(&self, ms: u64) {
         let end = now() + ms * time::CYCLES_PER_MS;
         while self.advance(end) {}
     }
 
-    /// Runs until `done`, for `ms` at most. Whether it came to that.
+    /// Runs until `done`, for at most `ms` milliseconds. Returns whether `done` became true.
     pub fn run_until(&self, ms: u64, mut done: impl FnMut() -> bool) -> bool {
         let end = now() + ms * time::CYCLES_PER_MS;
         while !done() {
@@ -130,7 +132,8 @@ impl Machine {
         true
     }
 
-    /// Moves the clock to the next event before `end` and lets the firmware react.
+    /// Moves the clock to the next event before `end` and lets the firmware react. Returns `false` if there is no
+    /// such event; the clock is at `end` then.
     fn advance(&self, end: u64) -> bool {
         let step = stepper::next_tick();
         let bytes = uart::next_event();
@@ -162,7 +165,7 @@ impl Machine {
         true
     }
 
-    /// Polls until nobody has anything left to do now.
+    /// Polls until no task has anything left to do now.
     fn settle(&self) {
         let thread = self.runtime.thread();
         self.runtime.settle(|bits| {

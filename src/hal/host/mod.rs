@@ -1,9 +1,8 @@
 //! The host's stand-in for the hardware, over mocked time.
 //!
-//! Each thread is one machine with a clock of its own, in CPU cycles. Code takes no time; what takes
-//! time is what does on the chip: bytes on the line, ticks of the step timer, milliseconds.
-//! [`Machine`] moves the clock from one such event to the next and runs the same tasks, rings and step
-//! generator as the image.
+//! Each thread is one machine with a clock of its own, in CPU cycles. Code takes no time. Time passes with what takes
+//! time on the chip as well: bytes on the line, ticks of the step timer, milliseconds. [`Machine`] moves the clock
+//! from one such event to the next and runs the same tasks, rings and step generator as the image.
 
 pub mod arithmetic;
 pub mod card;
@@ -47,7 +46,7 @@ pub mod text_functions {
     pub use super::text::copy_printing;
 }
 
-/// Never.
+/// The time of an event that never comes.
 const NEVER: u64 = u64::MAX;
 
 /// A value that only this thread's machine touches.
@@ -75,12 +74,12 @@ pub fn now() -> u64 {
     clock().get()
 }
 
-/// Starts the firmware anew. On the host it is only noted: see [`was_reset`].
+/// Restarts the firmware. On the host this is only recorded: see [`was_reset`].
 pub fn reset() {
     resets().set(true);
 }
 
-/// Starts the boot loader. On the host it is as [`reset`].
+/// Starts the boot loader. On the host this is the same as [`reset`].
 pub fn boot() {
     reset();
 }

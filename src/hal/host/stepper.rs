@@ -1,4 +1,4 @@
-//! The step timer on the host: the real step generator, ticking in mocked time, with pins that count.
+//! The step timer on the host: the real step generator, which ticks in mocked time, with pins that count.
 
 use core::cell::{Cell, RefCell};
 use std::vec::Vec;
@@ -24,13 +24,13 @@ struct Near {
     input: usize,
     motor: usize,
     step: i64,
-    /// The contact opens there instead of closing.
+    /// The contact opens at `step` instead of closing.
     opens: bool,
     closed: bool,
 }
 
 impl Near {
-    /// The motor is at `position`.
+    /// Opens or closes the contact, with the motor at `position`.
     fn look(&mut self, position: i64) {
         let upper = self.input < board_inputs::ENDS && self.input % 2 == 1;
         let worked = if upper { position >= self.step } else { position <= self.step };
@@ -110,7 +110,7 @@ impl Pins for Pinned {
     }
 }
 
-/// Sets the timer up; `None` after the first time.
+/// Sets the timer up and returns the filling end of the segment ring; `None` after the first time.
 pub fn start() -> Option<Producer<Segment, SEGMENTS>> {
     let (producer, consumer) = ring().split()?;
     stepper().segments.replace(Some(consumer));
@@ -127,18 +127,18 @@ pub fn go() {
     }
 }
 
-/// Stops the ticks at once and until [`release`], wherever the motors are.
+/// Stops the ticks at once, wherever the motors are; they stay stopped until [`release`].
 pub fn stop() {
     stepper().halted.set(true);
     stepper().next_tick.set(NEVER);
 }
 
-/// Whether they have been stopped.
+/// Whether [`stop`] has stopped the ticks and nothing has released them.
 pub fn is_stopped() -> bool {
     stepper().halted.get()
 }
 
-/// Ticks may come again.
+/// Allows ticks again after a stop.
 pub fn release() {
     stepper().halted.set(false);
 }
@@ -148,14 +148,15 @@ pub fn running() -> bool {
     stepper().next_tick.get() != NEVER
 }
 
-/// How long the segment that runs takes yet, cycles.
+/// Returns how long the running segment still takes, in cycles.
 pub fn left() -> u32 {
     let stepper = stepper();
     u32::from(stepper.dda.borrow().ticks) * stepper.pins.borrow().period as u32
 }
 
-/// Every motor is where its last pulse has put it; nothing is left of the segments, of which `held` would have
-/// come first after those that are queued. What they lack is taken off `position`. For exec, while no ticks come.
+/// Drops the rest of all segments after a stop, so that every motor stands where its last pulse has put it. `held` is
+/// the segment that would have come next after the queued ones. Subtracts the steps that were not made from
+/// `position`. Exec, while no ticks come.
 pub fn settle(mut held: Option<Segment>, position: &mut [i32; MOTORS]) {
     if running() {
         return;
@@ -165,26 +166,26 @@ pub fn settle(mut held: Option<Segment>, position: &mut [i32; MOTORS]) {
     stepper().dda.borrow_mut().settle(&mut queued, position);
 }
 
-/// Where the generator is right now, and the slot of its segment.
+/// Returns the state of the generator now, and the slot of its segment.
 pub fn moment() -> (Dda, u8) {
     (stepper().dda.borrow().clone(), ring().tail())
 }
 
-/// Which direction pins are inverted: of no account here, where positions are counted before the pins.
+/// Does nothing: positions are counted before pins are inverted.
 pub fn set_inverted(_motors: u8) {}
 
-/// How wide a step pulse is, in microseconds, and which step pins rest high: of no account either, but
-/// kept for tests.
+/// Keeps the width of a step pulse, in microseconds, and which step pins rest high, for tests. They have no other
+/// effect here.
 pub fn set_step_output(pulse_us: u8, inverted: u8) {
     stepper().output.set((pulse_us, inverted));
 }
 
-/// What was set last: pulse width, and the inverted motors as bits.
+/// Returns what [`set_step_output`] was told last: pulse width, and the inverted motors as bits.
 pub fn step_output() -> (u8, u8) {
     stepper().output.get()
 }
 
-/// The motor of an axis works the switch at an input from now on: see
+/// Makes the motor of an axis work the switch at an input from now on: see
 /// [`Machine::set_near`](super::Machine::set_near).
 pub(super) fn set_near(input: usize, step: i64, opens: bool) {
     let motor = if input < board_inputs::ENDS { input / 2 } else { 2 };
@@ -194,12 +195,12 @@ pub(super) fn set_near(input: usize, step: i64, opens: bool) {
     pins.near.push(near);
 }
 
-/// What the pins have done so far.
+/// Returns what the pins have done so far.
 pub fn emitted() -> Emitted {
     stepper().pins.borrow().emitted.clone()
 }
 
-/// When the next tick is due.
+/// Returns when the next tick is due.
 pub(super) fn next_tick() -> u64 {
     stepper().next_tick.get()
 }

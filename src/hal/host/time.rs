@@ -1,4 +1,4 @@
-//! embassy-time's driver over the machine's clock.
+//! The driver of `embassy-time` over the machine's clock.
 
 use core::cell::RefCell;
 use core::task::Waker;
@@ -32,7 +32,7 @@ impl Driver for Millis {
     }
 }
 
-/// Milliseconds since the machine was made, modulo 2^32.
+/// Returns the machine's clock in milliseconds, modulo 2^32.
 pub fn millis() -> u32 {
     DRIVER.now() as u32
 }
@@ -45,12 +45,12 @@ pub fn wake_expired() {
     }
 }
 
-/// When the next millisecond is due.
+/// Returns when the next millisecond is due.
 pub(super) fn next_tick() -> u64 {
     (now() / CYCLES_PER_MS + 1) * CYCLES_PER_MS
 }
 
-/// A millisecond has passed.
+/// Sets the event of the tick: a millisecond has passed.
 pub(super) fn tick() {
     flags::set(Event::Tick);
 }

@@ -1,4 +1,4 @@
-//! The serial ports on the host: bytes arrive and leave one after the other at the baud rate.
+//! The serial ports on the host. Bytes arrive and leave one after the other, at the baud rate.
 
 use core::cell::RefCell;
 use std::boxed::Box;
@@ -23,7 +23,7 @@ trait Fill {
     fn is_high(&self) -> bool;
     fn push(&mut self, byte: u8);
     fn newest(&self) -> u8;
-    /// Puts a mark where there is room, else over the newest byte.
+    /// Puts a mark where there is room, else replaces the newest byte by it.
     fn mark(&mut self, mark: u8);
     fn batch(&self) -> u8;
 }
@@ -47,7 +47,7 @@ impl<const N: usize> Fill for Producer<u8, N> {
 
     fn mark(&mut self, mark: u8) {
         if Producer::push(self, mark).is_err() {
-            // SAFETY: everything here is one thread, and neither exec nor the reader is running.
+            // SAFETY: everything here is one thread, and neither exec nor the reader runs now.
             let thread = unsafe { Thread::assume() };
             exec::lock(thread, |ceiling| self.amend(ceiling, 0, |newest| *newest = mark));
         }
@@ -68,22 +68,22 @@ struct Line {
     sent: Vec<u8>,
     /// The byte that is leaving.
     leaving: Option<u8>,
-    /// A byte to send before all others, and whether these are held back.
+    /// A byte to send before all others. `held` says whether XOFF holds those others back.
     ahead: Option<u8>,
-    /// For how many ms it waits for the end of a line, and whether a line is open.
+    /// For how many ms `ahead` waits for the end of a line. `open` says whether a line is open.
     wait_ms: u8,
     open: bool,
     held: bool,
-    /// The sender has been stopped by XOFF.
+    /// Whether XOFF has stopped the sender.
     stopped: bool,
-    /// Whether XOFF and XON count.
+    /// Whether XOFF and XON from the other side count.
     heeds_xoff: bool,
-    /// Whether real-time characters that print are text.
+    /// Whether printable real-time characters are text.
     plain: bool,
-    /// Whether CTS counts, and holds them back.
+    /// Whether the pin CTS counts. `cts` says whether it holds bytes back.
     heeds_cts: bool,
     cts: bool,
-    /// The sender is held back by RTS.
+    /// Whether RTS stops the sender.
     rts: bool,
     /// A program has opened the port.
     opened: bool,
@@ -96,7 +96,7 @@ struct Line {
     asked: Asked,
     /// The byte queued last.
     last: u8,
-    /// A byte's time at this end of the line and at the sender's.
+    /// Cycles of a byte at the firmware's rate; `sender_cycles` is the same at the sender's rate.
     byte_cycles: u64,
     rate: u32,
     sender_cycles: u64,
@@ -150,8 +150,8 @@ fn with<R>(port: u8, act: impl FnOnce(&mut Line) -> R) -> R {
     act(&mut lines()[usize::from(port)].borrow_mut())
 }
 
-/// Starts the lines, the senders' ends too: USB at `rate` bits a second, the other at the board's; `None` after
-/// the first time.
+/// Starts the lines, and the senders' ends, too: USB at `rate` bits a second, the second port at the board's rate.
+/// `None` after the first time.
 pub fn start(rate: u32) -> Option<AllEnds> {
     let usb = split(USB, usb_rx(), usb_tx(), rate)?;
     let aux = match hardware(AUX) {
@@ -178,12 +178,12 @@ fn split<const N: usize>(
     Some((rx_out.into_view(), tx_in))
 }
 
-/// Goes on at `rate` bits a second.
+/// Changes the firmware's rate to `rate` bits a second.
 pub fn set_rate(port: u8, rate: u32) {
     with(port, |line| (line.byte_cycles, line.rate) = (byte_cycles(rate), rate));
 }
 
-/// The sender goes on at `rate` bits a second.
+/// Changes the sender's rate to `rate` bits a second.
 pub(super) fn set_sender_rate(port: u8, rate: u32) {
     with(port, |line| line.sender_cycles = byte_cycles(rate));
 }
@@ -192,13 +192,13 @@ fn byte_cycles(rate: u32) -> u64 {
     u64::from(ACTIVE.clock_hz) * 10 / u64::from(rate)
 }
 
-/// Sends what the ring holds.
+/// Starts sending what the ring holds.
 pub fn kick(port: u8) {
     with(port, Line::kick);
 }
 
-/// Stops the sender, or lets it go on, in the way they have agreed upon. A character may wait for the end of a line if
-/// it `waits`.
+/// Stops the sender or lets it go on, by the flow control that the two sides have agreed on. If `waits`, XOFF or XON
+/// may wait for the end of a line.
 pub fn stop_sender(port: u8, flow: Flow, stop: bool, waits: bool) {
     with(port, |line| match flow {
         Flow::None => {}
@@ -215,12 +215,12 @@ pub fn stop_sender(port: u8, flow: Flow, stop: bool, waits: bool) {
     });
 }
 
-/// Whether the sender has been stopped by XOFF, by thread mode or by [`stop_late`].
+/// Whether XOFF has stopped the sender, sent by thread mode or by [`stop_late`].
 pub fn is_stopped(port: u8) -> bool {
     with(port, |line| line.stopped)
 }
 
-/// Stops the sender of the second port by XOFF if its ring fills while thread mode has no turn. Exec.
+/// Stops the sender of the second port by XOFF if its receive ring fills while thread mode has no turn. Exec.
 pub fn stop_late() {
     if aux_rx().used() < LATE {
         return;
@@ -234,12 +234,12 @@ pub fn stop_late() {
     });
 }
 
-/// Whether `!`, `~`, `%` and bytes above 0x7F are text, from now on.
+/// Sets whether `!`, `~`, `%` and bytes above 0x7F are plain text from now on.
 pub fn set_plain(port: u8, plain: bool) {
     with(port, |line| line.plain = plain);
 }
 
-/// How the other side may hold it back from now on.
+/// Sets how the other side may stop this port's transmitter from now on.
 pub fn set_flow(port: u8, flow: Flow) {
     with(port, |line| {
         line.heeds_xoff = flow == Flow::Characters;
@@ -251,7 +251,7 @@ pub fn set_flow(port: u8, flow: Flow) {
     });
 }
 
-/// Sends on what CTS has held back, and XOFF or XON that has waited for long enough. Each millisecond.
+/// Sends XOFF or XON that has waited long enough, and what CTS has held back. Each millisecond.
 pub fn look() {
     for port in 0..PORTS as u8 {
         with(port, |line| line.wait_ms = line.wait_ms.saturating_sub(1));
@@ -262,7 +262,7 @@ pub fn look() {
 /// Does nothing: bytes that find no room in the ring are lost.
 pub fn go_on() {}
 
-/// It does, for tests: [`Machine::open_usb`](super::Machine::open_usb).
+/// Always true, so that tests can open the port: [`Machine::open_usb`](super::Machine::open_usb).
 pub fn sees_opening() -> bool {
     true
 }
@@ -277,24 +277,24 @@ pub fn take_closed() -> bool {
     with(USB, |line| core::mem::take(&mut line.closed))
 }
 
-/// A program opens the first port.
+/// Lets a program open the first port.
 pub(super) fn open_usb() {
     with(USB, |line| (line.opened, line.closed) = (true, false));
     flags::set(Event::Realtime);
 }
 
-/// The program closes it.
+/// Lets the program close the first port.
 pub(super) fn close_usb() {
     with(USB, |line| line.closed = true);
     flags::set(Event::Received);
 }
 
-/// Line ends lost since start-up, modulo 2^16.
+/// Returns how many line ends have been lost since start-up, modulo 2^16.
 pub fn lost_ends(port: u8) -> u16 {
     with(port, |line| line.lost_ends)
 }
 
-/// Bytes that may come before any is lost, at most 254: one less than the receive ring has room for.
+/// Returns how many bytes may come before one is lost, at most 254: one less than the receive ring has room for.
 pub fn room(port: u8) -> u8 {
     let (size, used) = match port {
         AUX => (AUX_RING, aux_rx().used()),
@@ -303,21 +303,21 @@ pub fn room(port: u8) -> u8 {
     (size - 2).saturating_sub(used) as u8
 }
 
-/// Whether half of the second port's receive ring is full: the other half lasts 3 ms, so that whoever has much to do gives
-/// way to the reader. Thread mode.
+/// Whether half of the second port's receive ring is full. The other half lasts 3 ms, so a task with much to do then
+/// gives way to the reader. Thread mode.
 pub fn presses() -> bool {
     aux_rx().used() >= AUX_RING / 2
 }
 
-/// Whether the reader is to have its turn before a line that waits is carried out: see [`serial::calls_reader`]; on the second port
-/// any byte says so. Thread mode.
+/// Whether the reader has to have its turn before the next waiting line is carried out: see [`serial::calls_reader`].
+/// On the second port any waiting byte is a reason. Thread mode.
 pub fn calls_reader() -> bool {
     // SAFETY: the reader does not run meanwhile.
     let ring = unsafe { usb_rx().window() };
     aux_rx().used() > 0 || serial::calls_reader(&ring)
 }
 
-/// The slot of the receive ring with the byte that came last, if it still waits there.
+/// Returns the slot of the receive ring that holds the newest byte; `None` if that byte has been read.
 pub fn newest(port: u8) -> Option<u8> {
     match port {
         AUX => aux_rx().newest(),
@@ -325,29 +325,29 @@ pub fn newest(port: u8) -> Option<u8> {
     }
 }
 
-/// The slot of the mark that stands for the last `%` or `^d`, if it has not been read.
+/// Returns the slot of the mark that stands for the last `%` or `^d`; `None` if no such mark waits.
 pub fn last_cut(port: u8) -> Option<u8> {
     // SAFETY: the reader does not run meanwhile.
     let ring = unsafe { if port == AUX { aux_rx().window() } else { usb_rx().window() } };
     last_mark(&ring)
 }
 
-/// Whether an exclamation mark has come that nobody has taken yet, on any port.
+/// Whether a `!` has come, on any port, that nobody has taken yet.
 pub fn asks_hold() -> bool {
     (0..PORTS as u8).any(|port| with(port, |line| line.realtime & realtime::HOLD != 0))
 }
 
-/// The real-time characters since the last call, as bits (see [`realtime`]).
+/// Takes the real-time characters since the last call, as bits (see [`realtime`]).
 pub fn take_realtime(port: u8) -> u8 {
     with(port, |line| core::mem::take(&mut line.realtime))
 }
 
-/// What characters have asked of overrides since the last call.
+/// Takes the override requests that characters have made since the last call.
 pub fn take_asked(port: u8) -> Asked {
     with(port, |line| core::mem::take(&mut line.asked))
 }
 
-/// The sender puts bytes on the line.
+/// Lets the sender put bytes on the line.
 pub(super) fn send(port: u8, bytes: &[u8]) {
     with(port, |line| {
         line.arriving.extend(bytes.iter().map(|byte| (*byte, true)));
@@ -355,7 +355,7 @@ pub(super) fn send(port: u8, bytes: &[u8]) {
     });
 }
 
-/// The sender puts a byte on the line that arrives damaged.
+/// Lets the sender put a byte on the line that arrives damaged.
 pub(super) fn send_damaged(port: u8) {
     with(port, |line| {
         line.arriving.push_back((b'x', false));
@@ -363,12 +363,12 @@ pub(super) fn send_damaged(port: u8) {
     });
 }
 
-/// The sender holds the machine back by its RTS, which is our CTS, or lets it go on.
+/// Lets the sender stop the machine by its RTS, which is our CTS, or let it go on.
 pub(super) fn set_cts(port: u8, stop: bool) {
     with(port, |line| line.cts = stop);
 }
 
-/// Whether the machine holds the sender back by RTS.
+/// Whether the machine stops the sender by RTS.
 pub(super) fn rts(port: u8) -> bool {
     with(port, |line| line.rts)
 }
@@ -378,13 +378,13 @@ pub(super) fn received(port: u8) -> Vec<u8> {
     with(port, |line| core::mem::take(&mut line.sent))
 }
 
-/// When the next byte is through, in either direction.
+/// Returns when the next byte has passed the line, in either direction.
 pub(super) fn next_event() -> u64 {
     let due = |line: &RefCell<Line>| line.borrow().next_rx.min(line.borrow().next_tx);
     lines().iter().map(due).min().unwrap_or(NEVER)
 }
 
-/// The bytes that are through by now.
+/// Handles the bytes that have passed the line by now.
 pub(super) fn advance() {
     for line in lines() {
         line.borrow_mut().advance();
@@ -392,7 +392,7 @@ pub(super) fn advance() {
 }
 
 impl Line {
-    /// Whether the two ends differ too much to understand each other: by more than 4.5 %.
+    /// Whether the rates of the two ends differ too much to understand each other: by more than 4.5 %.
     fn garbles(&self) -> bool {
         self.byte_cycles.abs_diff(self.sender_cycles) * 1_000 > self.sender_cycles * 45
     }
@@ -440,7 +440,8 @@ impl Line {
         self.next_tx = if self.leaving.is_some() { now() + self.byte_cycles } else { NEVER };
     }
 
-    /// Queues the mark of a real-time character: that of a loss if there is no room, but none for a resume.
+    /// Queues the mark of a real-time character. If there is no room, the mark becomes that of a loss; a resume goes
+    /// without a place.
     fn place(&mut self, character: u8) {
         let Some(ring) = self.rx_in.as_mut() else { return };
         match ring.is_full() {
@@ -491,7 +492,7 @@ impl Line {
         self.last = ring.newest();
         self.queued = self.queued.wrapping_add(1);
         let batch = self.queued.is_multiple_of(ring.batch());
-        // The reader may come too late to stop the sender.
+        // The reader may come too late to stop the sender, so RTS is set here.
         self.rts |= batch && self.heeds_cts && ring.is_high();
         if full || byte < b' ' || batch {
             flags::set(Event::Received);
@@ -499,7 +500,7 @@ impl Line {
     }
 }
 
-/// Marks the loss of a byte. Returns the line ends that it counts.
+/// Marks the loss of a byte. Returns the number of line ends that this loss adds, 0 or 1.
 fn lost(ring: &mut dyn Fill, byte: u8) -> u16 {
     let begun = if ring.is_full() { mark(ring.newest()) } else { 0 };
     let (mark, is_end) = lose(begun, byte);

@@ -11,22 +11,22 @@ machine_static! {
     fn started() -> Local<Cause> = Local::new(Cause::PowerOn);
 }
 
-/// Why the machine has started.
+/// Returns why the machine has started.
 pub fn cause() -> Cause {
     started().get()
 }
 
-/// Has the next machine of this thread start so.
+/// Sets the cause with which the next machine of this thread starts.
 pub fn set_cause(cause: Cause) {
     started().set(cause);
 }
 
-/// All is well.
+/// Restarts the time of the watchdog: all is well.
 pub fn feed() {
     last().set(now());
 }
 
-/// When it was fed last, in CPU cycles.
+/// Returns when the watchdog was fed last, in CPU cycles.
 pub fn fed() -> u64 {
     last().get()
 }

@@ -22,7 +22,7 @@ progmem! { static PAIRS: [[u8; 2]; 128] = pairs!(); }
 pub struct Text(Plain);
 
 impl Text {
-    /// The text that `packed` stands for.
+    /// Makes a text from its packed bytes.
     pub const fn new(packed: Plain) -> Self {
         Self(packed)
     }
@@ -34,7 +34,7 @@ impl Text {
         self.bytes().count()
     }
 
-    /// Whether there is none.
+    /// Whether the text is empty.
     pub const fn is_empty(self) -> bool {
         self.0.is_empty()
     }
@@ -48,7 +48,7 @@ impl Text {
 /// The bytes of a [`Text`].
 pub struct Bytes {
     packed: Plain,
-    /// What is left of the part being read, the next one last.
+    /// What is left of the code that is being unpacked, the next byte last.
     pending: Vec<u8, DEPTH>,
 }
 
@@ -69,7 +69,7 @@ impl Iterator for Bytes {
         while let Some([first, second]) =
             byte.checked_sub(FIRST).and_then(|code| PAIRS.at(code.into()))
         {
-            // A test holds the parts to their depth.
+            // A test ensures that the codes are not nested deeper than `DEPTH`.
             let _ = self.pending.push(second);
             byte = first;
         }

@@ -1,7 +1,9 @@
-//! TMC2209 drivers on one line of UART1: what they are told, again and again, for they forget it when the motors' supply fails.
+//! TMC2209 drivers on one line of UART1. Their settings are sent again and again, because a driver forgets them when
+//! the motors' supply fails.
 //!
-//! Called by thread mode each millisecond. A datagram of 8 bytes goes to the UART's FIFO each [`EVERY_MS`], each millisecond while a register has a new value;
-//! nothing waits, and nothing is read: a driver that does not hear keeps what its pins say. Cost: 300 cycles a datagram.
+//! Thread mode calls it each millisecond. It writes a datagram of 8 bytes to the UART's FIFO each [`EVERY_MS`], or
+//! each millisecond while a register has a new value. Nothing waits, and nothing is read: a driver that receives
+//! nothing keeps what its pins say. Cost: 300 cycles a datagram.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -11,14 +13,14 @@ use super::gpio::{Unit, connect, connect_pulled};
 use crate::boards::{ACTIVE, MOTORS};
 use crate::drivers::{FIRST, REGISTERS, datagram};
 
-/// Bits a second. Drivers find the rate out by themselves.
+/// Bits a second. The drivers detect the rate.
 const RATE: u32 = 115_200;
-/// Milliseconds from a datagram to the next.
+/// Milliseconds from one datagram to the next while no value is new.
 const EVERY_MS: u32 = 4;
 
-/// The values of the registers, those of motor 1 first. Thread mode alone uses them.
+/// The values of the registers, motor 1 first. Only thread mode uses them.
 static VALUES: [AtomicU32; MOTORS * REGISTERS] = first();
-/// Those of them that are new, as bits.
+/// The values that are new, as bits.
 static NEW: AtomicU32 = AtomicU32::new(0);
 const _: () = assert!(MOTORS * REGISTERS <= 32);
 
@@ -50,7 +52,7 @@ pub(super) fn start() {
     });
 }
 
-/// What the registers of a motor's driver are to be. Thread mode.
+/// Sets the values of the registers of a motor's driver. Thread mode.
 pub fn tell(motor: u8, values: &[u32; REGISTERS]) {
     let first = usize::from(motor) * REGISTERS;
     for (at, value) in (first..).zip(values) {
@@ -62,7 +64,7 @@ pub fn tell(motor: u8, values: &[u32; REGISTERS]) {
     }
 }
 
-/// Sends a datagram, if it is time for one. Thread mode, each millisecond.
+/// Sends the next datagram, if it is time for one. Thread mode, each millisecond.
 pub(super) fn look(now_ms: u32) {
     let Some(drivers) = ACTIVE.drivers else { return };
     let new = NEW.load(Ordering::Relaxed);

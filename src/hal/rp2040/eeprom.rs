@@ -1,13 +1,16 @@
-//! Memory that keeps its bytes: a copy in RAM, and in the last 64 KiB of the flash the same in pieces, by `sequential-storage`.
+//! Memory that keeps its bytes: a copy in RAM, and the same bytes in pieces in the last 64 KiB of the flash, by
+//! `sequential-storage`.
 //!
-//! A byte that is written goes to the copy at once; its piece of 32 bytes becomes an item of the map in the flash, whole or not at all. Items of the
-//! map are written one behind the other over all sectors, which wear alike.
+//! A byte that is written goes to the copy at once. Its piece of 32 bytes becomes an item of the map in the flash,
+//! whole or not at all. Items of the map are written one after the other over all sectors, so the sectors wear alike.
 //!
-//! **While the flash is written nothing else runs from it**: for 1 ms, and each 80 items for 45 ms, in which a sector is erased. So a piece waits
-//! until the motors rest and no byte has come for [`QUIET_MS`]; [`Memory::is_busy`] says so until then. Meanwhile it takes more bytes, so that a record of
-//! the log is two or three items, not one for each byte. One piece waits at most: who writes to another one before its turn has it written at once.
+//! **While the flash is written nothing else runs from it**: for 1 ms, and every 80 items for 45 ms, in which a
+//! sector is erased. So a piece waits until the motors rest and no byte has come for [`QUIET_MS`]; until then
+//! [`Memory::is_busy`] is true. The waiting piece takes more bytes meanwhile, so a record of the log is two or three
+//! items, not one for each byte. At most one piece waits: a write to another piece makes the waiting one be stored at
+//! once.
 //!
-//! Thread mode alone uses it, after start-up. RAM: 8.4 KB.
+//! Only thread mode uses it, after start-up. RAM: 8.4 KB.
 
 use core::cell::UnsafeCell;
 use core::ops::Range;
@@ -27,12 +30,12 @@ use crate::store::program::AREA;
 const BYTES: usize = 8_192;
 /// Bytes of a piece.
 const PIECE: usize = 32;
-/// Of the flash, and where pieces are in it: `memory.x` leaves that part free.
+/// The size of the flash, and the place of the pieces in it: `memory.x` leaves that part free.
 const FLASH_BYTES: usize = 2 << 20;
 const PLACE: Range<u32> = (FLASH_BYTES - (64 << 10)) as u32..FLASH_BYTES as u32;
-/// Without a byte for so long a sender waits for an answer, or has nothing to say.
+/// If no byte has come for this long, the sender waits for an answer, or has nothing to say.
 const QUIET_MS: u32 = 5;
-/// Room for an item with what the map puts beside it.
+/// Room for an item, with what the map adds to it.
 const ITEM: usize = 64;
 
 /// The driver of the flash.
@@ -43,13 +46,13 @@ type Map = MapStorage<u8, Chip, Cache<Uncached, Uncached, Uncached, u8>>;
 struct State {
     bytes: [u8; BYTES],
     map: Option<Map>,
-    /// The piece that the flash has not got yet.
+    /// The piece that is not in the flash yet.
     waiting: Option<u8>,
 }
 
 struct Shared(UnsafeCell<State>);
 
-// SAFETY: thread mode alone uses it: see `with`.
+// SAFETY: only thread mode uses it: see `with`.
 unsafe impl Sync for Shared {}
 
 static STATE: Shared =
@@ -60,7 +63,7 @@ fn with<R>(act: impl FnOnce(&mut State) -> R) -> R {
     act(unsafe { &mut *STATE.0.get() })
 }
 
-/// Reads what has been kept. Start-up.
+/// Reads the bytes that the flash has kept. Start-up.
 pub(super) fn start(flash: embassy_rp::Peri<'static, FLASH>) {
     let chip = BlockingAsync::new(Flash::new_blocking(flash));
     let mut map = Map::new(chip, const { MapConfig::new(PLACE) }, Cache::new_uncached());
@@ -70,7 +73,8 @@ pub(super) fn start(flash: embassy_rp::Peri<'static, FLASH>) {
     });
 }
 
-/// Puts all pieces where they belong; of a piece that is there several times the last one counts. What cannot be read is as erased.
+/// Copies all pieces to their places. If a piece is there several times, the last one counts. What cannot be read
+/// stays as if erased.
 fn read(map: &mut Map, bytes: &mut [u8; BYTES]) {
     let mut room = [0; ITEM];
     block_on(async {
@@ -86,16 +90,16 @@ fn read(map: &mut Map, bytes: &mut [u8; BYTES]) {
 }
 
 impl State {
-    /// Writes the piece that waits.
+    /// Writes the piece that waits to the flash.
     fn put_away(&mut self) {
         let (Some(number), Some(map)) = (self.waiting.take(), self.map.as_mut()) else { return };
         let at = usize::from(number) * PIECE;
         let Some(piece) = self.bytes.get(at..at + PIECE) else { return };
-        // Erasing takes as long as the flash pleases, at worst longer than the watchdog waits.
+        // Erasing takes as long as the flash needs, at worst longer than the watchdog waits.
         watchdog::off();
         let mut room = [0; ITEM];
         let mut store = || block_on(map.store_item(&mut room, &number, &piece)).is_ok();
-        // A part of the flash that makes no sense is begun anew: all pieces follow, a turn each.
+        // If the map in the flash makes no sense, all of it is erased, and all pieces are written again.
         if !store() {
             let _ = block_on(map.erase_all());
             for (number, piece) in (0..).zip(self.bytes.chunks_exact(PIECE)) {
@@ -108,12 +112,12 @@ impl State {
     }
 }
 
-/// The number of the piece that has an address.
+/// Returns the number of the piece that contains an address.
 fn number(at: u16) -> u8 {
     (usize::from(at) / PIECE) as u8
 }
 
-/// Writes the piece that waits, if nothing is disturbed by it. Whether none waits any more.
+/// Writes the piece that waits, if that disturbs nothing now. Returns whether no piece waits any more.
 fn is_kept() -> bool {
     with(|state| {
         let quiet = time::millis().wrapping_sub(uart::heard_at()) >= QUIET_MS;
@@ -128,7 +132,7 @@ fn is_kept() -> bool {
 pub struct Eeprom(());
 
 impl Eeprom {
-    /// Access from thread mode. One task at most is to write each part.
+    /// Returns access from thread mode. At most one task may write each part.
     pub fn take() -> Self {
         Self(())
     }
@@ -164,7 +168,7 @@ impl Memory for Eeprom {
     }
 }
 
-/// A turn of the main loop, each millisecond.
+/// Writes the waiting piece when that is possible. Thread mode, each millisecond.
 pub(super) fn look() {
     is_kept();
 }

@@ -1,7 +1,8 @@
-//! The pulses of the spindle's sensors: the handler of edges ([`super::inputs`]) takes their time, in counts of 4 us.
+//! The pulses of the spindle's sensors: the handler of edges ([`super::inputs`]) records their times, in counts of 4
+//! us.
 //!
-//! A pulse is the falling edge of a pin that has been still for `bounce` before, so that a contact that bounces is one pulse. Who reads does so
-//! with interrupts off for some cycles.
+//! A pulse is a falling edge of a pin that has not changed for `bounce` before, so that a contact that bounces makes
+//! one pulse. A read has interrupts off for some cycles.
 
 use core::cell::UnsafeCell;
 
@@ -12,19 +13,20 @@ use crate::boards::{ACTIVE, Pin};
 use crate::capability::Capability;
 use crate::encoder::Pulses;
 
-/// What handler and readers share.
+/// The state that the handler and readers share.
 struct State {
     pulses: Pulses,
     in_use: u8,
-    /// How long contacts bounce, counts.
+    /// How long contacts bounce, in counts.
     bounce: u16,
-    /// When each pin has changed last, counts.
+    /// When each pin changed last, in counts.
     edges: [u32; 2],
 }
 
 struct Shared(UnsafeCell<State>);
 
-// SAFETY: the handler of edges, which nothing of ours preempts, and others with interrupts off: see `with`.
+// SAFETY: only the handler of edges, which nothing of ours preempts, and others with interrupts off use it: see
+// `with`.
 unsafe impl Sync for Shared {}
 
 static STATE: Shared =
@@ -35,28 +37,29 @@ fn with<R>(act: impl FnOnce(&mut State) -> R) -> R {
     mask(|| act(unsafe { &mut *STATE.0.get() }))
 }
 
-/// Counts of 4 us since start-up.
+/// Returns the counts of 4 us since start-up.
 fn counts() -> u32 {
     TIMER.timerawl().read() / 4
 }
 
-/// The pins of the sensors, index first, if the image can use them.
+/// Returns the pins of the sensors, index first; `None` if the image cannot use them.
 fn pins() -> Option<[Pin; 2]> {
     let encoder = ACTIVE.encoder.filter(|_| Capability::Lathe.is_built_in())?;
     Some([encoder.index, encoder.sync])
 }
 
-/// Pull-ups. Start-up.
+/// Sets the pull-ups. Start-up.
 pub(super) fn start() {
     pins().into_iter().flatten().for_each(gpio::pull_up);
 }
 
-/// The pins whose edges are a sensor's, as bits of their numbers.
+/// Returns the pins whose edges are a sensor's, as bits of their numbers.
 pub(super) fn watched() -> u32 {
     pins().into_iter().flatten().fold(0, |bits, pin| bits | 1 << pin.bit)
 }
 
-/// The sensors `lines` are read from now on (bit 0 index, bit 1 sync), whose contacts bounce for so many counts. Thread mode.
+/// Sets which sensors are read from now on (bit 0 index, bit 1 sync), and for how many counts their contacts bounce.
+/// Thread mode.
 pub fn set_up(lines: u8, bounce: u16) {
     with(|state| (state.in_use, state.bounce) = (lines, bounce));
     inputs::leave_out(ACTIVE.shared_inputs(lines));
@@ -67,12 +70,12 @@ pub fn is_set_up() -> bool {
     with(|state| state.in_use != 0)
 }
 
-/// What the sensors have seen so far. Thread mode and exec.
+/// Returns the pulses counted and timed so far. Thread mode and exec.
 pub fn read() -> Pulses {
     with(|state| Pulses { now: counts() as u16, ..state.pulses })
 }
 
-/// Edges at pins, as bits of their numbers. The handler of edges.
+/// Records edges at pins, as bits of their numbers. The handler of edges.
 pub(super) fn edges(changed: u32) {
     let Some(pins) = pins() else { return };
     let levels = gpio::levels();

@@ -1,6 +1,6 @@
-//! Pins of the board: outputs that are not steps, and what connects a pin to a unit of the chip.
+//! Pins of the board: outputs that are not steps, and the connection of pins to units of the chip.
 //!
-//! Setting a pin is one store that disturbs no other.
+//! Setting a pin is one store that disturbs no other pin.
 
 use embassy_rp::pac::io::vals::{Inover, Outover};
 use embassy_rp::pac::{IO_BANK0, PADS_BANK0, SIO};
@@ -9,7 +9,7 @@ use crate::boards::outputs::{COUNTERCLOCKWISE, SPINDLE};
 use crate::boards::{ACTIVE, Pin};
 use crate::hal::byte::SharedByte;
 
-/// What a pin is connected to (RP2040 data sheet, 2.19.2).
+/// The unit that a pin is connected to (RP2040 data sheet, 2.19.2).
 #[derive(Clone, Copy)]
 #[repr(u8)]
 pub(super) enum Unit {
@@ -19,12 +19,12 @@ pub(super) enum Unit {
     Pio0 = 6,
 }
 
-/// The pin of the first channel of the converter.
+/// The pin of the first channel of the analog-to-digital converter.
 const FIRST_SENSED: u8 = 26;
-/// Connects a pin to nobody.
+/// Connects a pin to no unit.
 const NOBODY: u8 = 0x1F;
 
-/// Connects a pin. Start-up.
+/// Connects a pin to a unit. Start-up.
 pub(super) fn connect(pin: Pin, unit: Unit) {
     PADS_BANK0.gpio(pin.bit.into()).modify(|w| {
         w.set_ie(true);
@@ -38,32 +38,32 @@ pub(super) fn connect(pin: Pin, unit: Unit) {
     });
 }
 
-/// An input with a pull-up. Start-up.
+/// Makes a pin an input with a pull-up. Start-up.
 pub(super) fn pull_up(pin: Pin) {
     connect_pulled(pin, Unit::Cpu);
 }
 
-/// Connects an input that keeps its pull-up. Start-up.
+/// Connects an input to a unit, with a pull-up. Start-up.
 pub(super) fn connect_pulled(pin: Pin, unit: Unit) {
     connect(pin, unit);
     PADS_BANK0.gpio(pin.bit.into()).modify(|w| w.set_pue(true));
 }
 
-/// Leaves the pin of a channel of the converter to that. Start-up.
+/// Leaves the pin of an analog channel to the converter. Start-up.
 pub(super) fn sense(channel: u8) {
     let pin = usize::from(FIRST_SENSED + channel);
     IO_BANK0.gpio(pin).ctrl().write(|w| w.set_funcsel(NOBODY));
     PADS_BANK0.gpio(pin).write(|w| w.set_od(true));
 }
 
-/// Has an output of a unit inverted, or not.
+/// Sets whether the output of a unit is inverted at a pin.
 pub(super) fn invert(pin: Pin, inverted: bool) {
     IO_BANK0.gpio(pin.bit.into()).ctrl().modify(|w| {
         w.set_outover(if inverted { Outover::INVERT } else { Outover::NORMAL });
     });
 }
 
-/// The levels of all pins.
+/// Returns the levels of all pins.
 pub(super) fn levels() -> u32 {
     SIO.gpio_in(0).read()
 }
@@ -75,7 +75,7 @@ pub(super) fn set(pin: Pin, high: bool) {
     one.write_value(1 << pin.bit);
 }
 
-/// Makes an output of a pin.
+/// Makes a pin an output.
 fn output(pin: Pin) {
     connect(pin, Unit::Cpu);
     drive(pin);
@@ -85,8 +85,8 @@ fn drive(pin: Pin) {
     SIO.gpio_oe(0).value_set().write_value(1 << pin.bit);
 }
 
-/// Makes outputs of the board's outputs: drivers off, hazards off. Of the spindle's enable it is not known yet which level is off: see
-/// [`set_low`].
+/// Makes the board's output pins outputs: drivers off, hazards off. The level that switches the spindle off is not
+/// known yet, so the pin of its enable is not driven before [`set_low`].
 pub(super) fn start() {
     let enables = ACTIVE.motors.iter().filter_map(|motor| motor.enable);
     enables.chain(ACTIVE.enable_all).for_each(|enable| {
@@ -103,16 +103,16 @@ pub(super) fn start() {
     }
 }
 
-/// The motors whose drivers are wanted on, as bits.
+/// The motors whose drivers have been asked for, as bits.
 static WANTED: SharedByte = SharedByte::new(0);
 
-/// The motors whose drivers are on, as bits.
+/// Returns the motors whose drivers are on, as bits.
 pub fn powered() -> u8 {
     ACTIVE.powered(WANTED.get())
 }
 
-/// Switches the drivers of these motors (bits) on, and the others off as far as the board can: an
-/// enable that all drivers share is on for any of them. Exec, or while it cannot run.
+/// Switches the drivers of these motors (bits) on and the others off, as far as the board can: an enable that all
+/// drivers share is on as soon as one of them is wanted. Exec, or other levels while exec cannot run.
 pub fn power(motors: u8) {
     WANTED.set(motors);
     for (m, motor) in ACTIVE.motors.iter().enumerate() {
@@ -125,14 +125,14 @@ pub fn power(motors: u8) {
     }
 }
 
-/// The outputs that are on when they are low, as bits.
+/// The outputs that are active low, as bits.
 static LOW: SharedByte = SharedByte::new(0);
 
-/// Switches the outputs of M3 to M9, bits of [`outputs`](crate::boards::outputs). The direction of a spindle that is
-/// off stays as it is. Exec, or while it cannot run.
+/// Switches the outputs of M3 to M9, bits of [`outputs`](crate::boards::outputs). While the spindle is off, its
+/// direction pin keeps its level. Exec, or other levels while exec cannot run.
 pub fn set_outputs(on: u8) {
     let high = on ^ LOW.get();
-    // The direction before the enable.
+    // The direction is set before the enable.
     for o in [1, 0, 2, 3] {
         if let Some(pin) = ACTIVE.outputs[o]
             && (1 << o != COUNTERCLOCKWISE || on & SPINDLE != 0)
@@ -142,8 +142,8 @@ pub fn set_outputs(on: u8) {
     }
 }
 
-/// Which outputs are on when they are low. From the first time on the spindle's enable is driven. Thread mode, while
-/// exec cannot run.
+/// Sets which outputs are active low, and switches to the outputs `on`. The first call also begins to drive the
+/// enable of the spindle. Thread mode, while exec cannot run.
 pub fn set_low(outputs: u8, on: u8) {
     LOW.set(outputs);
     if let Some(direction) = ACTIVE.outputs[1] {

@@ -1,7 +1,8 @@
-//! Heaters and their sensors: the converter, and the pins.
+//! Heaters and their sensors: the analog-to-digital converter, and the pins.
 //!
-//! A reading is [`SAMPLES`] conversions of 12 bits one after the other, 2 us each, whose sum is as if each had 10. [`begin`] waits for them,
-//! 64 us of thread mode each 20 ms: no interrupt, and nobody else uses the converter. One that does not answer leaves no reading.
+//! A reading is [`SAMPLES`] conversions of 12 bits one after the other, 2 us each. Their sum is scaled as if each had
+//! 10 bits. [`begin`] waits for them, 64 us of thread mode each 20 ms: no interrupt, and nobody else uses the
+//! converter. If the converter does not answer, there is no reading.
 
 use core::sync::atomic::{AtomicU16, Ordering};
 
@@ -19,9 +20,9 @@ const _: () = assert!(
 
 /// No reading.
 const NONE: u16 = u16::MAX;
-/// Looks at the converter until it counts as broken: some ten times the time of a conversion.
+/// How often to look at the converter before it counts as broken: some ten times the time of a conversion.
 const PATIENCE: usize = 1_000;
-/// So many bits the sum has more than those of 10 bits.
+/// How many bits more than a sum of 10-bit conversions the sum has.
 const FINER: u32 = 2;
 
 static READING: AtomicU16 = AtomicU16::new(NONE);
@@ -33,7 +34,7 @@ pub(super) fn start() {
     ADC.cs().write(|w| w.set_en(true));
 }
 
-/// Takes a reading of a heater's sensor. Thread mode.
+/// Takes a reading of a heater's sensor, and waits for it. Thread mode.
 pub fn begin(heater: u8) {
     let Some(Heaters { heaters: [hot_end, bed], .. }) = ACTIVE.heaters else { return };
     let channel = if heater == 0 { hot_end.channel } else { bed.channel };
@@ -42,7 +43,7 @@ pub fn begin(heater: u8) {
     READING.store(sum.map_or(NONE, |sum| (sum >> FINER) as u16), Ordering::Relaxed);
 }
 
-/// A conversion.
+/// Makes a conversion. `None` if the converter does not answer.
 fn convert() -> Option<u16> {
     let is_ready = || (0..PATIENCE).any(|_| ADC.cs().read().ready());
     if !is_ready() {
@@ -52,17 +53,17 @@ fn convert() -> Option<u16> {
     is_ready().then(|| ADC.result().read().result())
 }
 
-/// The reading that has been begun last. Thread mode.
+/// Returns the last reading; `None` if the converter did not answer. Thread mode.
 pub fn reading() -> Option<u16> {
     Some(READING.load(Ordering::Relaxed)).filter(|reading| *reading != NONE)
 }
 
-/// What a heater's MAX6675 sends: these boards have none.
+/// Always `None`: these boards have no MAX6675.
 pub fn word(_: u8) -> Option<u16> {
     None
 }
 
-/// Switches the hot end, the bed and the fan: off with 0. Thread mode.
+/// Switches the hot end, the bed and the fan: off at 0, else on. Thread mode.
 pub fn drive(power: [u8; 3]) {
     let Some(Heaters { heaters: [hot_end, bed], fan }) = ACTIVE.heaters else { return };
     let [of_hot_end, of_bed, of_fan] = power.map(|power| power != 0);

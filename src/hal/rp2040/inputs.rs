@@ -2,11 +2,12 @@
 //!
 //! | interrupt | does |
 //! |---|---|
-//! | IO_IRQ_BANK0, priority 0 | an edge: a sample; edges of the encoder |
-//! | TIMER_IRQ_1, priority 0 | a sample of all pins, as [`Switches`] wants it |
+//! | IO_IRQ_BANK0, priority 0 | takes a sample at an edge of a switch; passes edges of the encoder on |
+//! | TIMER_IRQ_1, priority 0 | takes a sample of all pins, when [`Switches`] asks for one |
 //!
-//! While no switch moves none of them comes. A limit stops the steps right there, 9.4 us after its edge at most, of which 3 pass between the two samples. The place of a contact is where the
-//! generator's words were at the first of two samples; the feeder works it out ([`stepper::contact`]).
+//! While no switch moves none of these interrupts comes. At a limit the sample itself stops the steps, at most 9.4 us
+//! after the edge, of which 3 us pass between two samples. The place of a contact is the place of the generator's
+//! words at the first of two samples; the feeder works out the position ([`stepper::contact`]).
 
 use core::cell::UnsafeCell;
 
@@ -20,34 +21,34 @@ use crate::boards::ACTIVE;
 use crate::hal::event::Event;
 use crate::switches::{FIRST_US, LATER_US, Next, Switches};
 
-/// From the first of two samples to the second: a limit stops the steps within 10 us of its edge.
+/// Time from the first of two samples to the second. A limit stops the steps within 10 us of its edge.
 const SOON_US: u32 = 3;
-/// The alarm of the samples.
+/// The number of the alarm that times the samples.
 const ALARM: usize = 1;
-/// An alarm that is due at once is missed if the time has passed before it is set.
+/// Shortest time to an alarm: an alarm never comes if its time has passed before it is set.
 const SOONEST_US: u32 = 2;
-/// Edges of a pin among its four events: low and high edge.
+/// Bits of a pin's four events that are edges: falling and rising.
 const EDGES: u32 = 0b1100;
 
-/// What sampling knows and is told.
+/// The state of sampling, and what thread mode tells it.
 struct State {
     switches: Switches,
-    /// Those that are looked at: the pins of the others are an encoder's.
+    /// Inputs that are read, as bits. The pins of the others belong to an encoder.
     used: u16,
-    /// Low is worked.
+    /// Inputs that are active low.
     low: u16,
-    /// What stops the steps.
+    /// Inputs that stop the steps.
     stops: u16,
-    /// Those of them that have been hit.
+    /// Inputs that have stopped the steps since [`take_hits`] took them last.
     hits: u16,
-    /// Ends that are no limits for now.
+    /// Ends of axes that are not limits for now.
     spared: u8,
-    /// Those that end a move, and what they must be for it.
+    /// Inputs that end a move, and in `awaited` the state of each that ends it.
     armed: u16,
     awaited: u16,
     /// Where the generator was at the first of two samples.
     place: Place,
-    /// The next sample is to believe what it finds.
+    /// The next sample is adopted without being filtered.
     fresh: bool,
     /// A sample is due.
     due: bool,
@@ -55,7 +56,8 @@ struct State {
 
 struct Shared(UnsafeCell<State>);
 
-// SAFETY: the handlers of priority 0, which do not preempt each other, and others with interrupts off: see `with`.
+// SAFETY: only the handlers of priority 0, which do not preempt each other, and others with interrupts off use it:
+// see `with`.
 unsafe impl Sync for Shared {}
 
 static STATE: Shared = Shared(UnsafeCell::new(State {
@@ -78,23 +80,24 @@ fn with<R>(act: impl FnOnce(&mut State) -> R) -> R {
 }
 
 impl State {
-    /// The inputs that look worked.
+    /// Returns the inputs that look active now.
     fn found(&self) -> u16 {
         (levels() ^ self.low) & self.used
     }
 
-    /// Someone has to look in so many microseconds.
+    /// Plans a sample in `us` microseconds.
     fn plan(&mut self, us: u32) {
         self.due = true;
         let at = TIMER.timerawl().read().wrapping_add(us.max(SOONEST_US));
         TIMER.alarm(ALARM).write_value(at);
-        // One that was set behind its time never comes: the code may have had to wait for the flash.
+        // An alarm that is set after its time never comes, which may happen because the code had to wait for the
+        // flash.
         if TIMER.timerawl().read().wrapping_sub(at) as i32 >= 0 {
             interrupt::TIMER_IRQ_1.pend();
         }
     }
 
-    /// What is to be looked at like an edge.
+    /// Plans a sample as after an edge, if none is due.
     fn ask(&mut self) {
         if !self.due {
             self.plan(FIRST_US);
@@ -102,7 +105,7 @@ impl State {
     }
 }
 
-/// The inputs whose pins are high.
+/// Returns the inputs whose pins are high.
 fn levels() -> u16 {
     let all = gpio::levels();
     let pins = ACTIVE.inputs.iter().enumerate();
@@ -112,7 +115,7 @@ fn levels() -> u16 {
     })
 }
 
-/// Sets pins and interrupts up. Start-up.
+/// Sets up the pins and the interrupts. Start-up.
 pub(super) fn start() {
     ACTIVE.inputs.iter().flatten().for_each(|pin| gpio::pull_up(*pin));
     encoder::start();
@@ -128,14 +131,14 @@ pub(super) fn start() {
     interrupt::TIMER_IRQ_1.set_priority(Priority::P0);
     TIMER.inte().modify(|w| w.set_alarm(ALARM, true));
     with(|state| state.plan(LATER_US));
-    // SAFETY: what the handlers touch is there.
+    // SAFETY: everything that the handlers touch has been set up.
     unsafe {
         IO_IRQ_BANK0.enable();
         interrupt::TIMER_IRQ_1.enable();
     }
 }
 
-/// IO_IRQ_BANK0.
+/// The handler of IO_IRQ_BANK0.
 pub(super) extern "C" fn edges() {
     let mut changed = 0;
     for group in 0..4 {
@@ -158,7 +161,7 @@ pub(super) extern "C" fn edges() {
     }
 }
 
-/// A sample.
+/// Takes a sample, when the alarm says so.
 #[interrupt]
 fn TIMER_IRQ_1() {
     TIMER.intr().write(|w| w.set_alarm(ALARM, true));
@@ -188,7 +191,7 @@ fn sample(state: &mut State) {
         flags::set(Event::Realtime);
     }
     match next {
-        // An edge that came before this sample has been seen by it; one that comes later asks again.
+        // An edge that came before this sample has been seen by it; an edge that comes later plans another sample.
         Next::Edge if state.found() == now => {}
         Next::Edge => state.ask(),
         Next::Soon => state.plan(SOON_US),
@@ -196,7 +199,7 @@ fn sample(state: &mut State) {
     }
 }
 
-/// Which inputs are worked when low, and which of them stop the steps. Thread mode.
+/// Sets which inputs are active low, and which inputs stop the steps. Thread mode.
 pub fn set_up(low: u16, stops: u16) {
     with(|state| {
         state.stops = stops;
@@ -207,7 +210,7 @@ pub fn set_up(low: u16, stops: u16) {
     });
 }
 
-/// The pins of these inputs are an encoder's from now on. Thread mode.
+/// Leaves the pins of these inputs to an encoder from now on. Thread mode.
 pub(super) fn leave_out(inputs: u16) {
     with(|state| {
         (state.used, state.fresh) = (!inputs, true);
@@ -215,28 +218,28 @@ pub(super) fn leave_out(inputs: u16) {
     });
 }
 
-/// Those inputs. Thread mode.
+/// Returns the inputs that are not read because an encoder uses their pins. Thread mode.
 pub fn left_out() -> u16 {
     with(|state| !state.used)
 }
 
-/// These ends are no limits for now. Thread mode.
+/// Sets the ends of axes that are not limits for now. Thread mode.
 pub fn spare(ends: u8) {
     with(|state| state.spared = ends);
 }
 
-/// Has the first of the inputs `armed` that comes to be as in `awaited` end the move
-/// ([`contact`](crate::dda::contact)); none if `armed` is 0. Thread mode.
+/// Arms the end of a move: the first input of `armed` whose state becomes that in `awaited` ends the move
+/// ([`contact`](crate::dda::contact)). 0 disarms. Thread mode.
 pub fn arm(armed: u16, awaited: u16) {
     with(|state| (state.armed, state.awaited) = (armed, awaited));
 }
 
-/// The inputs that are worked. Thread mode.
+/// Returns the inputs that are active. Thread mode.
 pub fn worked() -> u16 {
     with(|state| state.switches.worked())
 }
 
-/// What has stopped the steps since the last call. Thread mode.
+/// Takes the inputs that have stopped the steps since the last call. Thread mode.
 pub fn take_hits() -> u16 {
     with(|state| core::mem::take(&mut state.hits))
 }

@@ -1,7 +1,7 @@
 //! The message of a panic, kept in RAM for after the reset.
 //!
-//! RAM keeps its bytes over a reset by the button or the watchdog, not without power. A mark and a sum tell a message from what RAM has at
-//! power-up. [`take`] gives it once, as a line of JSON.
+//! RAM keeps its bytes over a reset by the button or the watchdog, but not without power. A mark and a checksum tell
+//! a message from what RAM contains at power-up. [`take`] returns the message once, as a line of JSON.
 
 use core::cell::UnsafeCell;
 use core::fmt::{Display, Write};
@@ -9,13 +9,13 @@ use core::mem::MaybeUninit;
 
 use heapless::String;
 
-/// Bytes of a message; what is longer is cut off.
+/// Longest message, in bytes; the rest of a longer one is cut off.
 const MOST: usize = 120;
-/// Bytes of the line that tells it.
+/// Bytes of the JSON line with the message.
 pub(super) const LINE: usize = MOST + 24;
 const MARK: u32 = 0x4B5E_FA11;
 
-/// What RAM keeps.
+/// What is kept in RAM.
 #[repr(C)]
 #[derive(Clone, Copy)]
 struct Words {
@@ -27,21 +27,21 @@ struct Words {
 
 struct Place(UnsafeCell<MaybeUninit<Words>>);
 
-// SAFETY: the panic handler, behind which nothing runs, and start-up alone touch it.
+// SAFETY: only the panic handler, after which nothing runs, and start-up touch it.
 unsafe impl Sync for Place {}
 
-/// Start-up code leaves this section as it is.
+/// The start-up code does not clear this section.
 #[unsafe(link_section = ".uninit.last_words")]
 static PLACE: Place = Place(UnsafeCell::new(MaybeUninit::uninit()));
 
-/// What is written of a text, as far as it fits, without what JSON needs spelt otherwise.
+/// Collects a text, as far as it fits. Characters that JSON would have to escape become blanks.
 struct Cut(String<MOST>);
 
 impl Write for Cut {
     fn write_str(&mut self, text: &str) -> core::fmt::Result {
         for letter in text.chars() {
             let plain = matches!(letter, ' '..='~') && !matches!(letter, '"' | '\\');
-            // What has no room is cut off.
+            // Characters that find no room are cut off.
             let _ = self.0.push(if plain { letter } else { ' ' });
         }
         Ok(())
@@ -52,7 +52,7 @@ fn sum(bytes: &[u8]) -> u32 {
     bytes.iter().fold(MARK, |sum, byte| sum.rotate_left(5) ^ u32::from(*byte))
 }
 
-/// Keeps a message. Interrupts are off, and stay so.
+/// Keeps a message in RAM. Interrupts are off, and stay so.
 pub(super) fn leave(message: &dyn Display) {
     let mut cut = Cut(String::new());
     let _ = write!(cut, "{message}");
@@ -63,10 +63,10 @@ pub(super) fn leave(message: &dyn Display) {
     unsafe { PLACE.0.get().cast::<Words>().write_volatile(words) };
 }
 
-/// The line that tells the message that was left, if there is one; there is none any more. Start-up.
+/// Takes the line with the message that was left; `None` if there is none. Start-up.
 pub(super) fn take() -> Option<String<LINE>> {
     let place = PLACE.0.get().cast::<Words>();
-    // SAFETY: see `Place`; any bytes are a `Words`.
+    // SAFETY: see `Place`; any bytes form a valid `Words`.
     let words = unsafe { place.read_volatile() };
     // SAFETY: as above.
     unsafe { (&raw mut (*place).mark).write_volatile(0) };

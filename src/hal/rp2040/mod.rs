@@ -1,12 +1,12 @@
-//! The RP2040, on `embassy-rp`: its clocks, time driver and critical section; registers by its `pac` where pins are data of the board, or where
-//! an interrupt has to act before any task could.
+//! The RP2040, on `embassy-rp`: its clocks, its time driver and its critical section. Registers are used through its
+//! `pac` where pins are data of the board, or where an interrupt has to act before a task could.
 //!
 //! # Levels
 //!
 //! | priority | interrupt | file | does |
 //! |---|---|---|---|
-//! | - | PIO0, DMA channels 0 and 1 | `stepper` | step and direction pins, from words in RAM: no CPU |
-//! | 0 | IO_IRQ_BANK0, TIMER_IRQ_1 | `inputs`, `encoder` | looks at the switches when one moves; takes the time of a pulse |
+//! | - | PIO0, DMA channels 0 and 1 | `stepper` | step and direction pins, from words in RAM, without the CPU |
+//! | 0 | IO_IRQ_BANK0, TIMER_IRQ_1 | `inputs`, `encoder` | samples the switches when one moves; takes the time of a pulse |
 //! | 1 | UART0_IRQ, UART1_IRQ | `uart` | bytes between the line and the rings |
 //! | 1 | SysTick | `time` | counts milliseconds |
 //! | 2 | DMA_IRQ_0, PIO0_IRQ_0 | `stepper` | the feeder: runs the step generator ahead of time, and writes words |
@@ -15,14 +15,15 @@
 //! | 3 | SWI_IRQ_1 | [`avr_embassy::interrupt`] | polls the exec executor |
 //! | thread | | [`avr_embassy::Executor`] | everything else |
 //!
-//! A critical section masks all of them for some microseconds: it may wake a task from any. Steps do not notice.
+//! A critical section masks all these interrupts for some microseconds, because any of them may wake a task. Steps
+//! are not affected.
 //!
 //! # When full or late
 //!
-//! - **Words** last for half a millisecond to one. A feeder that comes later than that is a pause of all motors between two words: no step is lost, and
-//!   none is doubled.
-//! - **A byte** that is not taken within the time of the next one is lost, and marked ([`serial`](super::serial)).
-//! - **What a stop finds** in buffers is counted, not made: see [`stepper::settle`].
+//! - **Words** last for half a millisecond to one. If the feeder comes later than that, all motors pause between
+//!   two words: no step is lost, and none is doubled.
+//! - **A byte** that is not taken before the next one has come is lost, and marked ([`serial`](super::serial)).
+//! - **Entries in buffers** at a stop are counted, not made into steps: see [`stepper::settle`].
 
 #[path = "../host/arithmetic.rs"]
 pub mod arithmetic;
@@ -71,14 +72,14 @@ pub mod text_functions {
     pub use super::text::copy_printing;
 }
 
-/// Clocks, time and pins. First thing at start-up.
+/// Sets up clocks, time and pins. First thing at start-up.
 pub fn begin() {
     watchdog::begin();
     let mut config = embassy_rp::config::Config::default();
     if let Ok(clocks) = ClockConfig::system_freq(ACTIVE.clock_hz) {
         config.clocks = clocks;
     }
-    // Of these the flash alone is taken: pins and units are the board's data.
+    // Only the flash is taken from the peripherals: pins and units are the board's data.
     let peripherals = embassy_rp::init(config);
     if clk_sys_freq() != ACTIVE.clock_hz {
         panic::halt();
@@ -93,7 +94,7 @@ pub fn begin() {
     eeprom::start(peripherals.FLASH);
 }
 
-/// Starts what counts time. Interrupts are off.
+/// Starts the tick and the watchdog. Interrupts are off.
 pub fn start() {
     time::start();
     watchdog::start();

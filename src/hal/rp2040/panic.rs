@@ -1,10 +1,11 @@
-//! The last resort. No panic is meant to be reachable after start-up; should one be, motion and outputs stop and the machine stays still until
-//! it is reset. What the panic says is told [after that](super::last_words).
+//! The last resort. No panic is meant to be reachable after start-up. If one happens all the same, motion and outputs
+//! stop and the machine stays still until it is reset. The message of the panic is told [after the
+//! reset](super::last_words).
 
 use super::{gpio, last_words, pwm, stepper, watchdog};
 use crate::boards::ACTIVE;
 
-/// Stops the steps, switches drivers and hazardous outputs off, and stays.
+/// Stops the steps, switches drivers and hazardous outputs off, and never returns.
 pub fn halt() -> ! {
     cortex_m::interrupt::disable();
     make_safe();
@@ -14,7 +15,7 @@ pub fn halt() -> ! {
     }
 }
 
-/// Stops the steps, switches drivers and hazardous outputs off. Interrupts are off.
+/// Stops the steps, and switches drivers and hazardous outputs off. Interrupts are off.
 pub fn make_safe() {
     stepper::kill();
     pwm::kill();

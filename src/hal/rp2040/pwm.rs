@@ -1,7 +1,7 @@
-//! The spindle's pulse-width output: a slice of the chip's that counts up and down, and its pin.
+//! The spindle's pulse-width output: a slice of the chip's PWM unit that counts up and down, and its pin.
 //!
-//! The pin is high while the count is below the compare value; a new value counts from the next period on. Exec, or thread mode while exec cannot
-//! run. On a board without one nothing happens.
+//! The pin is high while the count is below the compare value; a new value takes effect with the next period. Exec,
+//! or thread mode while exec cannot run. On a board without a PWM output nothing happens.
 
 use embassy_rp::pac::PWM;
 
@@ -12,22 +12,23 @@ use crate::spindle::WHOLE;
 /// The highest count.
 const MOST: u32 = u16::MAX as u32 - 1;
 
-/// The pin, and its slice and channel (RP2040 data sheet, 4.5.2).
+/// Returns the pin, its slice, and whether it is channel B (RP2040 data sheet, 4.5.2).
 fn place() -> Option<(crate::boards::Pin, usize, bool)> {
     let pin = ACTIVE.pwm?.pin();
     Some((pin, usize::from(pin.bit / 2 % 8), pin.bit % 2 == 1))
 }
 
-/// The divider, in sixteenths, and the top for a frequency in thousandths of a Hz: the finest that fits.
+/// Returns the divider, in sixteenths, and the top for a frequency in thousandths of a Hz: the finest that fits.
 fn divide(millihertz: u32) -> (u32, u32) {
-    // A period is twice the top: up and down. 64 bits, once for a setting.
+    // A period is twice the top: up and down. 64-bit arithmetic is acceptable, because it runs once for each change
+    // of the setting.
     let counts = u64::from(ACTIVE.clock_hz) * 500 / u64::from(millihertz.max(1));
     let sixteenths = (counts * 16 / u64::from(MOST) + 1).clamp(16, 0xFFF) as u32;
     let top = (counts * 16 / u64::from(sixteenths)).clamp(1, MOST.into()) as u32;
     (sixteenths, top)
 }
 
-/// Sets the frequency, in thousandths of a Hz. The share has to be set again; until then it is 0.
+/// Sets the frequency, in thousandths of a Hz. The share becomes 0 and has to be set again.
 pub fn set_frequency(millihertz: u32) {
     let Some((pin, slice, _)) = place() else { return };
     let (sixteenths, top) = divide(millihertz);
@@ -44,18 +45,18 @@ pub fn set_frequency(millihertz: u32) {
     });
 }
 
-/// Sets what part of the period the pin is high, in thousandths.
+/// Sets the share of the period for which the pin is high, in thousandths.
 pub fn set_share(share: f32) {
     let Some((_, slice, is_b)) = place() else { return };
     let channel = PWM.ch(slice);
     let top = channel.top().read().top();
     let counts = share * (1.0 / WHOLE as f32) * f32::from(top) + 0.5;
-    // A share of all is beyond the top: no pulses, always high.
+    // A full share is beyond the top: no pulses, always high.
     let counts = if share >= f32::from(WHOLE) { u32::from(top) + 1 } else { counts as u32 };
     channel.cc().write(|w| if is_b { w.set_b(counts as u16) } else { w.set_a(counts as u16) });
 }
 
-/// Disconnects the pin, which is low from then on. For the panic handler.
+/// Disconnects the pin from the PWM unit; it is low from then on. For the panic handler.
 pub(super) fn kill() {
     if let Some((pin, ..)) = place() {
         gpio::connect(pin, Unit::Cpu);

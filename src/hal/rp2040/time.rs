@@ -1,4 +1,5 @@
-//! The count of milliseconds, which SysTick counts, and its event. Tasks wait by `embassy-rp`'s time driver.
+//! The count of milliseconds, which the interrupt of SysTick counts, and its event. Tasks wait by means of
+//! `embassy-rp`'s time driver.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -12,12 +13,12 @@ use crate::hal::flags;
 
 static MILLIS: AtomicU32 = AtomicU32::new(0);
 
-/// Priority 1, of the two highest bits.
+/// Priority 1, in the two highest bits.
 const PRIORITY: u8 = 1 << 6;
 
 /// Starts the count. Start-up.
 pub(super) fn start() {
-    // SAFETY: the core's peripherals are nobody else's.
+    // SAFETY: nobody else uses the core's peripherals.
     let mut core = unsafe { cortex_m::Peripherals::steal() };
     // SAFETY: start-up.
     unsafe { core.SCB.set_priority(SystemHandler::SysTick, PRIORITY) };
@@ -35,7 +36,7 @@ fn SysTick() {
     flags::set(Event::Tick);
 }
 
-/// Milliseconds since start-up, modulo 2^32.
+/// Returns the milliseconds since start-up, modulo 2^32.
 pub fn millis() -> u32 {
     MILLIS.load(Ordering::Relaxed)
 }

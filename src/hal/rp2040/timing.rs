@@ -5,7 +5,8 @@ use crate::boards::MOTORS;
 use crate::dda::Ticks;
 use crate::hal::contract::Timing;
 
-/// A pulse of half a microsecond and as long a pause; ticks beside steps as fine as the feeder takes a quarter of the CPU for.
+/// A pulse of half a microsecond and a pause of the same length. Ticks without steps are as fine as the feeder manages
+/// with a quarter of the CPU.
 const USUAL: Ticks =
     Ticks { step: 64, shortest: 64, fine: 66, coarse: 66, coarsest: 66, settles: u16::MAX / 4 };
 
@@ -14,7 +15,8 @@ impl Timing for Chip {
     const TIMER_HZ: u32 = 64_000_000;
     const PULSE_US: u8 = 0;
     const TICKS: [Ticks; MOTORS] = [USUAL; MOTORS];
-    /// Seven in the ring are the millisecond that the feeder is ahead, and most of another.
+    /// Seven segments of this length in the ring cover the millisecond by which the feeder is ahead, and most of
+    /// another one.
     const BLOCK_S_MIN: f32 = 0.000_25;
     const LOOK_AHEAD: usize = 1_024;
     const LINE_BYTES: [usize; 2] = [2_088, 1_040];

@@ -1,16 +1,18 @@
-//! The serial ports: bytes between their lines and two rings each.
+//! The serial ports: they move bytes between their lines and two rings each.
 //!
-//! The first port is [USB](super::usb); the other a UART without its FIFOs, so that a byte acts when it comes, not when others have
-//! come behind it: real-time characters are taken out right in the handler. A byte has to be taken within the time of the next one, 87 us at
-//! 115,200 baud.
+//! The first port is [USB](super::usb). The other one is a UART without its FIFOs, so that a byte acts when it comes,
+//! not when others have come after it: the handler itself takes real-time characters out. A byte has to be taken
+//! before the next one has come, within 87 us at 115,200 baud.
 //!
-//! USB brings up to 64 bytes at once. Real-time characters among them act when they come, even if there is no room for those before them; these
-//! wait ([`Line::behind`]), and the computer with the next ones.
+//! USB brings up to 64 bytes at once. Real-time characters among them act when they come, even if there is no room
+//! for the bytes before them. Those bytes wait ([`Line::behind`]), and the computer waits with the next packet.
 //!
-//! `embassy-rp`'s buffered driver has rings of its own, out of which a task takes bytes: a `!` would wait for the turn of a task, 10 ms of a
-//! busy CPU. So the handlers are our own; thread mode and exec share the state of a port with them with interrupts off.
+//! `embassy-rp`'s buffered driver has rings of its own, from which a task takes the bytes: a `!` would wait for the
+//! turn of a task, up to 10 ms of a busy CPU. So these handlers are our own. Thread mode and exec share the state of
+//! a port with them with interrupts off.
 //!
-//! Where bytes are lost, because a ring was full or the hardware overran, a mark says so to the reader: see [`serial`](crate::hal::serial).
+//! Where bytes are lost, because a ring was full or the hardware overran, a mark tells the reader: see
+//! [`serial`](crate::hal::serial).
 
 use core::cell::UnsafeCell;
 
@@ -40,7 +42,7 @@ enum Filling {
     Aux(Producer<u8, AUX_RING>),
 }
 
-/// Does something with either end.
+/// Runs the same code for either kind of end.
 macro_rules! either {
     ($end:expr, $ring:ident => $act:expr) => {
         match $end {
@@ -78,7 +80,7 @@ impl Filling {
         }
     }
 
-    /// Puts a mark where there is room, else over the newest byte.
+    /// Puts a mark where there is room, else replaces the newest byte by it.
     fn mark(&mut self, mark: u8) {
         if self.is_full() {
             // SAFETY: the reader, which is a task of thread mode, does not run within the handler.
@@ -93,44 +95,45 @@ impl Filling {
     }
 }
 
-/// Bytes of a packet that are seen to with interrupts off: some microseconds.
+/// Bytes of a packet that are handled at a time with interrupts off: some microseconds.
 const AT_ONCE: usize = 32;
-/// As [`AT_ONCE`], of bytes that are looked at one by one.
+/// Like [`AT_ONCE`], for bytes that are looked at one by one.
 const ONE_BY_ONE: usize = 8;
-/// So many of what characters ask at once: more than a packet of 64 asks.
+/// How many sums of override requests are kept: more than a packet of 64 bytes can fill.
 const ASKED: usize = 8;
 /// Percent beyond which one more character might not fit.
 const FAR: u8 = 110;
 
-/// What the handler of a port and the others share.
+/// The state that the handler of a port shares with the other levels.
 struct Line {
     rx: Option<Filling>,
     tx: Option<Consumer<u8, TX_RING>>,
     /// A byte to send before all others.
     ahead: Option<u8>,
-    /// For how many ms it waits for the end of a line, and whether a line is open.
+    /// For how many ms `ahead` waits for the end of a line. `open` says whether a line is open.
     wait_ms: u8,
     open: bool,
     /// The other side has sent XOFF.
     held: bool,
-    /// Whether XOFF and XON count.
+    /// Whether XOFF and XON from the other side count.
     heeds_xoff: bool,
-    /// The sender has been stopped by XOFF.
+    /// Whether XOFF has stopped the sender.
     stopped: bool,
     lost_ends: u16,
     /// Bytes queued, modulo 256.
     queued: u8,
     realtime: u8,
-    /// What characters have asked of overrides: one more each time that a number might not fit. Packets bring many at once.
+    /// Override requests that have not been taken. A new sum is begun each time that a number might not fit, because
+    /// a packet may bring many at once.
     asked: Deque<Asked, ASKED>,
     /// The byte queued last.
     last: u8,
     rate: u32,
-    /// The millisecond in which a byte came.
+    /// The millisecond in which the last byte came.
     heard_at: u32,
-    /// `!`, `~`, `%` and bytes above 0x7F are text.
+    /// Whether `!`, `~`, `%` and bytes above 0x7F are text.
     plain: bool,
-    /// Of USB: what the receive ring had no room for.
+    /// Of USB: bytes that the receive ring had no room for.
     behind: Deque<u8, PACKET>,
 }
 
@@ -160,7 +163,7 @@ impl Line {
 
 struct Shared(UnsafeCell<Line>);
 
-// SAFETY: touched with interrupts off only: see `with`.
+// SAFETY: it is touched with interrupts off only: see `with`.
 unsafe impl Sync for Shared {}
 
 static LINES: [Shared; PORTS] = [const { Shared(UnsafeCell::new(Line::new())) }; PORTS];
@@ -170,14 +173,14 @@ static USB_TX: Ring<u8, TX_RING> = Ring::new();
 static AUX_RX: Ring<u8, AUX_RING> = Ring::new();
 static AUX_TX: Ring<u8, TX_RING> = Ring::new();
 
-/// Does something with a port. Any level.
+/// Runs `act` on the state of a port, with interrupts off. Any level.
 fn with<R>(port: u8, act: impl FnOnce(&mut Line) -> R) -> R {
     let line = &LINES[usize::from(port) % PORTS];
     // SAFETY: interrupts are off.
     mask(|| act(unsafe { &mut *line.0.get() }))
 }
 
-/// The registers of a port; USB has none of this kind.
+/// Returns the registers of a port; `None` for USB, which has none of this kind.
 fn registers(port: u8) -> Option<Registers> {
     match hardware(port)?.usart {
         Usart::Uart0 => Some(pac::UART0),
@@ -186,7 +189,8 @@ fn registers(port: u8) -> Option<Registers> {
     }
 }
 
-/// Starts the lines, 8N1: the first at `rate` bits a second, the other at the board's. Start-up; `None` after the first time.
+/// Starts the lines, 8N1: the first at `rate` bits a second, the second at the board's rate. Start-up; `None` after
+/// the first time.
 pub fn start(rate: u32) -> Option<AllEnds> {
     let usb = split(USB, &USB_RX, &USB_TX, Filling::Usb)?;
     begin(USB, rate);
@@ -232,20 +236,21 @@ fn begin(port: u8, rate: u32) {
     });
     let interrupt = if uart == pac::UART0 { interrupt::UART0_IRQ } else { interrupt::UART1_IRQ };
     interrupt.set_priority(Priority::P1);
-    // SAFETY: what the handlers touch is there.
+    // SAFETY: everything that the handlers touch has been set up.
     unsafe { interrupt.enable() };
 }
 
-/// Goes on at `rate` bits a second. A byte on the line meanwhile, in either direction, is spoilt. Thread mode.
+/// Changes the rate to `rate` bits a second. A byte that is on the line at that moment, in either direction, is
+/// spoilt. Thread mode.
 pub fn set_rate(port: u8, rate: u32) {
-    // In 64ths, rounded.
+    // The divisor in 64ths, rounded.
     let divisor = (ACTIVE.clock_hz * 8 / rate.max(1)).div_ceil(2);
     let Some(uart) = registers(port) else { return };
     with(port, |line| {
         line.rate = rate;
         uart.uartibrd().write(|w| w.set_baud_divint((divisor >> 6) as u16));
         uart.uartfbrd().write(|w| w.set_baud_divfrac(divisor as u8 & 63));
-        // The divisor counts from this write on. Eight bits, no FIFO.
+        // The divisor takes effect with this write. Eight bits, no FIFO.
         uart.uartlcr_h().write(|w| w.set_wlen(0b11));
     });
 }
@@ -260,7 +265,7 @@ fn UART1_IRQ() {
     handle(Usart::Uart1);
 }
 
-/// What both handlers do: the byte that has come, and the next one that leaves.
+/// Does the work of both handlers: takes the bytes that have come, and sends the next ones.
 fn handle(usart: Usart) {
     let is_here = |port: &u8| hardware(*port).is_some_and(|serial| serial.usart == usart);
     let Some(port) = (0..PORTS as u8).find(is_here) else { return };
@@ -289,18 +294,18 @@ fn is_text(byte: u8) -> bool {
     matches!(byte, b'\n' | b' '..=b'}') && realtime::bit(byte) == 0
 }
 
-/// What a byte that has come is.
+/// What a received byte is.
 enum Came {
-    /// It has acted, and is no part of a line.
+    /// It has acted, and is not part of a line.
     Nothing,
-    /// It has acted; this stands where it was.
+    /// It has acted; this mark stands in its place.
     Mark(u8),
-    /// A part of a line.
+    /// It is part of a line.
     Text,
 }
 
 impl Line {
-    /// Sends as long as the transmitter takes bytes. Whether it took any.
+    /// Sends as long as the transmitter takes bytes. Returns whether it took any.
     fn send(&mut self, uart: Registers) -> bool {
         let mut sent = false;
         while !uart.uartfr().read().txff() {
@@ -311,7 +316,7 @@ impl Line {
         sent
     }
 
-    /// The byte that leaves next.
+    /// Takes the byte that leaves next; `None` if nothing may leave.
     fn next(&mut self) -> Option<u8> {
         let may_pass = self.wait_ms == 0 || !self.open;
         if let Some(ahead) = self.ahead.take_if(|_| may_pass) {
@@ -325,7 +330,7 @@ impl Line {
         Some(byte)
     }
 
-    /// A byte is lost.
+    /// Marks the loss of a byte.
     fn lose(&mut self, byte: u8) {
         let Some(ring) = self.rx.as_mut() else { return };
         let begun = if ring.is_full() { mark(ring.newest()) } else { 0 };
@@ -335,7 +340,8 @@ impl Line {
         flags::set(Event::Received);
     }
 
-    /// Queues the mark of a real-time character: that of a loss if there is no room, but none for a resume.
+    /// Queues the mark of a real-time character. If there is no room, the mark becomes that of a loss; a resume goes
+    /// without a place.
     fn place(&mut self, character: u8) {
         let Some(ring) = self.rx.as_mut() else { return };
         match ring.is_full() {
@@ -355,7 +361,7 @@ impl Line {
         }
     }
 
-    /// A byte has come: one that acts does so here and now.
+    /// Handles a byte that has come. A byte that acts does so here.
     fn act(&mut self, byte: u8, whole: bool) -> Came {
         self.heard_at = time::millis();
         if self.heeds_xoff && (byte == XOFF || byte == XON) {
@@ -383,7 +389,7 @@ impl Line {
         Came::Text
     }
 
-    /// Whether a character asks something of the overrides.
+    /// Adds what a character asks of the overrides. Returns whether it asks anything.
     fn ask(&mut self, byte: u8) -> bool {
         let last = self.asked.back().copied().unwrap_or(Asked::NOTHING);
         let is_far = last.percent.iter().any(|percent| percent.unsigned_abs() > FAR);
@@ -391,7 +397,7 @@ impl Line {
         let before = if begins { Asked::NOTHING } else { last };
         let Some(asked) = before.with(byte) else { return false };
         if begins {
-            // There is room.
+            // There is room: `begins` is true only if so.
             let _ = self.asked.push_back(asked);
         } else if let Some(last) = self.asked.back_mut() {
             *last = asked;
@@ -399,7 +405,8 @@ impl Line {
         true
     }
 
-    /// A byte has come by USB. What there is no room for waits, but for marks: they are placed as if what waits had been lost, or is lost then.
+    /// Handles a byte that has come by USB. If there is no room, text waits. A mark is queued after everything that
+    /// waits has been queued, or lost; a resume goes without a place.
     fn bring(&mut self, byte: u8) {
         let waits = !self.behind.is_empty() || self.rx.as_ref().is_none_or(Filling::is_full);
         match self.act(byte, true) {
@@ -413,14 +420,14 @@ impl Line {
             }
             Came::Text if waits => {
                 self.last = byte;
-                // A packet has room: the next one is read only when the last one has been taken.
+                // There is room for a packet: the next one is read only after the last one has been queued.
                 let _ = self.behind.push_back(byte);
             }
             Came::Text => self.queue(byte, true),
         }
     }
 
-    /// Text has come by USB, of which no byte acts. How long it is. Costs 20 cycles a byte.
+    /// Handles a run of text that has come by USB, in which no byte acts. Returns its length. Cost: 20 cycles a byte.
     fn bring_text(&mut self, bytes: &[u8]) -> usize {
         let count = bytes.iter().take_while(|byte| is_text(**byte)).count();
         let text = bytes.get(..count).unwrap_or_default();
@@ -430,13 +437,13 @@ impl Line {
         let (now, later) = text.split_at(room);
         ring.push_all(now.iter().copied());
         self.queued = self.queued.wrapping_add(room as u8);
-        // A packet has room: the next one is read only when the last one has been taken.
+        // There is room for a packet: the next one is read only after the last one has been queued.
         self.behind.extend(later.iter().copied().take(PACKET - self.behind.len()));
         flags::set(Event::Received);
         count
     }
 
-    /// Queues some of what waits, as far as there is room. Whether it was the last.
+    /// Queues some of the bytes that wait, as far as there is room. Returns whether the last one was among them.
     fn go_on(&mut self) -> bool {
         let Some(ring) = self.rx.as_mut() else { return false };
         let count = ring.free().min(AT_ONCE).min(self.behind.len());
@@ -449,7 +456,8 @@ impl Line {
         count > 0 && self.behind.is_empty()
     }
 
-    /// Takes bytes that leave next and lie side by side. How many: none also if one is to leave ahead of them.
+    /// Takes bytes that leave next and lie side by side. Returns how many; 0 also if a byte is to leave ahead of
+    /// them.
     fn take_run(&mut self, to: &mut [u8]) -> usize {
         if self.held || self.ahead.is_some() {
             return 0;
@@ -482,7 +490,7 @@ impl Line {
     }
 }
 
-/// Sends what the ring holds. Thread mode, or exec on a port that is no bus.
+/// Starts sending what the ring holds. Thread mode, or exec on a port that is no bus.
 pub fn kick(port: u8) {
     let Some(uart) = registers(port) else { return usb::kick() };
     if with(port, |line| line.send(uart)) {
@@ -490,9 +498,10 @@ pub fn kick(port: u8) {
     }
 }
 
-/// Stops the sender, or lets it go on, in the way they have agreed upon. A character may wait for the end of a line if it `waits`. Thread mode.
+/// Stops the sender or lets it go on, by the flow control that the two sides have agreed on. If `waits`, XOFF or XON
+/// may wait for the end of a line. Thread mode.
 pub fn stop_sender(port: u8, flow: Flow, stop: bool, waits: bool) {
-    // USB holds it back by itself.
+    // USB needs no flow control here: it holds the computer back by itself.
     if flow == Flow::Characters && registers(port).is_some() {
         with(port, |line| {
             line.ahead = Some(if stop { XOFF } else { XON });
@@ -504,12 +513,12 @@ pub fn stop_sender(port: u8, flow: Flow, stop: bool, waits: bool) {
     }
 }
 
-/// Whether the sender has been stopped by XOFF, by thread mode or by [`stop_late`].
+/// Whether XOFF has stopped the sender, sent by thread mode or by [`stop_late`].
 pub fn is_stopped(port: u8) -> bool {
     with(port, |line| line.stopped)
 }
 
-/// Stops the sender of the second port by XOFF if its ring fills while thread mode has no turn. Exec.
+/// Stops the sender of the second port by XOFF if its receive ring fills while thread mode has no turn. Exec.
 pub fn stop_late() {
     if PORTS < 2 || AUX_RX.used() < LATE {
         return;
@@ -527,12 +536,12 @@ pub fn stop_late() {
     }
 }
 
-/// Whether `!`, `~`, `%` and bytes above 0x7F are text, from now on. Thread mode.
+/// Sets whether `!`, `~`, `%` and bytes above 0x7F are plain text from now on. Thread mode.
 pub fn set_plain(port: u8, plain: bool) {
     with(port, |line| line.plain = plain);
 }
 
-/// A packet has come by USB. Whether another one may: else [`usb::ROOM`] says when.
+/// Handles a packet that has come by USB. Returns whether another one may come; if not, [`usb::ROOM`] says when.
 pub(super) fn bring(packet: &[u8]) -> bool {
     let mut left = packet;
     while !left.is_empty() {
@@ -550,19 +559,19 @@ pub(super) fn bring(packet: &[u8]) -> bool {
     with(USB, |line| line.behind.is_empty())
 }
 
-/// Queues what has come by USB when there was no room. Thread mode, each turn.
+/// Queues bytes that have come by USB when there was no room. Thread mode, each turn.
 pub fn go_on() {
     if with(USB, Line::go_on) {
         usb::ROOM.signal(());
     }
 }
 
-/// Whether the first port is USB of the chip's own.
+/// Whether the first port is the chip's own USB.
 pub fn sees_opening() -> bool {
     registers(USB).is_none()
 }
 
-/// Whether a program has opened USB since the last call, but for the first. Thread mode.
+/// Whether a program, not the first, has opened USB since the last call. Thread mode.
 pub fn take_opened() -> bool {
     usb::take_opened()
 }
@@ -572,7 +581,7 @@ pub fn take_closed() -> bool {
     usb::take_closed()
 }
 
-/// Takes what is to leave by USB next. How much that is.
+/// Takes what is to leave by USB next. Returns how many bytes it is.
 pub(super) fn take(packet: &mut [u8]) -> usize {
     let mut count = 0;
     while let Some(to) = packet.get_mut(count..).filter(|to| !to.is_empty()) {
@@ -593,13 +602,14 @@ pub(super) fn take(packet: &mut [u8]) -> usize {
     count
 }
 
-/// Whether what is to leave by USB had better leave now: it makes a packet, or is a whole answer behind which no line waits for its own.
+/// Whether what is to leave by USB should leave now: it fills a packet, or it is a whole answer and no other line
+/// waits for its answer.
 pub(super) fn is_due() -> bool {
     let used = USB_TX.used();
     used >= PACKET - 1 || used > 0 && USB_RX.used() == 0
 }
 
-/// How the other side may hold it back from now on. Thread mode.
+/// Sets how the other side may stop this port's transmitter from now on. Thread mode.
 pub fn set_flow(port: u8, flow: Flow) {
     with(port, |line| {
         line.heeds_xoff = flow == Flow::Characters;
@@ -608,7 +618,8 @@ pub fn set_flow(port: u8, flow: Flow) {
     kick(port);
 }
 
-/// Sends XOFF or XON that has waited for long enough; has what is to be kept written. Thread mode, each millisecond.
+/// Sends XOFF or XON that has waited long enough; also gives [`eeprom`] and [`drivers`] their turns. Thread mode,
+/// each millisecond.
 pub fn look() {
     for port in 0..PORTS as u8 {
         with(port, |line| line.wait_ms = line.wait_ms.saturating_sub(1));
@@ -621,19 +632,20 @@ pub fn look() {
     drivers::look(time::millis());
 }
 
-/// The millisecond in which the last byte came, on any port.
+/// Returns the millisecond in which the last byte came, on any port.
 pub(super) fn heard_at() -> u32 {
     let now = time::millis();
     let ages = (0..PORTS as u8).map(|port| now.wrapping_sub(with(port, |line| line.heard_at)));
     now.wrapping_sub(ages.min().unwrap_or(0))
 }
 
-/// Line ends lost since start-up, modulo 2^16. Thread mode.
+/// Returns how many line ends have been lost since start-up, modulo 2^16. Thread mode.
 pub fn lost_ends(port: u8) -> u16 {
     with(port, |line| line.lost_ends)
 }
 
-/// Bytes that may come before any is lost, at most 254: one less than the receive ring has room for. Thread mode.
+/// Returns how many bytes may come before one is lost, at most 254: one less than the receive ring has room for.
+/// Thread mode.
 pub fn room(port: u8) -> u8 {
     let (size, used) = match port {
         AUX => (AUX_RING, AUX_RX.used()),
@@ -647,15 +659,15 @@ pub fn presses() -> bool {
     PORTS > 1 && AUX_RX.used() >= AUX_RING / 2
 }
 
-/// Whether the reader is to have its turn before a line that waits is carried out: see [`serial::calls_reader`]; on the second port
-/// any byte says so. Thread mode.
+/// Whether the reader has to have its turn before the next waiting line is carried out: see [`serial::calls_reader`].
+/// On the second port any waiting byte is a reason. Thread mode.
 pub fn calls_reader() -> bool {
     // SAFETY: the reader does not run meanwhile.
     let ring = unsafe { USB_RX.window() };
     PORTS > 1 && AUX_RX.used() > 0 || serial::calls_reader(&ring)
 }
 
-/// The slot of the receive ring with the byte that came last, if it still waits there. Thread mode.
+/// Returns the slot of the receive ring that holds the newest byte; `None` if that byte has been read. Thread mode.
 pub fn newest(port: u8) -> Option<u8> {
     match port {
         AUX => AUX_RX.newest(),
@@ -663,19 +675,20 @@ pub fn newest(port: u8) -> Option<u8> {
     }
 }
 
-/// The slot of the mark that stands for the last `%` or `^d`, if it has not been read. Thread mode.
+/// Returns the slot of the mark that stands for the last `%` or `^d`; `None` if no such mark waits. Thread mode.
 pub fn last_cut(port: u8) -> Option<u8> {
     // SAFETY: the reader does not run meanwhile.
     let ring = unsafe { if port == AUX { AUX_RX.window() } else { USB_RX.window() } };
     last_mark(&ring)
 }
 
-/// Whether an exclamation mark has come that nobody has taken yet, on any port. Any level.
+/// Whether a `!` has come, on any port, that nobody has taken yet. Any level.
 pub fn asks_hold() -> bool {
     (0..PORTS as u8).any(|port| with(port, |line| line.realtime & realtime::HOLD != 0))
 }
 
-/// What characters have asked of overrides since the last call. Thread mode.
+/// Takes override requests that characters have made since the last call; if there are more, an event announces them.
+/// Thread mode.
 pub fn take_asked(port: u8) -> Asked {
     let (asked, more) = with(port, |line| (line.asked.pop_front(), !line.asked.is_empty()));
     if more {
@@ -684,12 +697,13 @@ pub fn take_asked(port: u8) -> Asked {
     asked.unwrap_or(Asked::NOTHING)
 }
 
-/// The real-time characters since the last call, as bits (see [`realtime`]). Thread mode.
+/// Takes the real-time characters since the last call, as bits (see [`realtime`]). Thread mode.
 pub fn take_realtime(port: u8) -> u8 {
     with(port, |line| core::mem::take(&mut line.realtime))
 }
 
-/// Ends the lines of which a part has been sent; what else the rings hold is never sent. Interrupts are off, and stay so.
+/// Ends the lines of which a part has been sent. The rest of what the rings hold is never sent. Interrupts are off,
+/// and stay so.
 pub(super) fn end_lines() {
     for port in 0..PORTS as u8 {
         let Some(uart) = registers(port) else { continue };

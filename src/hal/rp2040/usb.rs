@@ -1,10 +1,12 @@
 //! USB: a serial port of the class CDC ACM, by `embassy-usb` on `embassy-rp`'s driver.
 //!
-//! Its tasks run on the [prompt executor](avr_embassy::interrupt::prompt), above thread mode and exec, so that a `!` acts when its packet comes. A
-//! packet that the receive ring has no room for is the last: the computer is told to wait (NAK) until it has gone.
+//! Its tasks run on the [prompt executor](avr_embassy::interrupt::prompt), above thread mode and exec, so that a `!`
+//! acts when its packet comes. After a packet that the receive ring has no room for, no other one is taken: the
+//! computer is told to wait (NAK) until all of that packet has been queued.
 //!
-//! Nobody listens while no program has the port open, or the bus sleeps. What is said then is dropped, so that no task waits for it; but the
-//! first [`KEPT`] bytes after start-up, with the greeting, are kept for the first who opens it. That others do is told to tasks ([`take_opened`]).
+//! Nobody listens while no program has the port open, or while the bus sleeps. Output is dropped then, so that no
+//! task waits for it. Only the first [`KEPT`] bytes after start-up, with the greeting, are kept for the first program
+//! that opens the port. Tasks are told when another program opens it ([`take_opened`]).
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
@@ -27,11 +29,11 @@ use crate::hal::event::Event;
 
 /// The longest packet of a full-speed bus.
 pub(super) const PACKET: usize = 64;
-/// What is said is cut into pieces that are shorter than a packet: none needs an empty one behind it.
+/// Output is cut into pieces that are shorter than a packet, so that none needs an empty packet behind it.
 const PIECE: usize = PACKET - 1;
-/// Bytes kept for the first who opens the port.
+/// Bytes kept for the first program that opens the port.
 const KEPT: usize = 256 + last_words::LINE;
-/// A pair of numbers for tests, of pid.codes; nobody sells boards with it.
+/// A test pair of vendor and product number, of pid.codes; no boards are sold with it.
 const VENDOR: u16 = 0x1209;
 /// See [`VENDOR`].
 const PRODUCT: u16 = 0x0001;
@@ -42,18 +44,18 @@ bind_interrupts!(struct Handlers {
     USBCTRL_IRQ => InterruptHandler<USB>;
 });
 
-/// What has come has been queued: the next packet may.
+/// All received bytes have been queued: the next packet may come.
 pub(super) static ROOM: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 /// There may be something to send, or somebody to send it to.
 static NEWS: Signal<CriticalSectionRawMutex, ()> = Signal::new();
-/// A piece waits for the one before it to leave; what is put meanwhile leaves behind it.
+/// A piece is being sent. What is put meanwhile leaves after it.
 static SENDS: AtomicBool = AtomicBool::new(false);
 /// The bus sleeps, or its cable is out.
 static ASLEEP: AtomicBool = AtomicBool::new(false);
 
-/// A program has opened the port that is not the first, which nobody has taken yet.
+/// A program, not the first, has opened the port, and nobody has taken this yet.
 static OPENED: AtomicBool = AtomicBool::new(false);
-/// The program has closed the port, which nobody has taken yet.
+/// The program has closed the port, and nobody has taken this yet.
 static CLOSED: AtomicBool = AtomicBool::new(false);
 
 /// Notices when the bus sleeps.
@@ -70,7 +72,7 @@ impl Handler for Sleep {
     }
 }
 
-/// Starts it: the computer notices. Start-up.
+/// Starts the tasks of USB; the computer notices the device. Start-up.
 pub(super) fn start() {
     static DESCRIPTORS: StaticCell<[u8; 256]> = StaticCell::new();
     static BOS: StaticCell<[u8; 32]> = StaticCell::new();
@@ -97,7 +99,7 @@ pub(super) fn start() {
     interrupt::SWI_IRQ_2.set_priority(Priority::P2);
     interrupt::USBCTRL_IRQ.set_priority(Priority::P2);
     prompt::start(|spawner| {
-        // None has been spawned before.
+        // These tasks have not been spawned before.
         if let (Ok(serve), Ok(hear), Ok(tell)) =
             (serve(device), hear(receiver), tell(sender, control))
         {
@@ -108,9 +110,9 @@ pub(super) fn start() {
     });
 }
 
-/// Whether a program has opened the port since the last call, but for the first. Thread mode.
+/// Whether a program, not the first, has opened the port since the last call. Thread mode.
 pub(super) fn take_opened() -> bool {
-    // One that comes in between is greeted with this one.
+    // If another opening comes in between, this greeting serves both.
     take(&OPENED)
 }
 
@@ -119,7 +121,7 @@ pub(super) fn take_closed() -> bool {
     take(&CLOSED)
 }
 
-/// Clears a flag. Whether it was set.
+/// Clears a flag. Returns whether it was set.
 fn take(flag: &AtomicBool) -> bool {
     let is_set = flag.load(Ordering::Relaxed);
     if is_set {
@@ -128,15 +130,15 @@ fn take(flag: &AtomicBool) -> bool {
     is_set
 }
 
-/// There may be something to send. While lines wait their answers are gathered into full packets, for a millisecond at most: see [`flush`].
-/// Any level.
+/// Notes that there may be something to send. While lines wait, their answers are gathered into full packets, for at
+/// most a millisecond: see [`flush`]. Any level.
 pub(super) fn kick() {
     if uart::is_due() {
         flush();
     }
 }
 
-/// What is there may leave. Any level.
+/// Lets what is there leave. Any level.
 pub(super) fn flush() {
     if !SENDS.load(Ordering::Relaxed) {
         NEWS.signal(());
@@ -189,7 +191,7 @@ async fn tell(mut sender: Sender<'static, Driver>, control: ControlChanged<'stat
         if piece.is_empty() {
             select(NEWS.wait(), control.control_changed()).await;
         } else if hears {
-            // If nobody listens any more, nobody takes it.
+            // If nobody listens any more, the piece is dropped.
             SENDS.store(true, Ordering::Relaxed);
             select(sender.write_packet(piece), silence(&control)).await;
             SENDS.store(false, Ordering::Relaxed);
@@ -211,23 +213,23 @@ async fn silence(control: &ControlChanged<'_>) {
     }
 }
 
-/// Whether a program has the port open, by the line (DTR) that says so, and whether one has had.
+/// Whether a program has the port open, by the line (DTR) that says so, and whether one had it open before.
 #[derive(Default)]
 struct Door {
     is_open: bool,
     was_open: bool,
 }
 
-/// What a change of that line tells.
+/// What a change of DTR means.
 enum Turn {
-    /// A program has opened the port, and is not the first.
+    /// A program, not the first, has opened the port.
     OpensAgain,
-    /// The program has closed it.
+    /// The program has closed the port.
     Closes,
 }
 
 impl Door {
-    /// The line is so now. What that tells, if it has changed.
+    /// Takes the level of DTR. Returns what it means, if it has changed.
     fn turn(&mut self, dtr: bool) -> Option<Turn> {
         if dtr == self.is_open {
             return None;
@@ -248,7 +250,8 @@ struct First {
 }
 
 impl First {
-    /// Keeps a piece; of what is too long whole lines alone.
+    /// Keeps a piece. When there is no room for it, drops it and everything that comes later, and the half line
+    /// before it.
     fn keep(&mut self, piece: &[u8]) {
         self.keeps &= self.bytes.len() + piece.len() <= KEPT;
         if self.keeps {
@@ -262,7 +265,7 @@ impl First {
         }
     }
 
-    /// Takes the next piece. How long it is.
+    /// Takes the next piece. Returns its length.
     fn take(&mut self, piece: &mut [u8]) -> usize {
         self.keeps = false;
         let bytes = piece.iter_mut();

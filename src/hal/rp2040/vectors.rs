@@ -1,7 +1,7 @@
 //! The vector table, in RAM, with our own handler for edges at pins.
 //!
-//! `embassy-rp` has a handler for edges, which wakes tasks. A limit switch has to stop the steps within 10 us, whatever tasks do, so ours takes
-//! its place.
+//! The handler of `embassy-rp` for edges wakes tasks. A limit switch has to stop the steps within 10 us, whatever
+//! tasks do, so our own handler replaces it.
 
 use core::cell::UnsafeCell;
 
@@ -12,22 +12,23 @@ const EXCEPTIONS: usize = 16;
 /// Interrupts of the chip.
 const INTERRUPTS: usize = 32;
 
-/// The table. The register that says where it is has no lower bits.
+/// The table. It is aligned because the register with its address has no lower bits.
 #[repr(C, align(256))]
 struct Table(UnsafeCell<[u32; EXCEPTIONS + INTERRUPTS]>);
 
-// SAFETY: start-up alone writes it.
+// SAFETY: only start-up writes it.
 unsafe impl Sync for Table {}
 
 static TABLE: Table = Table(UnsafeCell::new([0; EXCEPTIONS + INTERRUPTS]));
 
-/// Where the table is.
+/// The register with the address of the table.
 const VTOR: *mut u32 = 0xE000_ED08 as *mut u32;
 
-/// Copies the table, and has the CPU use the copy. Start-up.
+/// Copies the table to RAM, and has the CPU use the copy. Start-up.
 pub(super) fn move_to_ram() {
     let edges = EXCEPTIONS + IO_IRQ_BANK0 as usize;
-    // SAFETY: before any handler of ours is enabled. VTOR points to the table that the image begins with, of as many words.
+    // SAFETY: this runs before any handler of ours is enabled. VTOR points to the table at the beginning of the
+    // image, which has as many words.
     unsafe {
         let table = TABLE.0.get().cast::<u32>();
         let first = VTOR.read_volatile() as *const u32;

@@ -1,7 +1,7 @@
 //! The watchdog, and why the machine has started.
 //!
-//! [`start`] gives the firmware [`TIME_US`] between two calls of [`feed`]; if it is late, the chip resets. A scratch register, which such a reset
-//! leaves alone, keeps a [`Mark`] over it. After a reset all pins are inputs.
+//! After [`start`] the firmware has [`TIME_US`] between two calls of [`feed`]; if it is late, the chip resets. A
+//! scratch register, which this reset does not clear, keeps a [`Mark`]. After a reset all pins are inputs.
 
 use embassy_rp::pac::watchdog::regs::Load;
 use embassy_rp::pac::{PSM, VREG_AND_CHIP_RESET, WATCHDOG};
@@ -11,14 +11,14 @@ use crate::hal::resets::{self, Cause, Mark};
 /// 0.5 s. The counter goes down twice a microsecond (erratum E1).
 const TIME_US: u32 = 500_000;
 
-/// Bits of a reset's cause as [`resets::cause`] takes them.
+/// Bits of the cause of a reset, as [`resets::cause`] takes them.
 const POWER_ON: u8 = 1;
 /// See [`POWER_ON`].
 const EXTERNAL: u8 = 1 << 1;
 /// See [`POWER_ON`].
 const WATCHDOG_BIT: u8 = 1 << 3;
 
-/// What is reset: all but the oscillators.
+/// What the watchdog resets: everything except the oscillators.
 const RESETS: u32 = 0x0001_FFFC;
 
 fn leave(mark: Mark) {
@@ -44,29 +44,29 @@ pub(super) fn begin() {
     leave(Mark::running(resets::cause(bits, left())));
 }
 
-/// Why the machine has started.
+/// Returns why the machine has started.
 pub fn cause() -> Cause {
     left().cause().unwrap_or(Cause::PowerOn)
 }
 
-/// Has the watchdog on from now on.
+/// Switches the watchdog on.
 pub(super) fn start() {
     PSM.wdsel().write_value(embassy_rp::pac::psm::regs::Wdsel(RESETS));
     feed();
     WATCHDOG.ctrl().modify(|w| w.set_enable(true));
 }
 
-/// All is well. Thread mode, and exec.
+/// Restarts the time of the watchdog: all is well. Thread mode, and exec.
 pub fn feed() {
     WATCHDOG.load().write_value(Load(2 * TIME_US));
 }
 
-/// Takes it off.
+/// Switches the watchdog off.
 pub(super) fn off() {
     WATCHDOG.ctrl().modify(|w| w.set_enable(false));
 }
 
-/// Starts the firmware anew, as if the reset button had been pressed.
+/// Restarts the firmware, as if the reset button had been pressed.
 pub fn reset() -> ! {
     cortex_m::interrupt::disable();
     super::panic::make_safe();
@@ -79,7 +79,7 @@ pub fn reset() -> ! {
     }
 }
 
-/// Starts the boot loader in ROM, which shows a drive for a new image.
+/// Starts the boot loader in ROM, which appears as a drive that takes a new image.
 pub fn boot() -> ! {
     cortex_m::interrupt::disable();
     super::panic::make_safe();

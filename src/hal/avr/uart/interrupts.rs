@@ -1,14 +1,15 @@
-//! The interrupts of a serial port, in assembly; each port has its own, made from the same text.
+//! The interrupts of a serial port, in assembly. Each port has its own copies, made from the same text.
 //!
-//! The receive interrupt picks real-time characters off wherever they stand and never queues them.
+//! The receive interrupt takes real-time characters out of the stream wherever they stand, and never queues them.
 //!
-//! Interrupts stay off from the first cycle to the last. A tick need not wait so long: the
-//! handlers look at the timer's flag again and again, half-way for a usual byte, and call the step interrupt's handler if it is set. That costs
-//! two cycles, where masking the port's own interrupt, holding exec off and `sei` cost 26. So neither handler nests in itself, bytes keep their
-//! order, and exec, which would run far too long in the midst of a byte, waits for its end. Other interrupts wait for all of it: 60 cycles, 130
-//! for a byte that is lost.
+//! Interrupts stay off from the first cycle to the last. A tick of the step timer need not wait that long: the
+//! handlers test the timer's flag several times on their way, for a usual byte once half-way, and call the handler of
+//! the step interrupt if the flag is set. Each test costs two cycles; masking the port's own interrupt, holding exec
+//! off and `sei` would cost 26. Thus neither handler nests in itself, bytes keep their order, and exec, which runs
+//! far too long for the middle of a byte, waits for the end of the handler. Other interrupts wait for the whole
+//! handler: 60 cycles, 130 for a byte that is lost.
 //!
-//! A USART that the board does not use has interrupts that return at once, and nothing enables them.
+//! For a USART that the board does not use the handlers return at once, and nothing enables these interrupts.
 
 use core::arch::asm;
 use core::mem::offset_of;
@@ -34,7 +35,7 @@ const fn is_on(port: u8, usart: Usart) -> bool {
     matches!(hardware(port), Some(serial) if serial.usart as u8 == usart as u8)
 }
 
-/// The pin that the other side holds us back with.
+/// Returns the pin with which the other side stops us.
 const fn cts(port: u8) -> Option<Pin> {
     match hardware(port) {
         Some(Serial { handshake: Some(Handshake { cts, .. }), .. }) => Some(cts),
@@ -42,7 +43,7 @@ const fn cts(port: u8) -> Option<Pin> {
     }
 }
 
-/// The pin that we hold the other side back with.
+/// Returns the pin with which we stop the other side.
 const fn rts(port: u8) -> Option<Pin> {
     match hardware(port) {
         Some(Serial { handshake: Some(Handshake { rts, .. }), .. }) => Some(rts),
@@ -50,7 +51,8 @@ const fn rts(port: u8) -> Option<Pin> {
     }
 }
 
-/// Where a pin of the board is: a PIN register (0), or a PORT register (2), in the I/O space, and the bit.
+/// Returns where a pin of the board is: the address in the I/O space of its PIN register (`register` 0) or of its
+/// PORT register (`register` 2), and its bit.
 const fn place(pin: Option<Pin>, register: usize) -> (usize, u8) {
     match pin {
         Some(pin) => (pin.port.address() - 0x22 + register, pin.bit),
@@ -58,7 +60,7 @@ const fn place(pin: Option<Pin>, register: usize) -> (usize, u8) {
     }
 }
 
-/// The pin that enables the driver of a port.
+/// Returns the pin that enables the driver of a port.
 const fn driver(port: u8) -> Option<Pin> {
     match hardware(port) {
         Some(serial) => serial.driver_enable,
@@ -71,15 +73,17 @@ macro_rules! interrupts {
         $port:ident on $usart:ident: $shared:ident, $ring:ident,
         $rx:ident, $empty:ident, $complete:ident
     ) => {
-        /// USARTn_RX: takes a byte, in 60 cycles, a line end in 70.
+        /// USARTn_RX: takes a byte, in 60 cycles; a line end in 70.
         ///
-        /// A tick waits for 40 of them at most. The reader is told at the ends of lines and every `batch` bytes.
+        /// A tick waits for at most 40 of these cycles. The reader is woken at the ends of lines and every `batch`
+        /// bytes.
         #[unsafe(no_mangle)]
         extern "C" fn $rx() -> ! {
-            // SAFETY: every register it changes is restored, and it returns by `reti`. It is the only producer
-            // of the receive ring and the only one to write `lost_ends` and to set bits of `realtime`. Interrupts are off, so it
-            // does not nest in itself. The handler of the step interrupt restores every register as well; its `reti` lets interrupts
-            // in, but none comes before the instruction behind it, which is `cli`. The flag that it is called for is cleared, as the chip does on the way there.
+            // SAFETY: every register it changes is restored, and it returns by `reti`. It is the only producer of the
+            // receive ring, and it alone writes `lost_ends` and sets bits of `realtime`. Interrupts are off, so it
+            // does not nest in itself. The handler of the step interrupt also restores every register. Its `reti`
+            // lets interrupts in, but none comes before the instruction after it, which is `cli`. The timer's flag is
+            // cleared before the call, as the chip does when it enters that handler.
             unsafe {
                 asm!(
                     ".if {here}",
@@ -88,15 +92,15 @@ macro_rules! interrupts {
                     "push r24",
                     "push r30",
                     "push r31",
-                    // The status goes with the byte that is read after it.
+                    // The status belongs to the byte that is read after it, so it is read first.
                     "lds  r31, {status}",
                     "lds  r24, {data}",
-                    // Letters, digits and dots, the most of it, are no real-time characters.
+                    // Letters, digits and dots, most of what comes, are no real-time characters.
                     "cpi  r24, 0x26",
                     "brlo 61f",
                     "cpi  r24, 0x7E",
                     "brsh 12f",
-                    // A frame error or an overrun says that something was lost.
+                    // A frame error or an overrun means that something was lost.
                     "60:",
                     "andi r31, 0x18",
                     "brne 64f",
@@ -129,7 +133,8 @@ macro_rules! interrupts {
                     "62:",
                     "sbi  {flags}, {received}",
                     ".if {rts_there}",
-                    // The reader may come too late to stop the sender, where the ring is short.
+                    // Where the ring is short, the reader may come too late to stop the sender: this interrupt sets
+                    // RTS.
                     "sbic {step_flags}, {due}",
                     "rcall 68f",
                     "lds  r31, {shared} + {held}",
@@ -144,7 +149,7 @@ macro_rules! interrupts {
                     "sbi  {rts_register}, {rts_bit}",
                     ".endif",
                     "rjmp 65b",
-                    // A tick is due.
+                    // A tick is due: clear the flag and call the step interrupt's handler.
                     "68:",
                     "sbi  {step_flags}, {due}",
                     "call {step}",
@@ -161,7 +166,7 @@ macro_rules! interrupts {
                     "rjmp 60b",
                     ".endif",
                     "rjmp 40f",
-                    // Up to a percent sign. A blank or a line end comes at once.
+                    // Bytes up to a percent sign. Blanks and line ends take the shortest ways.
                     "61:",
                     "sbic {step_flags}, {due}",
                     "rcall 68b",
@@ -184,7 +189,7 @@ macro_rules! interrupts {
                     "53:",
                     "cpi  r24, {marks}",
                     "brlo 54f",
-                    // A line end, or nearly: the reader is to look.
+                    // A line end or another control character: wake the reader.
                     "67:",
                     "sbi  {flags}, {received}",
                     "rjmp 60b",
@@ -193,7 +198,8 @@ macro_rules! interrupts {
                     "rjmp 67b",
                     "52:",
                     "rjmp 50f",
-                    // From blank to percent: special are 0x21 and 0x25, those of odd number with bit 1 clear.
+                    // From a blank to a percent sign. Special are 0x21 and 0x25: the bytes with bit 0 set and bit 1
+                    // clear.
                     "6:",
                     "sbrs r24, 0",
                     "rjmp 60b",
@@ -216,18 +222,18 @@ macro_rules! interrupts {
                     "rjmp 16f",
                     "15:",
                     "ldi  r30, {kill}",
-                    // A real-time character. What was lost before it is still to be marked.
+                    // A real-time character. If a loss came with it, that is still to be marked.
                     "16:",
                     "sbic {step_flags}, {due}",
                     "rcall 68b",
                     "lds  r24, {shared} + {realtime}",
-                    // Who says hold does not say resume any more (`realtime::with`).
+                    // A hold takes back a resume that is pending (`realtime::with`).
                     "sbrc r30, {hold_bit}",
                     "andi r24, {not_resume}",
                     "or   r24, r30",
                     "sts  {shared} + {realtime}, r24",
                     "sbi  {flags}, {special}",
-                    // Where it stands counts, of some: queue a mark.
+                    // For some of them the place in the stream counts: queue a mark.
                     "ldi  r24, {cut}",
                     "sbrc r30, {resume_bit}",
                     "ldi  r24, {go}",
@@ -235,7 +241,7 @@ macro_rules! interrupts {
                     "breq 24f",
                     "sbi  {flags}, {received}",
                     "rjmp 60b",
-                    // All is done.
+                    // Nothing is left to do.
                     "3:",
                     "rjmp 66b",
                     "24:",
@@ -243,7 +249,7 @@ macro_rules! interrupts {
                     "andi r31, 0x18",
                     "breq 3b",
                     "rjmp 71f",
-                    // XON or XOFF, if they count.
+                    // XON or XOFF, if flow control is by characters.
                     "50:",
                     "lds  r30, {shared} + {held}",
                     "sbrs r30, {heeds_xoff}",
@@ -261,7 +267,7 @@ macro_rules! interrupts {
                     "51:",
                     "sts  {shared} + {held}, r30",
                     "rjmp 24b",
-                    // Something was lost: a mark for it, if there is room.
+                    // Something was lost: queue a mark, if there is room.
                     "7:",
                     "sbic {step_flags}, {due}",
                     "rcall 68b",
@@ -283,7 +289,7 @@ macro_rules! interrupts {
                     "8:",
                     "sbic {step_flags}, {due}",
                     "rcall 68b",
-                    // A resume goes without its place: nothing is lost for it.
+                    // A resume does without its place, so that no byte is lost for it.
                     "cpi  r24, {go}",
                     "brne 81f",
                     "lds  r24, {shared} + {realtime}",
@@ -339,14 +345,14 @@ macro_rules! interrupts {
                     "st   Z, r26",
                     "pop  r26",
                     "rjmp 3b",
-                    // Z to the slot of index r30.
+                    // Sets Z to the slot of index r30.
                     "20:",
                     "ldi  r31, 0",
                     "subi r30, lo8(-({shared} + {slots}))",
                     "sbci r31, hi8(-({shared} + {slots}))",
                     "ret",
-                    // A tilde, or above: an override, or the end of a jog (`realtime::Asked`), unless it is damaged, or a
-                    // part of a letter.
+                    // A tilde, or a byte above it: an override or the end of a jog (`realtime::Asked`), unless the
+                    // byte is damaged or part of a letter.
                     "40:",
                     "sbic {step_flags}, {due}",
                     "rcall 68b",
@@ -415,7 +421,7 @@ macro_rules! interrupts {
                     "36:",
                     "sts  {shared} + {asked} + 2, r30",
                     "rjmp 3b",
-                    // The percent r30 with one more step, r24; r31 is the bit for one from 100 %.
+                    // Adds one more step, r24, to the percentage r30. r31 is the bit that says "from 100 %".
                     "45:",
                     "cpi  r24, 1",
                     "brlo 47f",
@@ -502,15 +508,15 @@ macro_rules! interrupts {
             }
         }
 
-        /// USARTn_UDRE: sends a byte, in 56 cycles, 60 on a bus, or stops asking when there is none. While XOFF or XON waits, or the other
-        /// side may hold us back, 85.
+        /// USARTn_UDRE: sends a byte, in 56 cycles, 60 on a bus; when there is none, it disables itself. While XOFF
+        /// or XON waits, or the other side may stop us, it takes 85.
         ///
-        /// A tick waits for 35 of them at most.
+        /// A tick waits for at most 35 of these cycles.
         #[unsafe(no_mangle)]
         extern "C" fn $empty() -> ! {
-            // SAFETY: every register it changes is restored, and it returns by `reti`. It is the only consumer
-            // of the transmit ring. Interrupts are off, so it does not nest in itself, and UCSRnB is changed in one piece. The step
-            // interrupt's handler is called as in the receive interrupt.
+            // SAFETY: every register it changes is restored, and it returns by `reti`. It is the only consumer of the
+            // transmit ring. Interrupts are off, so it does not nest in itself, and no other code changes UCSRnB
+            // meanwhile. The handler of the step interrupt is called as in the receive interrupt.
             unsafe {
                 asm!(
                     ".if {here}",
@@ -539,7 +545,8 @@ macro_rules! interrupts {
                     "4:",
                     "sts  {data}, r24",
                     ".if {bus}",
-                    // Complete is this byte, not one before it: no time may pass between the two.
+                    // Clears TXC, so that "complete" means this byte, not one before it. No time may pass between the
+                    // two stores.
                     "ldi  r24, {complete}",
                     "sts  {status}, r24",
                     ".endif",
@@ -551,13 +558,13 @@ macro_rules! interrupts {
                     "out  0x3F, r24",
                     "pop  r24",
                     "reti",
-                    // A tick is due.
+                    // A tick is due: clear the flag and call the step interrupt's handler.
                     "25:",
                     "sbi  {step_flags}, {due}",
                     "call {step}",
                     "cli",
                     "ret",
-                    // It stays masked until there is something to send.
+                    // Nothing may be sent now: the interrupt stays masked until `kick`.
                     "24:",
                     "sbic {step_flags}, {due}",
                     "rcall 25b",
@@ -568,7 +575,7 @@ macro_rules! interrupts {
                     ".endif",
                     "sts  {control}, r24",
                     "rjmp 23b",
-                    // A byte goes before all others, if it waits no more, or the byte sent last ends a line.
+                    // A byte goes before all others, if its wait is over or the byte sent last ends a line.
                     "20:",
                     "lds  r24, {shared} + {ahead}",
                     "tst  r24",
@@ -587,14 +594,14 @@ macro_rules! interrupts {
                     "ldi  r30, 0",
                     "sts  {shared} + {ahead}, r30",
                     "rjmp 4b",
-                    // It has gone.
+                    // No byte is to go ahead any more: clear `AHEAD`.
                     "12:",
                     "sbic {step_flags}, {due}",
                     "rcall 25b",
                     "lds  r24, {shared} + {held}",
                     "andi r24, {not_before}",
                     "sts  {shared} + {held}, r24",
-                    // The other side has said that it holds us back, or may say so by a pin.
+                    // The other side has stopped us by XOFF, or may do so by a pin.
                     "5:",
                     "sbic {step_flags}, {due}",
                     "rcall 25b",
@@ -646,11 +653,11 @@ macro_rules! interrupts {
             }
         }
 
-        /// USARTn_TX: the last byte has left; lets go of the bus. Interrupts are off for 15 cycles.
+        /// USARTn_TX: the last byte has left, so it lets go of the bus. Interrupts are off for 15 cycles.
         #[unsafe(no_mangle)]
         extern "C" fn $complete() -> ! {
             // SAFETY: it changes no register, and returns by `reti`. The bit of the pin is changed in one
-            // instruction; `uart::kick` keeps this away while it sets it.
+            // instruction; `uart::kick` keeps this interrupt away while it sets that bit.
             unsafe {
                 asm!(
                     ".if {bus}",

@@ -1,7 +1,9 @@
-//! The feeder: writes chunks of entries ahead of time. Owns the step generator, and the ring's end that reads.
+//! The feeder: writes chunks of entries ahead of time. Owns the step generator, and the reading end of the segment
+//! ring.
 //!
-//! It runs in the handlers of DMA_IRQ_0 and PIO0_IRQ_0, of one priority: at the end of each chunk, when exec starts the steps, at the mark of the last entry, and
-//! when a contact is to be worked out. Cost: see [`Writer::run`].
+//! It runs in the handlers of DMA_IRQ_0 and PIO0_IRQ_0, which have one priority: at the end of each chunk, when exec
+//! starts the steps, at the mark of the last entry, and when a contact has to be worked out. Cost: see
+//! [`Writer::run`].
 
 use core::cell::{Cell, UnsafeCell};
 use core::sync::atomic::Ordering::Relaxed;
@@ -18,30 +20,31 @@ use crate::hal::event::Event;
 use crate::hal::flags;
 use crate::hal::ring::Consumer;
 
-/// From the start to the first tick, counts.
+/// Counts from the start to the first tick.
 const FIRST_TICK: u32 = 400;
 
-/// What the feeder owns.
+/// The state that the feeder owns.
 pub(super) struct Feeder {
     dda: Dda,
     writer: Writer,
     segments: Option<Consumer<Segment, SEGMENTS>>,
     /// The next entry is the first of a motion.
     begins: bool,
-    /// Chunks that are sent or wait.
+    /// Chunks that are being sent or wait.
     flying: u8,
-    /// The last entry has been written: its mark is to come.
+    /// The last entry has been written; its mark has not come yet.
     ended: bool,
 }
 
-/// It, and what others tell it.
+/// The feeder, and what others tell it.
 pub(super) struct Shared {
     feeder: UnsafeCell<Feeder>,
-    /// Where the pins were at a contact. With interrupts off.
+    /// Where the pins were at a contact that is still to be worked out. Used with interrupts off.
     pub contact: Cell<Option<Place>>,
 }
 
-// SAFETY: the feeder's handlers, which do not preempt each other, and `alone`; `contact` with interrupts off.
+// SAFETY: only the feeder's handlers, which do not preempt each other, and `alone` use the feeder; `contact` is used
+// with interrupts off.
 unsafe impl Sync for Shared {}
 
 pub(super) static FEEDER: Shared = Shared {
@@ -56,22 +59,22 @@ pub(super) static FEEDER: Shared = Shared {
     contact: Cell::new(None),
 };
 
-/// Takes the ring's end. Start-up.
+/// Takes the reading end of the segment ring. Start-up.
 pub(super) fn start(segments: Consumer<Segment, SEGMENTS>) {
     alone(|feeder| feeder.segments = Some(segments));
 }
 
-/// Does something with the feeder while it cannot run. Thread mode, exec, and start-up.
+/// Runs `act` on the feeder while its handlers cannot run. Thread mode, exec, and start-up.
 pub(super) fn alone<R>(act: impl FnOnce(&mut Feeder) -> R) -> R {
     let was = interrupt::DMA_IRQ_0.is_enabled();
     interrupt::DMA_IRQ_0.disable();
     interrupt::PIO0_IRQ_0.disable();
     cortex_m::asm::dsb();
     cortex_m::asm::isb();
-    // SAFETY: its handlers are off, and no level above them calls this.
+    // SAFETY: the feeder's handlers are off, and no level above them calls this.
     let result = act(unsafe { &mut *FEEDER.feeder.get() });
     if was {
-        // SAFETY: as it was before.
+        // SAFETY: the interrupts are enabled as they were before.
         unsafe {
             interrupt::DMA_IRQ_0.enable();
             interrupt::PIO0_IRQ_0.enable();
@@ -90,9 +93,9 @@ fn PIO0_IRQ_0() {
     turn();
 }
 
-/// What both handlers do.
+/// Does the work of both handlers.
 fn turn() {
-    // SAFETY: handlers of one priority, and `alone` keeps them off.
+    // SAFETY: both handlers have one priority, and `alone` keeps them off.
     let feeder = unsafe { &mut *FEEDER.feeder.get() };
     feeder.flying = feeder.flying.saturating_sub(machine::take_done().count_ones() as u8);
     if machine::take_mark() {
@@ -109,7 +112,7 @@ fn turn() {
 }
 
 impl Feeder {
-    /// The generator.
+    /// Returns the generator.
     pub(super) fn dda(&self) -> &Dda {
         &self.dda
     }
@@ -120,7 +123,7 @@ impl Feeder {
         (self.begins, self.ended) = (true, false);
     }
 
-    /// The last entry has been carried out.
+    /// Ends the motion, because the last entry has been carried out; begins another one if segments wait.
     fn rest(&mut self) {
         self.ended = false;
         let waits = self.segments.as_ref().is_some_and(|segments| !segments.is_empty());
@@ -131,13 +134,13 @@ impl Feeder {
         exec::pend();
     }
 
-    /// Has two chunks on their way, as far as there are segments.
+    /// Keeps two chunks on their way, as long as there are segments.
     fn feed(&mut self) {
         while RUNNING.load(Relaxed) && self.flying < 2 && !self.ended {
             let mut chunk = Chunk::next();
             self.fill(&mut chunk);
             if chunk.is_empty() {
-                // Segments may come while the other one is sent.
+                // Segments may still come while the other chunk is sent.
                 if self.flying > 0 {
                     return;
                 }
@@ -148,12 +151,12 @@ impl Feeder {
         }
     }
 
-    /// Whether there is a tick to be written.
+    /// Whether there is a tick to write.
     fn has_tick(&self) -> bool {
         self.dda.ticks > 0 || self.segments.as_ref().is_some_and(|segments| !segments.is_empty())
     }
 
-    /// Writes ticks for about [`CHUNK_CYCLES`].
+    /// Writes ticks to `chunk` for about [`CHUNK_CYCLES`].
     fn fill(&mut self, chunk: &mut Chunk) {
         let mut cycles = 0i32;
         while cycles < CHUNK_CYCLES
@@ -179,7 +182,7 @@ impl Feeder {
         }
     }
 
-    /// Takes the next segment up. False when there is none.
+    /// Loads the next segment. Returns `false` if there is none.
     fn load(&mut self, chunk: &mut Chunk) -> bool {
         let Some(segments) = self.segments.as_mut() else { return false };
         let mut out = Out { writer: &mut self.writer, to: &mut chunk.list };
@@ -190,13 +193,13 @@ impl Feeder {
         loaded
     }
 
-    /// The last entry, with its mark.
+    /// Writes the last entry, with its mark.
     fn end(&mut self, chunk: &mut Chunk) {
         self.writer.end(&mut chunk.list);
         self.ended = true;
     }
 
-    /// Everything that has not been carried out is forgotten: see [`Dda::settle`].
+    /// Drops everything that has not been carried out: see [`Dda::settle`].
     pub(super) fn settle(&mut self, held: &mut Option<Segment>, position: &mut [i32; MOTORS]) {
         let segments = &mut self.segments;
         let queued = || segments.as_mut().and_then(Consumer::pop).or_else(|| held.take());

@@ -1,4 +1,4 @@
-//! The state machine, its FIFO and the two channels of the DMA: all their registers.
+//! The state machine, its FIFO and the two DMA channels: this module owns all their registers.
 //!
 //! ```text
 //! RAM: chunk n, n + 1  --channel n mod 2-->  FIFO (4 words)  -->  state machine  -->  pins
@@ -15,28 +15,29 @@ use super::words::{CHANGES, Count, Entry, List, Wiring};
 use super::{CHUNK, CHUNKS, STOPPED, gpio, mask};
 use crate::boards::{ACTIVE, MOTORS, Port};
 
-/// The state machine, of four.
+/// The number of the state machine, of four.
 const SM: usize = 0;
-/// Where its program lies: wherever it is loaded, jumps are as in the text.
+/// The address of its program. The program has to be loaded at this address, because its jumps are not relocated.
 const ORIGIN: u8 = 0;
-/// Where the program has taken an entry's first word, and both, and not carried them out.
+/// Addresses at which the program has taken the first word of an entry but not carried it out.
 const HALF_TAKEN: [core::ops::RangeInclusive<u8>; 2] = [1..=4, 10..=12];
 const TAKEN: u8 = 13;
-/// The interrupt flag that a marked entry raises.
+/// Bit of the interrupt flag that a marked entry raises.
 const MARKED: u32 = 1;
-/// So often a place is looked for that moves on meanwhile.
+/// How often [`place`] looks again when the state machine moves on meanwhile.
 const TRIES: u8 = 8;
 /// Words of an entry.
 const WORDS: u32 = 2;
 
-/// What the channels do: words from memory, one for each place in the FIFO (request 0 is that of the first state machine of PIO0).
+/// What the channels do: they move words from memory, one for each free place in the FIFO (request 0 is that of
+/// PIO0's first state machine).
 const CONTROL: u32 = 1 | 2 << 2 | 1 << 4;
-/// Where the channel that follows is written, itself for none.
+/// Position of the number of the channel that follows; a channel's own number means none.
 const CHAIN: u32 = 11;
-/// Of a channel: it is at work.
+/// Bit of a channel's control register: the channel is at work.
 const BUSY: u32 = 1 << 24;
 
-/// The pins of the chip.
+/// The number of pins of the chip.
 const PINS: u8 = 30;
 
 /// The motors' pins.
@@ -54,7 +55,7 @@ const _: () = {
 
 struct Buffer(UnsafeCell<[[Entry; CHUNK]; CHUNKS]>);
 
-// SAFETY: the feeder alone writes it, and never a chunk that the DMA reads.
+// SAFETY: only the feeder writes it, and never a chunk that the DMA reads.
 unsafe impl Sync for Buffer {}
 
 static BUFFER: Buffer = Buffer(UnsafeCell::new([[[0; 2]; CHUNK]; CHUNKS]));
@@ -64,7 +65,7 @@ static LENGTHS: [AtomicU32; CHUNKS] = [const { AtomicU32::new(0) }; CHUNKS];
 /// Chunks that have been handed to the DMA.
 static SENT: AtomicU32 = AtomicU32::new(0);
 
-/// How far entries have been carried out: so many words of this chunk, and all before it.
+/// How far entries have been carried out: `words` words of this chunk, and all chunks before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Place {
     chunk: u32,
@@ -72,11 +73,11 @@ pub struct Place {
 }
 
 impl Place {
-    /// Nowhere.
+    /// No place: nothing has been sent.
     pub const NONE: Place = Place { chunk: 0, words: 0 };
 }
 
-/// The address of a chunk.
+/// Returns the address of a chunk.
 fn address(chunk: u32) -> u32 {
     BUFFER.0.get() as u32 + chunk % CHUNKS as u32 * size_of::<[Entry; CHUNK]>() as u32
 }
@@ -127,7 +128,7 @@ pub(super) fn start() {
         w.set_out_shiftdir(true);
         w.set_in_shiftdir(true);
     });
-    // Pins become outputs by instructions that are carried out at once.
+    // Pins become outputs by instructions that the state machine carries out at once.
     for motor in ACTIVE.motors {
         for pin in [motor.step, motor.dir] {
             sm.pinctrl().write(|w| {
@@ -139,13 +140,13 @@ pub(super) fn start() {
             gpio::connect(pin, gpio::Unit::Pio0);
         }
     }
-    // All pins of the chip: those that are connected to it are the motors'.
+    // All pins of the chip. Only the motors' pins are connected to the state machine.
     sm.pinctrl().write(|w| w.set_out_count(PINS));
     PIO0.irqs(0).inte().write(|w| w.0 = MARKED << 8);
     DMA.inte(0).write_value(0b11);
     for interrupt in [DMA_IRQ_0, PIO0_IRQ_0] {
         interrupt.set_priority(Priority::P2);
-        // SAFETY: what the handlers touch is there.
+        // SAFETY: everything that the handlers touch has been set up.
         unsafe { interrupt.enable() };
     }
 }
@@ -161,9 +162,9 @@ fn execute(instruction: u16) {
     PIO0.sm(SM).instr().write(|w| w.set_instr(instruction));
 }
 
-/// The state machine stands still from now on. Any level.
+/// Stops the state machine at once. Any level.
 pub(super) fn halt() {
-    // The other state machines are nobody's.
+    // Nobody uses the other state machines.
     PIO0.ctrl().write(|w| w.0 = 0);
 }
 
@@ -171,7 +172,7 @@ fn run() {
     PIO0.ctrl().write(|w| w.0 = 1 << SM);
 }
 
-/// From the next entry on pulses count so many cycles. The feeder, while nothing is sent.
+/// Sets the count of pulses from the next entry on. The feeder, while nothing is sent.
 pub(super) fn set_pulse(count: u32) {
     halt();
     begin_anew();
@@ -180,20 +181,20 @@ pub(super) fn set_pulse(count: u32) {
     execute(TO_PULSE);
 }
 
-/// The program begins at its start. While it stands still.
+/// Lets the program begin at its start. While the state machine stands still.
 fn begin_anew() {
     PIO0.ctrl().write(|w| w.set_sm_restart(1 << SM));
     execute(JMP_START);
 }
 
-/// The channels whose chunks have gone to the FIFO since the last call, as bits.
+/// Takes the channels whose chunks have gone to the FIFO since the last call, as bits.
 pub(super) fn take_done() -> u32 {
     let done = DMA.ints(0).read() & 0b11;
     DMA.ints(0).write_value(done);
     done
 }
 
-/// Whether a marked word has ended since the last call.
+/// Whether a marked entry has been carried out since the last call.
 pub(super) fn take_mark() -> bool {
     let marked = PIO0.irq().read().0 & MARKED != 0;
     if marked {
@@ -202,19 +203,20 @@ pub(super) fn take_mark() -> bool {
     marked
 }
 
-/// The next chunk, to be filled. The feeder.
+/// The next chunk, which the feeder fills.
 pub(super) struct Chunk {
     number: u32,
-    /// What has been put there.
+    /// The entries that have been written.
     pub list: List<'static>,
 }
 
 impl Chunk {
-    /// The feeder alone, one at a time.
+    /// Returns the next chunk. Only the feeder calls it, and fills one chunk at a time.
     pub(super) fn next() -> Self {
         let number = SENT.load(Relaxed);
         let chunks = BUFFER.0.get().cast::<[Entry; CHUNK]>();
-        // SAFETY: inside the buffer; the DMA does not read this chunk now, and the one before that was filled has been handed over.
+        // SAFETY: inside the buffer. The DMA does not read this chunk now, and the chunk that was filled before has
+        // been handed over.
         let room = unsafe { &mut *chunks.wrapping_add(number as usize % CHUNKS) };
         Self { number, list: List::new(room) }
     }
@@ -223,14 +225,14 @@ impl Chunk {
         self.list.len() == 0
     }
 
-    /// Hands it to the DMA, behind the chunk that is sent if `follows`.
+    /// Hands the chunk to the DMA. If `follows`, it comes behind the chunk that is being sent.
     pub(super) fn send(self, follows: bool) {
         let (own, other) = (self.number as usize % 2, (self.number as usize + 1) % 2);
         let start = address(self.number);
         let (channel, before) = (DMA.ch(own), DMA.ch(other));
         let words = self.list.len() as u32 * WORDS;
         LENGTHS[self.number as usize % CHUNKS].store(words, Relaxed);
-        // The words are in memory before the DMA reads them.
+        // The words must be in memory before the DMA reads them.
         cortex_m::asm::dmb();
         mask(|| {
             channel.al1_ctrl().write_value(CONTROL | (own as u32) << CHAIN);
@@ -244,7 +246,7 @@ impl Chunk {
             run();
             if follows {
                 before.al1_ctrl().write_value(CONTROL | (own as u32) << CHAIN);
-                // It may have ended before it was told what follows.
+                // The channel before may have ended before it was told what follows.
                 let ended = before.al1_ctrl().read() & BUSY == 0;
                 let waits = channel.al1_ctrl().read() & BUSY == 0
                     && channel.al1_read_addr().read() == start;
@@ -257,13 +259,13 @@ impl Chunk {
     }
 }
 
-/// How far entries have been carried out right now. Any level. Cost: 80 cycles.
+/// Returns how far entries have been carried out right now. Any level. Cost: 80 cycles.
 pub fn place() -> Place {
     let mut found = Place::NONE;
     if SENT.load(Relaxed) == 0 {
         return found;
     }
-    // What moves on meanwhile is looked at again; it does so for a moment in each entry.
+    // If the state machine moves on meanwhile, it is looked at again. In each entry that happens for a moment only.
     for _ in 0..TRIES {
         let (place, waiting) = (sent(), waiting());
         let at = PIO0.sm(SM).addr().read().addr();
@@ -280,17 +282,17 @@ pub fn place() -> Place {
     found
 }
 
-/// Whether this place is so many words behind what has been sent.
+/// Whether `place` is `behind` words before the end of what has been sent.
 fn sent_is(place: Place, behind: u32) -> bool {
     back(sent(), behind) == place && waiting() <= behind
 }
 
-/// Words in the FIFO.
+/// Returns the number of words in the FIFO.
 fn waiting() -> u32 {
     PIO0.flevel().read().0 >> (8 * SM) & 0xF
 }
 
-/// How far the DMA has read.
+/// Returns how far the DMA has read.
 fn sent() -> Place {
     let newest = SENT.load(Relaxed).wrapping_sub(1);
     let gone = |chunk: u32| {
@@ -306,7 +308,7 @@ fn sent() -> Place {
     }
 }
 
-/// So many words before a place.
+/// Returns the place `words` words before `place`.
 fn back(mut place: Place, mut words: u32) -> Place {
     for _ in 0..CHUNKS {
         if let Some(left) = place.words.checked_sub(words) {
@@ -321,11 +323,12 @@ fn back(mut place: Place, mut words: u32) -> Place {
 
 fn entry(chunk: u32, number: u32) -> Entry {
     let at = address(chunk) as *const Entry;
-    // SAFETY: inside the buffer; the feeder, which writes it, does not run meanwhile or calls this.
+    // SAFETY: inside the buffer. The feeder, which writes it, does not run meanwhile, or it is the caller.
     unsafe { at.wrapping_add(number as usize % CHUNK).read_volatile() }
 }
 
-/// The steps of the entries behind a place, backwards ones negative. The feeder, or while it cannot run.
+/// Returns the steps of the entries behind a place; backward steps are negative. The feeder, or others while it
+/// cannot run.
 pub(super) fn steps_behind(place: Place) -> [i32; MOTORS] {
     let mut count = Count::default();
     let (mut at, end) = (place, SENT.load(Relaxed));
@@ -341,10 +344,11 @@ pub(super) fn steps_behind(place: Place) -> [i32; MOTORS] {
     count.steps
 }
 
-/// What has been sent and not carried out is gone; the steps of it. Step pins are low. While the feeder cannot run and no steps come.
+/// Drops what has been sent and not carried out, and returns its steps. Leaves step pins low. While the feeder cannot
+/// run and no steps come.
 pub(super) fn drop_words() -> [i32; MOTORS] {
     halt();
-    // What is on its way to the FIFO arrives.
+    // Waits until the words on their way to the FIFO have arrived.
     while (0..2).any(|ch| DMA.ch(ch).al1_ctrl().read() & BUSY != 0)
         && PIO0.fstat().read().0 >> (16 + SM) & 1 == 0
     {}
@@ -355,7 +359,7 @@ pub(super) fn drop_words() -> [i32; MOTORS] {
     DMA.ch(newest as usize % 2).al1_read_addr().write_value(address(newest) + 4 * length(newest));
     take_done();
     take_mark();
-    // A change of this bit empties the FIFO.
+    // Changing this bit empties the FIFO.
     let sm = PIO0.sm(SM);
     for _ in 0..2 {
         sm.shiftctrl().modify(|w| w.set_fjoin_rx(!w.fjoin_rx()));
@@ -364,7 +368,7 @@ pub(super) fn drop_words() -> [i32; MOTORS] {
     steps
 }
 
-/// Puts the pins out, while nothing else is sent.
+/// Sets the pins to `pins`, while nothing else is sent.
 pub(super) fn show(pins: u32) {
     for word in [CHANGES, pins] {
         PIO0.txf(SM).write_value(word);

@@ -1,18 +1,21 @@
-//! Steps: a state machine of PIO0, which two channels of the DMA feed in turn with words out of RAM.
+//! Steps: a state machine of PIO0, which two DMA channels feed in turn with words from RAM.
 //!
-//! An entry of two words is a rest, a pulse, and the pins for it ([`words`]); the state machine runs at the system clock. So each
-//! edge is where it should be to a cycle, whatever the CPU does, and all motors keep to one time. Pins may be anywhere: entries have all of the chip.
+//! An entry of two words makes a rest, a pulse, and sets the pins for it ([`words`]). The state machine runs at the
+//! system clock, so each edge comes at its exact cycle whatever the CPU does, and all motors share one time base. The
+//! pins may be anywhere, because an entry has bits for all pins of the chip.
 //!
-//! The **feeder**, the handler of DMA_IRQ_0 and PIO0_IRQ_0, runs the step generator ([`Dda`]) ahead of time and writes chunks of entries, each about half a
-//! millisecond long. While one chunk is sent the next one waits behind it, chained by the hardware. Where no segment is left, the last entry has a mark, upon
-//! which the state machine raises its interrupt: the machine stands still.
+//! The **feeder**, the handler of DMA_IRQ_0 and PIO0_IRQ_0, runs the step generator ([`Dda`]) ahead of time and
+//! writes chunks of entries, each about half a millisecond long. While one chunk is sent the next one waits behind
+//! it, chained by the hardware. When no segment is left, the last entry has a mark, at which the state machine raises
+//! its interrupt: the machine stands still.
 //!
-//! **Counting.** Chunks are numbered. How many words have been carried out follows from the read address of the channels, the level of the FIFO and the
-//! instruction that the state machine is at ([`place`]). Entries behind that are steps that have not been made: after a stop [`settle`] takes them
-//! off the position, and a contact's place is worked out from them.
+//! **Counting.** Chunks are numbered. The read addresses of the channels, the level of the FIFO and the current
+//! instruction of the state machine tell how many words have been carried out ([`place`]). The entries behind that
+//! place are steps that have not been made: after a stop [`settle`] subtracts them from the position, and the place
+//! of a contact is computed from them.
 //!
-//! **When late.** Two chunks last for at least [`CHUNK_CYCLES`] each, unless segments come late. If the feeder comes later, all pins stand as they are
-//! until it does; no step is lost.
+//! **When late.** Two chunks are ready, each at least [`CHUNK_CYCLES`] long unless segments come late. If the feeder
+//! comes later than that, all pins keep their levels until it does; no step is lost.
 
 mod feeder;
 mod machine;
@@ -29,15 +32,16 @@ use crate::hal::ring::{Producer, Ring};
 use feeder::FEEDER;
 pub use machine::{Place, place};
 
-/// Entries of a chunk: a step each microsecond, and some.
+/// Entries of a chunk: enough for a step each microsecond, and some more.
 const CHUNK: usize = 512;
-/// Chunks in RAM. Two are sent or wait; three more may have entries in the FIFO and in the state machine, and a contact is told later.
+/// Chunks in RAM. Two are sent or wait. Up to three more may have entries in the FIFO and in the state machine, and a
+/// contact is worked out later than it happens.
 const CHUNKS: usize = 8;
 /// About how long a chunk lasts, cycles: half a millisecond.
 const CHUNK_CYCLES: i32 = 64_000;
 
 static RING: Ring<Segment, SEGMENTS> = Ring::new();
-/// Steps are coming, or will. Exec sets it, the feeder clears it.
+/// Steps are coming, or will come. Exec sets it, the feeder clears it.
 static RUNNING: AtomicBool = AtomicBool::new(false);
 /// Set by [`stop`].
 static STOPPED: AtomicBool = AtomicBool::new(false);
@@ -46,7 +50,7 @@ static BEGINS: AtomicBool = AtomicBool::new(false);
 /// How long pulses last, us.
 static PULSE_US: AtomicU32 = AtomicU32::new(2);
 
-/// Sets PIO, DMA and pins up. Start-up; `None` after the first time.
+/// Sets PIO, DMA and pins up, and returns the filling end of the segment ring. Start-up; `None` after the first time.
 pub fn start() -> Option<Producer<Segment, SEGMENTS>> {
     let (producer, consumer) = RING.split()?;
     feeder::start(consumer);
@@ -54,7 +58,7 @@ pub fn start() -> Option<Producer<Segment, SEGMENTS>> {
     Some(producer)
 }
 
-/// Starts the steps if they have stopped. Exec, after it has queued a segment.
+/// Starts the steps if they have stopped. Exec calls it after it has queued a segment.
 pub fn go() {
     if !RUNNING.load(Relaxed) && !is_stopped() {
         RUNNING.store(true, Relaxed);
@@ -63,7 +67,7 @@ pub fn go() {
     }
 }
 
-/// Stops the steps at once and until [`release`], wherever the motors are. Any level.
+/// Stops the steps at once, wherever the motors are; they stay stopped until [`release`]. Any level.
 pub fn stop() {
     STOPPED.store(true, Relaxed);
     kill();
@@ -74,12 +78,12 @@ pub fn kill() {
     machine::halt();
 }
 
-/// Whether they have been stopped. Any level.
+/// Whether [`stop`] has stopped the steps and nothing has released them. Any level.
 pub fn is_stopped() -> bool {
     STOPPED.load(Relaxed)
 }
 
-/// Steps may come again. Thread mode, when the motors have [settled](settle).
+/// Allows steps again after a stop. Thread mode, when the motors have [settled](settle).
 pub fn release() {
     STOPPED.store(false, Relaxed);
 }
@@ -89,13 +93,14 @@ pub fn running() -> bool {
     RUNNING.load(Relaxed) && !is_stopped()
 }
 
-/// How long the segment that runs takes yet: not known, for what the feeder has made of it waits to be sent. Exec.
+/// Always returns `u32::MAX`, unknown: what the feeder has made of the running segment still waits to be sent. Exec.
 pub fn left() -> u32 {
     u32::MAX
 }
 
-/// Every motor is where its last pulse has put it; nothing is left of the segments, of which `held` would have come first after those that are
-/// queued. What they lack is taken off `position`. Exec, while no steps come.
+/// Drops the rest of all segments after a stop, so that every motor stands where its last pulse has put it. `held` is
+/// the segment that would have come next after the queued ones. Subtracts the steps that were not made from
+/// `position`. Exec, while no steps come.
 pub fn settle(mut held: Option<Segment>, position: &mut [i32; MOTORS]) {
     if running() {
         return;
@@ -110,25 +115,27 @@ pub fn settle(mut held: Option<Segment>, position: &mut [i32; MOTORS]) {
     });
 }
 
-/// Where the generator is, between two ticks, and the slot of its segment. It is ahead of the pins: a contact goes by [`contact`] here.
+/// Returns the state of the generator between two ticks, and the slot of its segment. The generator is ahead of the
+/// pins, so contacts use [`contact`] on this chip.
 pub fn moment() -> (Dda, u8) {
     feeder::alone(|feeder| (feeder.dda().clone(), RING.tail()))
 }
 
-/// There has been a contact, when the pins were at `place`. Handler of inputs.
+/// Notes a contact, at which the pins were at `place`. Handler of inputs.
 pub(super) fn contact(place: Place) {
     mask(|| FEEDER.contact.set(Some(place)));
     DMA_IRQ_0.pend();
 }
 
-/// Which direction pins are inverted: bit m for motor m. Thread mode, while nothing runs.
+/// Sets which direction pins are inverted: bit m for motor m. Thread mode, while nothing runs.
 pub fn set_inverted(motors: u8) {
     for (m, motor) in ACTIVE.motors.iter().enumerate() {
         gpio::invert(motor.dir, motors & 1 << m != 0);
     }
 }
 
-/// How wide a step pulse is, in microseconds, and which step pins rest high (bit m for motor m). Thread mode; a change only while nothing runs.
+/// Sets the width of a step pulse, in microseconds, and which step pins rest high (bit m for motor m). Thread mode;
+/// the values may change only while nothing runs.
 pub fn set_step_output(pulse_us: u8, inverted: u8) {
     PULSE_US.store(pulse_us.into(), Relaxed);
     for (m, motor) in ACTIVE.motors.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Ticks as entries for the state machine: each is a rest, a pulse and the pins for it, two words of 32 bits.
+//! Ticks as entries for the state machine. An entry is a rest, a pulse and the pins for it, in two words of 32 bits.
 //!
 //! ```text
 //! bit 0     0                         bit 0     1
@@ -6,35 +6,37 @@
 //! word 2    all pins in the pulse     word 2    all pins between pulses from now on: directions
 //! ```
 //!
-//! Ticks without a step have no entry: they make the rest before the next one longer. Directions change behind the last pulse of the old ones, and a tick before
-//! the first of the new ones.
+//! Ticks without a step have no entry; they lengthen the rest before the next entry. Directions change after the last
+//! pulse with the old directions, one tick before the first pulse with the new ones.
 //!
-//! Time is counted in cycles of the system clock. An entry lasts [`Writer::least`] at least: what asks for less is as long, and what follows makes up for it.
+//! Time is counted in cycles of the system clock. An entry lasts at least [`Writer::least`]. If it ought to be
+//! shorter, it lasts that long all the same, and the rests of the entries behind it make up for the delay.
 
 use crate::boards::{MOTORS, MotorPins};
 use crate::dda::{Dda, Pins, SEGMENTS, STEP};
 
-/// What the state machine takes at a time.
+/// An entry: what the state machine takes at a time.
 pub type Entry = [u32; 2];
 
-/// Set in entries that change what pins are between pulses.
+/// Bit of the first word: the entry changes the levels of the pins between pulses.
 pub const CHANGES: u32 = 1;
-/// Set in those of them that are told.
+/// Bit of the first word, together with [`CHANGES`]: the state machine raises its interrupt at this entry.
 pub const MARK: u32 = 2;
-/// Where the rest begins.
+/// Position of the rest in the first word.
 const REST: u32 = 1;
 
-/// Cycles of a pulse, of an entry beside its rest and its pulse, and of an entry that changes pins: what the program takes at least.
+/// Least cycles that the program takes for a pulse, for an entry besides its rest and its pulse, and for an entry
+/// that changes pins.
 const PULSE_LEAST: i32 = 3;
 const AROUND: i32 = 7;
 const CHANGE: i32 = 8;
 
-/// Entries that a segment makes beside those of its ticks.
+/// Entries that a segment makes besides those of its ticks.
 pub const OF_A_SEGMENT: usize = 1;
-/// Entries that the end of a chunk, or of motion, takes.
+/// Entries that the end of a chunk, or of a motion, takes.
 pub const OF_THE_END: usize = 2;
 
-/// Cycles of a microsecond, and of a count of [`TIMER_HZ`](crate::hal::TIMER_HZ).
+/// Cycles in a microsecond. [`CYCLES_PER_COUNT`] is the number in a count of [`TIMER_HZ`](crate::hal::TIMER_HZ).
 pub const CYCLES_PER_US: u32 = 128;
 /// See [`CYCLES_PER_US`].
 pub const CYCLES_PER_COUNT: u32 = 2;
@@ -42,21 +44,21 @@ pub const CYCLES_PER_COUNT: u32 = 2;
 /// The shortest pulse, cycles: what the setting calls 0 us.
 const SHORTEST: i32 = CYCLES_PER_US as i32 / 2;
 
-/// Pairs of motors: two phases are added at once.
+/// Pairs of motors: the phases of a pair are added at once.
 const PAIRS: usize = MOTORS.div_ceil(2);
-/// What is carried out of both phases of a pair.
+/// The carry bits of both phases of a pair.
 const CARRIES: u32 = (STEP as u32) << 16 | STEP as u32;
 
-/// Which pins motors have.
+/// The pins of the motors.
 pub struct Wiring {
-    /// Pins of each set of motors that step.
+    /// Step pins of each set of motors.
     steps: [u32; 1 << MOTORS],
     /// The direction pin of each motor.
     dirs: [u32; MOTORS],
 }
 
 impl Wiring {
-    /// Of these motors: bits are numbers of pins.
+    /// Makes the wiring of these motors. Bits are numbers of pins.
     pub const fn new(motors: &[MotorPins]) -> Self {
         let mut wiring = Self { steps: [0; 1 << MOTORS], dirs: [0; MOTORS] };
         let mut m = 0;
@@ -74,43 +76,43 @@ impl Wiring {
         wiring
     }
 
-    /// The direction pins that are high.
+    /// Returns the direction pins of the motors in `backwards`.
     fn turned(&self, backwards: u8) -> u32 {
         let dirs = self.dirs.iter().enumerate();
         dirs.fold(0, |pins, (m, dir)| if backwards >> m & 1 != 0 { pins | dir } else { pins })
     }
 }
 
-/// Where entries are put.
+/// A list of entries, in memory of fixed size.
 pub struct List<'a> {
     room: &'a mut [Entry],
     used: usize,
 }
 
 impl<'a> List<'a> {
-    /// An empty one.
+    /// Makes an empty list.
     pub fn new(room: &'a mut [Entry]) -> Self {
         Self { room, used: 0 }
     }
 
-    /// Entries in it.
+    /// Returns the number of entries in it.
     pub fn len(&self) -> usize {
         self.used
     }
 
-    /// How many more there is room for.
+    /// Returns how many more entries it has room for.
     pub fn left(&self) -> usize {
         self.room.len() - self.used
     }
 
-    /// The places of so many entries, which are used from now on.
+    /// Returns the places of the next `entries` entries, which count as used from now on.
     fn take(&mut self, entries: usize) -> &mut [Entry] {
         let from = self.used;
         self.used = self.room.len().min(from + entries);
         self.room.get_mut(from..self.used).unwrap_or_default()
     }
 
-    /// So many of them were not needed.
+    /// Gives back the last `entries` places, which were not needed.
     fn give_back(&mut self, entries: usize) {
         self.used = self.used.saturating_sub(entries);
     }
@@ -123,16 +125,17 @@ impl<'a> List<'a> {
     }
 }
 
-/// What stands at the pins, and since when.
+/// What the entries have put at the pins, and since when.
 pub struct Writer {
     wiring: &'static Wiring,
     /// The pins between pulses.
     low: u32,
-    /// How long ago the last pulse rose at the tick that is written, less what entries have taken since; below 0 if that was more.
+    /// Cycles from the last pulse to the tick that is being written, less what entries have taken since. Negative if
+    /// they took more.
     age: i32,
-    /// From a tick to the next.
+    /// Cycles from a tick to the next.
     period: i32,
-    /// How long a pulse lasts.
+    /// Cycles of a pulse.
     pulse: i32,
 }
 
@@ -142,44 +145,44 @@ impl Writer {
         Self { wiring, low: 0, age: 0, period: 0, pulse: 2 * CYCLES_PER_US as i32 }
     }
 
-    /// From now on pulses last so many microseconds, with 0 half of one.
+    /// Sets how long pulses last from now on, in microseconds; 0 means half of one.
     pub fn set_pulse(&mut self, us: u8) {
         self.pulse = (i32::from(us) * CYCLES_PER_US as i32).max(SHORTEST);
     }
 
-    /// What the program counts in a pulse.
+    /// Returns the number that the program counts down in a pulse.
     pub fn pulse_count(&self) -> u32 {
         (self.pulse - PULSE_LEAST) as u32
     }
 
-    /// Motion begins: the first tick comes after so many cycles.
+    /// Begins a motion: the first tick comes after `cycles`.
     pub fn begin(&mut self, cycles: u32, to: &mut List) {
         self.age = cycles as i32;
         to.put([CHANGES, self.low]);
     }
 
-    /// Forgets time that has passed.
+    /// Forgets the time that has passed.
     pub fn rest(&mut self) {
         self.age = 0;
     }
 
-    /// Cycles of the shortest entry with a pulse.
+    /// Returns the cycles of the shortest entry with a pulse.
     fn least(&self) -> i32 {
         self.pulse + AROUND
     }
 
-    /// From a tick to the next, cycles.
+    /// Returns the cycles from a tick to the next.
     pub fn period(&self) -> i32 {
         self.period
     }
 
-    /// The pins between pulses, when all entries have been carried out.
+    /// Returns the levels of the pins between pulses, when all entries have been carried out.
     pub fn low(&self) -> u32 {
         self.low
     }
 
-    /// Runs so many ticks, of those that the generator's segment has left. There is room for as many entries.
-    /// Cost: 25 cycles a tick, 15 more with a step; in lockstep 15.
+    /// Runs `ticks` ticks of those that the generator's segment has left. The list must have room for as many
+    /// entries. Cost: 25 cycles a tick, 15 more with a step; in lockstep 15.
     pub fn run(&mut self, dda: &mut Dda, ticks: u16, to: &mut List) {
         if dda.increment.iter().all(|increment| *increment & !STEP == 0) {
             self.run_even(dda, ticks, to);
@@ -189,7 +192,7 @@ impl Writer {
         dda.ticks -= ticks;
     }
 
-    /// Motors step on every tick, or never: phases stay.
+    /// Runs ticks on which each motor always steps, or never: phases do not change.
     fn run_even(&mut self, dda: &Dda, ticks: u16, to: &mut List) {
         let full = dda.increment.iter().enumerate();
         let full = full.fold(0, |set, (m, increment)| set | usize::from(*increment != 0) << m);
@@ -208,7 +211,7 @@ impl Writer {
         self.age = rest + least;
     }
 
-    // A function of its own has registers for what the loop needs.
+    // A function of its own, so that the compiler keeps the loop's variables in registers.
     #[inline(never)]
     fn run_mixed(&mut self, dda: &mut Dda, ticks: u16, to: &mut List) {
         let (mut phases, steps) = (pairs(&dda.phase), pairs(&dda.increment));
@@ -238,7 +241,7 @@ impl Writer {
         }
     }
 
-    /// Puts an entry without a pulse for the time that has passed. What follows begins behind it.
+    /// Puts an entry without a pulse for the time that has passed. The next entry begins behind it.
     pub fn close(&mut self, to: &mut List) {
         if self.age > 0 {
             let rest = self.age - self.least();
@@ -247,7 +250,7 @@ impl Writer {
         }
     }
 
-    /// The end of motion, which is told.
+    /// Ends the motion, with a marked entry.
     pub fn end(&mut self, to: &mut List) {
         self.close(to);
         to.put([CHANGES | MARK, self.low]);
@@ -255,13 +258,14 @@ impl Writer {
     }
 }
 
-/// The first word of an entry whose pulse rises after a rest: the shortest if time is over.
+/// Returns the first word of an entry whose pulse rises after `rest`. If that time is over, the rest is the shortest.
 #[inline(always)]
 fn head(rest: i32) -> u32 {
     (rest.max(0) as u32) << REST
 }
 
-/// A tick: motors that step, as bits; the second one of pair i is bit 16 + i.
+/// Runs one tick. Returns the motors that step, as bits: bit i for the first motor of pair i, bit 16 + i for the
+/// second.
 #[inline(always)]
 fn advance(phases: &mut [u32; PAIRS], steps: &[u32; PAIRS]) -> u32 {
     let mut due = 0;
@@ -274,7 +278,7 @@ fn advance(phases: &mut [u32; PAIRS], steps: &[u32; PAIRS]) -> u32 {
     due
 }
 
-/// The values of motors by pairs: motor i, and in the upper half motor i + [`PAIRS`].
+/// Returns the values of motors as pairs: motor i in the lower half, motor i + [`PAIRS`] in the upper half.
 fn pairs(values: &[u16; MOTORS]) -> [u32; PAIRS] {
     let mut pairs = [0; PAIRS];
     for (m, value) in values.iter().enumerate() {
@@ -283,9 +287,9 @@ fn pairs(values: &[u16; MOTORS]) -> [u32; PAIRS] {
     pairs
 }
 
-/// A segment's way to the entries.
+/// Turns what the generator says of a segment into entries.
 pub struct Out<'a, 'b> {
-    /// What stands at the pins.
+    /// Keeps the state of the pins.
     pub writer: &'a mut Writer,
     /// Where entries go.
     pub to: &'a mut List<'b>,
@@ -319,7 +323,7 @@ pub struct Count {
 }
 
 impl Count {
-    /// One more entry is carried out.
+    /// Adds an entry that is carried out.
     pub fn add(&mut self, wiring: &Wiring, [head, pins]: Entry) {
         if head & CHANGES != 0 {
             return;
@@ -332,7 +336,7 @@ impl Count {
     }
 }
 
-// `Dda::load` takes a segment a tick at most.
+// `Dda::load` takes at most one segment a tick.
 const _: () = assert!(SEGMENTS > 1);
 
 #[cfg(test)]
@@ -345,7 +349,7 @@ mod tests {
     use std::boxed::Box;
     use std::vec::Vec;
 
-    /// Pins in no order.
+    /// The pins are in no particular order.
     static WIRING: Wiring = Wiring::new(&[
         MotorPins { step: gp(11), dir: gp(10), enable: None },
         MotorPins { step: gp(6), dir: gp(5), enable: None },
@@ -356,7 +360,7 @@ mod tests {
     /// Steps: when, of which motors, and which go backwards.
     type Rises = Vec<(i64, u8, u8)>;
 
-    /// What ticks do by themselves.
+    /// The steps that the ticks make without entries.
     #[derive(Default)]
     struct Plan {
         now: i64,
@@ -395,7 +399,7 @@ mod tests {
 
     const FIRST: u32 = 800;
 
-    /// The entries of segments, `chunk` ticks at a time, and what the pulse counts.
+    /// Returns the entries of segments, written `chunk` ticks at a time, and what the program counts in a pulse.
     fn written(segments: &[Segment], chunk: u16, pulse_us: u8) -> (Vec<Entry>, i64) {
         let ring: &'static Ring<Segment, 8> = Box::leak(Box::default());
         let (mut producer, mut consumer) = ring.split().unwrap();
@@ -425,7 +429,7 @@ mod tests {
         (room, writer.pulse_count().into())
     }
 
-    /// When steps rise: what the program does.
+    /// Returns when steps rise, by the timing of the program.
     fn rises(entries: &[Entry], pulse: i64) -> Rises {
         let (mut now, mut low, mut all) = (0, 0, Vec::new());
         for [head, pins] in entries {
@@ -439,7 +443,7 @@ mod tests {
             let motors = (0..MOTORS).filter(high).fold(0, |set, m| set | 1 << m);
             let turned = |m: &usize| pins & WIRING.dirs[*m] != 0;
             let backwards = (0..MOTORS).filter(turned).fold(0, |set, m| set | 1 << m);
-            // Directions have stood before.
+            // Directions were set before the pulse.
             assert_eq!(pins & !WIRING.steps[15], low);
             if motors != 0 {
                 all.push((now, motors, backwards & motors));
@@ -449,14 +453,14 @@ mod tests {
         all
     }
 
-    /// Times from the first one on.
+    /// Returns the steps with times counted from the first one.
     fn from_the_first(rises: &Rises) -> Rises {
         let first = rises.first().map_or(0, |rise| rise.0);
         rises.iter().map(|(at, motors, backwards)| (at - first, *motors, *backwards)).collect()
     }
 
     proptest! {
-        /// Whatever runs, and wherever chunks end: each pulse is at its cycle, in its direction.
+        /// Whatever the segments, and wherever chunks end, each pulse comes at its cycle, in its direction.
         #[test]
         fn entries_do_what_ticks_do(
             segments in prop::collection::vec(
@@ -504,7 +508,7 @@ mod tests {
         assert_eq!(pulse + 3, 64);
     }
 
-    /// What is too close for its pulses comes late, and what follows in time.
+    /// A pulse that is due too soon after another comes late, and the pulses after it come in time again.
     #[test]
     fn late_pulses_are_made_up_for() {
         let close = segment([STEP, 0, 0, 0], 4, 64, 0);
