@@ -1,7 +1,7 @@
-//! The alarm that is on: how it begins and how it ends. What each of them does is in [`machine::alarm`](mod@crate::machine::alarm).
+//! How an alarm begins and how it ends. What each alarm does is in [`machine::alarm`](mod@crate::machine::alarm).
 //!
 //! ```text
-//!  raise   steps stop at once if it is sudden (the interrupt of a limit has stopped them already); outputs off;
+//!  raise   steps stop at once if the alarm is sudden (the interrupt of a limit has stopped them already); outputs off;
 //!          Event::Cut: a hold, and data lines wait
 //!  planner drop_blocks   exec, at rest or stopped, drops its blocks and counts what has been made, to the step
 //!          restart       planner and model start from there; data lines are refused from now on
@@ -22,13 +22,13 @@ use crate::hal::stepper;
 use crate::machine::{self, Alarm};
 use crate::status::Status;
 
-/// Begins an alarm, if there is none as bad.
+/// Begins an alarm, unless there is one that is as bad or worse.
 #[small]
 pub fn raise(links: &Links, alarm: Alarm) {
     raise_for(links, alarm, alarm.status());
 }
 
-/// Begins an alarm, if there is none as bad, and reports it with `reason` as its status.
+/// Begins an alarm, unless there is one that is as bad or worse, and reports it with `reason` as its status.
 #[inline(never)]
 #[small]
 pub fn raise_for(links: &Links, alarm: Alarm, reason: Status) {
@@ -47,14 +47,16 @@ pub fn raise_for(links: &Links, alarm: Alarm, reason: Status) {
     links.except_at_once(reason);
 }
 
-/// The machine has started as nobody wanted it to: whoever sends to it is to look first. Before anything runs.
+/// Starts the machine in an alarm, after a reset that nobody wanted: whoever sends to it is to look first. Called
+/// before anything runs.
 pub fn wake_up_in(links: &Links) {
     machine::start_alarmed();
     // The reporter looks before it waits.
     links.notices.exception.set(Some(Status::HardReset));
 }
 
-/// Ends the alarm. [`Status::Again`] as long as the machine comes to rest.
+/// Ends the alarm. Returns [`Status::Again`] while the machine comes to rest, and the status of an alarm that cannot
+/// end.
 #[inline(never)]
 #[small]
 pub fn clear(links: &Links, settings: &Settings) -> Status {
@@ -68,7 +70,7 @@ pub fn clear(links: &Links, settings: &Settings) -> Status {
         return if alarm == Alarm::Panic { alarm.status() } else { Status::Again };
     }
     links.notices.limits_hit.set(0);
-    // One that was hit meanwhile has stopped what stood still.
+    // A limit that was hit meanwhile has stopped steps while nothing moved.
     stepper::release();
     links.reporter_wake.notify_now();
     Status::Ok

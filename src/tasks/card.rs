@@ -1,10 +1,13 @@
 //! Lines of a file on the SD card, within the turns of the parser task.
 //!
-//! A line is taken when the planner is free and no answer is under way, behind those that hosts have sent; while one is under way G-code of hosts
-//! waits, and all else does not. It is carried out as if the host that has chosen the file had sent it, but for its `ok`; what it tells, that host
-//! is told. A line that cannot be carried out is told so, and the next one is taken. An alarm or a flush ends the print, the file stays chosen.
+//! A line is taken when the planner is free and no answer is under way, behind the lines that hosts have sent. While a
+//! line is under way, G-code of hosts waits, and nothing else does. A line is carried out as if the host that has
+//! chosen the file had sent it, but without its `ok`; what the line tells goes to that host. If a line cannot be
+//! carried out, the host is told, and the next line is taken. An alarm or a flush ends the print; the file stays
+//! chosen.
 //!
-//! Cost: as of a line of the host, and 3,000 cycles for each 40 bytes; each 512 bytes 25,000 more, of thread mode alone.
+//! Cost: that of a line of the host, and 3,000 cycles for each 40 bytes. Each 512 bytes cost 25,000 more, of thread
+//! mode alone.
 
 use heapless::Vec;
 
@@ -17,9 +20,9 @@ use crate::machine;
 use crate::protocol::{Answers, Machine, Next, Request, Value};
 use crate::status::Status;
 
-/// Steps of an answer in a turn.
+/// The most steps of an answer in a turn.
 const STEPS: u8 = 4;
-/// Pieces of a line in a turn.
+/// The most pieces of a line in a turn.
 const PIECES: u8 = 3;
 
 /// What a piece of the file has brought.
@@ -33,14 +36,14 @@ enum Read {
     Nothing,
 }
 
-/// The line that is read, or under way.
+/// The line that is being read or carried out.
 pub struct Feed {
     line: Vec<u8, LINE_MAX>,
     request: Option<Request>,
-    /// What it tells is under way.
+    /// The transmitter, while the line is telling something.
     tx: Option<Sender>,
     waits: bool,
-    /// A line of the fast path has been interpreted: its move waits for the planner.
+    /// A line of the fast path has been interpreted: its move is to be handed to the planner.
     moves: bool,
 }
 
@@ -52,7 +55,7 @@ impl Default for Feed {
 
 #[small]
 impl Feed {
-    /// Nothing is under way.
+    /// Returns a feed on which nothing is under way.
     pub const fn new() -> Self {
         Self { line: Vec::new(), request: None, tx: None, waits: false, moves: false }
     }
@@ -62,24 +65,24 @@ impl Feed {
         self.request.is_some()
     }
 
-    /// Whether it is to have a turn each millisecond.
+    /// Whether the feed is to have a turn each millisecond.
     pub fn waits(&self) -> bool {
         self.waits
     }
 
-    /// Whether a move is to be handed over, once.
+    /// Whether a move is to be handed over. Returns true once for each move.
     pub fn take_move(&mut self) -> bool {
         core::mem::take(&mut self.moves)
     }
 
-    /// A turn. Whether there may be more to do at once.
+    /// Takes a turn. Returns whether there may be more to do at once.
     #[inline(never)]
     pub fn turn(&mut self, links: &'static Links) -> bool {
         self.waits = false;
         if self.request.is_some() {
             return self.go_on(links);
         }
-        // What has been read of a line is kept: M24 goes on in it.
+        // The part of a line that has been read is kept: M24 goes on in the middle of it.
         if !links.card.borrow().prints() {
             return false;
         }
@@ -104,7 +107,7 @@ impl Feed {
         }
     }
 
-    // Apart from what carries a line out, which has the deepest stack.
+    // Not inlined, to keep this apart from carrying out a line, which has the deepest stack.
     #[inline(never)]
     fn read(&mut self, links: &'static Links) -> Read {
         let read = links.card.borrow_mut().line(&mut self.line);
@@ -129,7 +132,7 @@ impl Feed {
                 links.card.borrow_mut().release();
                 links.except(Status::CardError);
             }
-            // What has been asked for is done first.
+            // The file ends when everything that it has asked for is done.
             Line::End if View::of(links, links.told()).value(Value::Working) != 0 => {
                 self.waits = true;
                 return Read::Nothing;

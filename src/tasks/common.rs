@@ -1,7 +1,8 @@
-//! What exec and thread mode both change: how motion stands, the overrides, which motors have power, the outputs.
+//! State that exec and thread mode both change: how motion stands, the overrides, which motors have power, the
+//! outputs.
 //!
-//! Exec has it, by its [end](avr_embassy::InterruptEnd), while it does one step; everybody else has it [`with`] exec locked out. What is
-//! done with the parts is in `overrides`, `power` and `spindle`.
+//! Exec has the state, by its [end](avr_embassy::InterruptEnd), while it does one step. All others use the state with
+//! exec locked out ([`with`]). What is done with its parts is in `overrides`, `power` and `spindle`.
 
 use crate::encoder::Encoder;
 use crate::gcode::overrides::Overrides;
@@ -12,9 +13,9 @@ use crate::motion::snapshot::Snapshot;
 use crate::motors::Motors;
 use crate::spindle::Spindle;
 
-/// Which motors have power, and so on: see the module's text.
+/// The state: see the module's text.
 pub struct State {
-    /// How motion stands. Exec changes it, the others read.
+    /// How motion stands. Exec changes this, all others read it.
     pub motion: Snapshot,
     /// The overrides in force.
     pub overrides: Overrides,
@@ -22,16 +23,16 @@ pub struct State {
     pub motors: Motors,
     /// What settings and override say of the outputs.
     pub spindle: Spindle,
-    /// What is known of the spindle by its encoder.
+    /// What the encoder tells of the spindle.
     pub encoder: Encoder,
-    /// What heaters are to be, in an image that has them.
+    /// What heaters are to be, in an image that has heaters.
     pub heat: [Orders; PRINTERS],
 }
 
 avr_embassy::shared_static! {
-    /// Where it is.
+    /// Where the state is.
     ///
-    /// Nobody looks at it without the lock:
+    /// Nobody looks at the state without the lock:
     ///
     /// ```compile_fail,E0061
     /// use kerf::tasks::common::Common;
@@ -56,13 +57,13 @@ avr_embassy::shared_static! {
     };
 }
 
-/// Has `act` use it while exec cannot run.
+/// Has `act` use the state while exec cannot run.
 #[inline(always)]
 pub fn with<R>(thread: Thread, act: impl FnOnce(&mut State) -> R + Send) -> R {
     exec::lock(thread, |ceiling| Common.with(ceiling, act))
 }
 
-/// How motion stands.
+/// Returns how motion stands.
 pub fn snapshot(thread: Thread) -> Snapshot {
     with(thread, |common| common.motion)
 }

@@ -1,9 +1,11 @@
 //! The control task: real-time characters, which act at once and get no response.
 //!
-//! Reads what the receive interrupt picked off; waits on [`Event::Realtime`]. What they lead to is in
-//! [`hold`]; besides, `^x` resets the machine, and ENQ asks whether anybody is there, which the
-//! reporter answers. A switch that
-//! changes is seen to as well, by [`switches`], and so is a program that opens the first port, where the chip sees that.
+//! Reads what the receive interrupt has taken out of the streams; waits on [`Event::Realtime`]. [`hold`] says what the
+//! characters lead to. Besides, `^x` resets the machine, and ENQ asks whether anybody is there, which the parser
+//! answers.
+//!
+//! The task also sees to switches that change ([`switches`]), and to a program that opens the first port, if the chip
+//! sees that.
 
 use super::hold;
 use super::links::Links;

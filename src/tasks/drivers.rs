@@ -1,17 +1,17 @@
-//! Settings of drivers that are told by UART. An image without them has nothing here. Thread mode.
+//! Settings of drivers that are told by UART. An image without such drivers has nothing here. Thread mode.
 
 use super::storage::Storage;
 use crate::config::{Setting, Settings};
 #[cfg(feature = "drivers")]
 use crate::{config::drive::DRIVERS, drivers::registers, hal::drivers};
 
-/// Takes over a setting, if it is one of theirs. Whether it is.
+/// Takes over a setting, if it belongs to a driver. Returns whether it does.
 #[cfg(feature = "drivers")]
 pub fn set(settings: &mut Settings, setting: Setting, value: i32) -> bool {
     settings.set_drive(setting, value)
 }
 
-/// Takes over all of them, as they have been put away.
+/// Takes over all settings of drivers, as they have been saved.
 #[cfg(feature = "drivers")]
 pub fn recall(settings: &mut Settings, storage: &Storage) {
     for setting in (Setting::WARM..Setting::COLD).filter_map(Setting::from_number) {
@@ -27,19 +27,19 @@ pub fn tell(settings: &Settings) {
     }
 }
 
-/// There is no such setting.
+/// Without drivers, no setting belongs to one.
 #[cfg(not(feature = "drivers"))]
 #[inline(always)]
 pub fn set(_settings: &mut Settings, _setting: Setting, _value: i32) -> bool {
     false
 }
 
-/// There are none.
+/// Without drivers, there is nothing to take over.
 #[cfg(not(feature = "drivers"))]
 #[inline(always)]
 pub fn recall(_settings: &mut Settings, _storage: &Storage) {}
 
-/// Nobody is told.
+/// Without drivers, nobody is told.
 #[cfg(not(feature = "drivers"))]
 #[inline(always)]
 pub fn tell(_settings: &Settings) {}

@@ -1,10 +1,11 @@
 //! The exec task: keeps the segment ring full. The only task of the exec executor.
 //!
-//! Reads the block ring, writes the segment ring, waits for a free segment slot, a new block, or the
-//! steppers to stop (each pends the exec interrupt). One run prepares what is needed for the next few
-//! milliseconds ([`Amount::least`]), 4,000 to 12,000 cycles each, 24,000 at worst; the rest one by one, when one is used up or thread mode
-//! has nothing else to do: a line that has come is answered meanwhile. When too little waits ([`WAITING_SHORT`]), stretches become twice
-//! as long, and for a while more waits ([`PRESSED`]).
+//! Reads the block ring, writes the segment ring, waits for a free segment slot, a new block, or the steppers to stop
+//! (each pends the exec interrupt). A segment costs 4,000 to 12,000 cycles, 24,000 at worst. One run prepares the
+//! segments for the next few milliseconds ([`Amount::least`]). Further segments are prepared one by one, each when a
+//! segment is used up or when thread mode has nothing else to do; meanwhile thread mode can answer a line. When too
+//! little motion waits ([`WAITING_SHORT`]), stretches become twice as long, and for a while more motion is queued
+//! ([`PRESSED`]).
 
 use avr_embassy::InterruptEnd;
 
@@ -32,14 +33,16 @@ use crate::status::Status;
 use crate::tasks::common::{Common, State};
 use crate::tasks::{Never, hold, links, overrides, power, spindle};
 
-/// After so many segments without a turn of thread mode they become longer, which takes less of the CPU.
+/// After more than this many segments without a turn of thread mode, segments become longer, which takes less CPU
+/// time.
 const PATIENCE: u8 = 6;
 
-/// After so many, while somebody asks, a jerk-limited motion makes no scans that may wait.
+/// After more than this many segments without a turn of thread mode, while somebody waits for an answer, a
+/// jerk-limited motion makes no scans that may wait.
 const PATIENCE_ASKED: u8 = 1;
 
-/// While motion has just begun thread mode gets a turn after so many segments: what waits is built up from
-/// nothing, which would take 6 ms at a stretch.
+/// While motion has just begun, thread mode gets a turn after this many segments. To fill the ring from empty to the
+/// usual amount without a turn would take 6 ms.
 const FIRST_TURN: u8 = 2;
 
 /// The task.
@@ -51,7 +54,7 @@ pub fn run(
     segments: Producer<Segment, SEGMENTS>,
 ) -> impl Future<Output = Never> {
     async move {
-        // By itself: it would be made on the stack, and copied.
+        // A variable of its own: it would otherwise be built on the stack and copied.
         let mut machine = Exec::new();
         let mut task = Task::new(common, blocks, segments, &mut machine);
         loop {
@@ -66,19 +69,19 @@ pub fn run(
     }
 }
 
-/// From the start of the steppers to their first tick, CPU cycles.
+/// CPU cycles from the start of the steppers to their first tick.
 const FIRST_TICK: u32 = 400;
 
-/// What the task goes on with.
+/// What the task waits for before it goes on.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Next {
-    /// The next turn, as soon as there is room.
+    /// Exec takes the next turn at once, if there is room.
     Turn,
-    /// The next turn, if there is room: when thread mode is idle, or a segment has been used up.
+    /// Exec takes the next turn when thread mode is idle or a segment has been used up, if there is room then.
     Idle,
-    /// The next turn, when a segment has been used up.
+    /// Exec takes the next turn when a segment has been used up.
     Room,
-    /// Whatever it is pended for: a block, the steppers at a standstill, the end of a hold.
+    /// Exec waits until something pends it: a block, the steppers at a standstill, the end of a hold.
     Block,
 }
 
@@ -88,21 +91,21 @@ struct Runner<'a> {
     finished: Finished,
     /// The machine stands still at the end of what has been queued.
     rests: bool,
-    /// The reporter is to be told whether thread mode has been idle since the last segment.
+    /// At the next turn, `waiting` is to be told whether thread mode has been idle since the last segment.
     asked: bool,
     segments: Prefilled<Segment, SEGMENTS>,
     blocks: BlockSource,
     machine: &'a mut Exec,
 }
 
-/// The runner, with exec's end of what tasks share.
+/// The runner, and exec's end of the state that it shares with thread mode.
 struct Task<'a> {
     runner: Runner<'a>,
     common: InterruptEnd<Common>,
 }
 
 impl<'a> Task<'a> {
-    /// Out of line: it would be made on the stack, and copied.
+    /// Not inlined: otherwise the task would be built on the stack and copied.
     #[inline(never)]
     #[small]
     fn new(
@@ -118,9 +121,10 @@ impl<'a> Task<'a> {
         Self { runner, common }
     }
 
-    /// Does what there is room for. What the task goes on with, or `None` if it waits for room.
+    /// Takes turns as long as there is room. Returns what the task waits for next, or `None` if it waits for room.
     ///
-    /// Out of line: the CPU reaches fields of the runner from a pointer to it, not from one to the future.
+    /// Not inlined: the CPU then reaches the fields of the runner from a pointer to the runner, not from one to the
+    /// future.
     #[inline(never)]
     fn go_on(&mut self) -> Option<Next> {
         let Self { runner, common } = self;
@@ -135,7 +139,8 @@ impl<'a> Task<'a> {
 }
 
 impl Runner<'_> {
-    /// What there is room for, if there is room for a segment, or a stop to be seen to.
+    /// Returns what there is room for. `None` if there is no room for a segment and the steppers have not been
+    /// stopped.
     #[inline(always)]
     fn is_due(&mut self) -> Option<Room> {
         health::answer(Sign::Exec);
@@ -149,7 +154,7 @@ impl Runner<'_> {
         due.then_some(room)
     }
 
-    /// Does the next thing there is to do.
+    /// Takes one turn, which is one step of the machine. Returns what the task waits for next.
     #[inline(always)]
     fn turn(&mut self, room: Room, common: &mut InterruptEnd<Common>) -> Next {
         uart::stop_late();
@@ -178,7 +183,7 @@ impl Runner<'_> {
         }
     }
 
-    /// The next step of the machine, and what follows from it; a segment is put into the ring.
+    /// Carries out the next step of the machine and acts on its result. A segment goes into the ring.
     #[inline(always)]
     fn step(&mut self, standstill: bool, common: &mut State) -> Step {
         let State { motion: out, overrides, motors, spindle, encoder, heat } = common;
@@ -197,13 +202,13 @@ impl Runner<'_> {
             Capability::Lathe.is_built_in() && (has_left.is_some() || encoder.pass == Status::Noop);
         let holds = hold::is_wanted(out.running) || contact::is_noted() || left;
         self.machine.set_hold(holds, out);
-        // What has paused in a hold goes on before motion does.
+        // An output that has paused in a hold is switched on again before motion goes on.
         if out.outputs != spindle::on() {
             if !machine::is_held() {
                 spindle.go_on();
             }
             let ms = spindle::switch(spindle, out, false);
-            // In the midst of G33.1 the axes go by the encoder.
+            // In the middle of G33.1 the axes follow the encoder and do not wait.
             if self.machine.thread().is_none() {
                 self.machine.wait(ms, out);
             }
@@ -238,7 +243,7 @@ impl Runner<'_> {
             Step::Switched => self.machine.wait(spindle::switch(spindle, out, true), out),
             Step::Again | Step::Leaves | Step::Idle | Step::Standstill | Step::Heat => {}
         }
-        // A standstill stays one until a segment leads out of it; velocity is ahead of the segments.
+        // A standstill lasts until a segment leads out of it: `out.velocity` runs ahead of the segments.
         self.rests = out.velocity.to_bits() == 0 || (self.rests && step != Step::Segment);
         step
     }
@@ -268,13 +273,14 @@ impl Runner<'_> {
         step
     }
 
-    /// The machine stands still in a hold. Drops what is queued if that is wanted.
+    /// Handles the standstill in a hold: switches the outputs, and drops what is queued if the planner wants that.
     #[inline(never)]
     #[small]
     fn held(&mut self, out: &mut Snapshot, spindle: &mut Spindle) {
         spindle::switch(spindle, out, false);
         machine::drop_if_wanted(|| {
-            // What has paused stays off. A kill switches off the rest: the end of the program may wait for a door.
+            // An output that has paused stays off. A kill switches off all outputs here, because the end of the
+            // program, which would do it as well, may have to wait for a door.
             out.outputs = if machine::is_killing() { 0 } else { spindle::on() };
             spindle.go_on();
             spindle::switch(spindle, out, false);
@@ -290,13 +296,13 @@ impl Runner<'_> {
         });
     }
 
-    /// X leaves the cut in the segments that wait.
+    /// Has X leave the cut in the segments that already wait in the ring.
     #[inline(never)]
     #[small]
     fn lead(&mut self, out: &mut Snapshot, motors: &mut Motors) {
         let Self { segments, machine, .. } = self;
         let (leaving, is_backwards) = machine.leaving();
-        // A single motor: more would take too long, and begin in segments of their own.
+        // Only for a single motor. Several would take too long; they begin in segments of their own.
         let motor = match leaving {
             1 => 0,
             2 => 1,
@@ -314,7 +320,7 @@ impl Runner<'_> {
             let backwards = core::hint::black_box(waits.backwards & !leaving | turned);
             let mode = Segment::mode_of(moving);
             machine.lead((waits.ticks, waits.period), out, |increment| {
-                // In two pieces: a step waits for 31 cycles at most. The first moves nothing.
+                // Two pieces, so that a step waits for 31 cycles at most. The first piece moves nothing.
                 segments.producer().amend_masked(back, |segment| {
                     (segment.backwards, segment.mode) = (backwards, mode);
                 }) && segments.producer().amend_masked(back, |segment| {
@@ -326,7 +332,8 @@ impl Runner<'_> {
         }
     }
 
-    /// A segment is in the ring: the steppers go, or go on.
+    /// Acts on a new segment in the ring: starts the steppers if they stand still, and decides whether thread mode
+    /// gets a turn. `rested` says whether the machine stood still before that segment.
     #[inline(always)]
     fn queued(&mut self, rested: bool) -> Next {
         let Self { waiting, segments, rests, .. } = self;
@@ -336,8 +343,8 @@ impl Runner<'_> {
         waiting.fewest = if has_jerk { 2 } else { 1 };
         let short = waiting.is_short(*rests);
         let passed_over = event::pass_over();
-        // While somebody asks, a ramp in usual stretches would keep the answer away for 9 ms, and scans of one segment after the
-        // other for 14.
+        // While somebody waits for an answer, a ramp in stretches of the usual length would delay the answer by 9 ms,
+        // and scans in one segment after the other by 14 ms.
         let asked = event::is_asked();
         waiting.coarse = short || asked || passed_over > PATIENCE || waiting.is_busy();
         let scans_too_long = asked && has_jerk && passed_over > PATIENCE_ASKED;
@@ -355,7 +362,8 @@ impl Runner<'_> {
     }
 }
 
-/// A pass follows what the encoder tells. Out of line: it needs the stack for itself.
+/// Takes a sample of the encoder, which a pass in step with the spindle follows. Not inlined, so that it takes up the
+/// stack only while it runs.
 #[inline(never)]
 #[small]
 fn look_at_spindle(exec: &mut Exec, encoder: &mut Encoder) {
@@ -380,13 +388,13 @@ fn look_at_spindle(exec: &mut Exec, encoder: &mut Encoder) {
     let Some(thread) = exec.thread() else { return };
     if let Some(fault) = thread.fault() {
         encoder.pass = fault;
-        // The planner waits for it.
+        // Wakes the planner, which waits for the end of the pass.
         flags::set(Event::BlockDone);
     }
     exec.break_off(machine::is_alarmed() || machine::is_killing());
 }
 
-/// The pass has been left, for this reason.
+/// Notes why a pass has been left, and wakes the planner. Does nothing if the pass has come to another end already.
 #[inline(never)]
 #[small]
 fn note_left(encoder: &mut Encoder, why: Status) {
@@ -396,7 +404,8 @@ fn note_left(encoder: &mut Encoder, why: Status) {
     }
 }
 
-/// Feeds a turn go by the measured speed, if there is an encoder: S is what they were planned for.
+/// Scales feeds per turn to the measured speed of the spindle, if there is an encoder. The S word is the speed that
+/// they were planned for.
 #[inline(never)]
 #[small]
 fn follow_speed(exec: &mut Exec, encoder: &mut Encoder, out: &Snapshot) {
@@ -410,7 +419,7 @@ fn follow_speed(exec: &mut Exec, encoder: &mut Encoder, out: &Snapshot) {
     }
 }
 
-/// The steppers have just been started in a pass.
+/// Tells a pass that the steppers have just been started: their first tick comes [`FIRST_TICK`] cycles later.
 #[inline(never)]
 #[small]
 fn start_thread(thread: &mut Thread, encoder: &Encoder) {
@@ -419,83 +428,86 @@ fn start_thread(thread: &mut Thread, encoder: &Encoder) {
 
 /// How long the segments last that wait in the ring, in units of 2^11 CPU cycles.
 struct Waiting {
-    /// The lengths of the last segments, the newest at `count - 1`, modulo their number.
+    /// The lengths of the last segments. The newest is at `count - 1`, modulo `SEGMENTS`.
     lengths: [u8; SEGMENTS],
     /// Segments queued, modulo 256.
     count: u8,
-    /// How many wait at least.
+    /// How many segments are to wait at least.
     fewest: u8,
     /// Stretches are twice as long, if there is room for them.
     coarse: bool,
-    /// How many wait, as far as that is known, and how long they take together.
+    /// How many segments wait, as of the last `update`; in `sum`, how long they take together.
     used: u8,
     sum: u16,
-    /// Segments until the usual amount waits again.
+    /// For how many more segments [`PRESSED`] is in force.
     pressed: u8,
     /// Segments since the machine stood still.
     moved: u8,
-    /// How many segments in a row were used up before thread mode was idle.
+    /// How many segments in a row were used up before thread mode became idle.
     busy: u8,
 }
 
 /// What there is room for.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Room {
-    /// There is none for another segment.
+    /// There is no room for another segment.
     None,
-    /// There is room for one of the usual length.
+    /// There is room for a segment of the usual length.
     Usual,
-    /// There is room for one that is twice as long.
+    /// There is room for a segment that is twice as long.
     Long,
 }
 
-/// After this many of them in a row thread mode has no time left.
+/// Thread mode counts as busy when this many segments in a row were used up before it became idle.
 const BUSY: u8 = 3;
 
 /// The unit of lengths as a power of two: shifts are cheaper than divisions.
 const UNIT_LOG2: u8 = 11;
 
-/// Units in so many tenths of a millisecond.
+/// Converts tenths of a millisecond into units.
 const fn units(tenths: u32) -> u16 {
     ((TIMER_HZ / 10_000 * tenths) >> UNIT_LOG2) as u16
 }
 
-/// How much is handed out, in the unit.
+/// How much motion is queued, in units of 2^11 CPU cycles.
 struct Amount {
-    /// What may wait, with the segment that runs.
+    /// The most that may be queued, the segment that runs included.
     most: u16,
     /// What is prepared before thread mode gets a turn.
     least: u16,
 }
 
-/// A feedhold begins within 10 ms. Less would not outlast a ramp that is laid out while ticks take two thirds of the CPU, which takes up to
-/// 4.1 ms, or an override.
+/// The usual amount. It is small enough for a feedhold to begin within 10 ms. It is large enough to outlast an
+/// override, and the layout of a ramp, which takes up to 4.1 ms while ticks take two thirds of the CPU.
 const USUAL: Amount = Amount { most: units(88), least: units(42) };
 
-/// For a while after too little has been waiting: more is prepared at a stretch. A feedhold begins within 10 ms still.
+/// In force for a while after too little has been waiting: more is prepared in one run. A feedhold still begins within
+/// 10 ms.
 const PRESSED: Amount = Amount { most: units(94), least: units(65) };
 
 /// How long [`PRESSED`] is in force, in segments.
 const PRESSED_FOR: u8 = 100;
 
-/// With less than this exec is late, and makes longer stretches.
+/// With less than this waiting, exec is late, and makes longer stretches.
 const WAITING_SHORT: u16 = units(25);
 
-/// With less than this an acceleration that is about to end under a jerk limit ends, the rest of the segment that runs counted in.
+/// With less than this queued, an acceleration under a jerk limit that is about to end does end, without a further
+/// look ahead. The rest of the segment that runs is included.
 const TIGHT: u16 = units(58);
 
-/// With less than this another segment may wait in any case.
+/// With less than this waiting, another segment may be queued in any case, unless the ring is full.
 const SOON: u16 = units(20);
 
-/// A segment that takes so long may wait alone, except under a jerk limit, where a ramp takes long to lay out.
+/// A segment that takes at least this long may wait alone, except under a jerk limit, where a ramp takes long to lay
+/// out.
 const LONG: u16 = units(30);
 
-/// What a stretch takes, if it is no end of a block.
+/// The length of a usual stretch that is not cut short by the end of a block.
 const USUAL_LENGTH: u16 = units(20);
-/// What a stretch takes at most while thread mode is busy.
+/// The greatest length of a stretch while thread mode is busy.
 const COARSE: u16 = units(40);
 
-/// What waits at least when thread mode gets a turn while motion has just begun: exec takes that long for a
+/// While motion has just begun, at least this much waits before thread mode gets a turn. Exec takes this long for a
 /// segment at worst.
 const FIRST_LEAST: u16 = units(15);
 
@@ -514,14 +526,14 @@ impl Waiting {
         }
     }
 
-    /// The length of the segment that was queued so many before the next one.
+    /// Returns the length of the segment that was queued `back` segments before the next one; 1 is the newest.
     #[inline(always)]
     fn length(&self, back: u8) -> u16 {
         let at = usize::from(self.count.wrapping_sub(back)) % SEGMENTS;
         self.lengths.get(at).copied().unwrap_or_default().into()
     }
 
-    /// A segment of so many CPU cycles has been queued.
+    /// Counts a new segment, which takes this many CPU cycles.
     #[inline(always)]
     fn push(&mut self, cycles: u32) {
         let units = (cycles >> 8) as u16 >> (UNIT_LOG2 - 8);
@@ -535,7 +547,7 @@ impl Waiting {
         self.sum += u16::from(length);
     }
 
-    /// No more than `used` segments wait.
+    /// Takes out the segments that have been used up. No more than `used` segments wait now.
     #[inline(always)]
     fn update(&mut self, used: usize) {
         while self.used > used as u8 {
@@ -544,17 +556,17 @@ impl Waiting {
         }
     }
 
-    /// Exec goes on: thread mode was `idle` meanwhile, or a segment was used up before.
+    /// Counts the segments that were used up in a row before thread mode became `idle`.
     fn go_on(&mut self, idle: bool) {
         self.busy = if idle { 0 } else { self.busy.saturating_add(1) };
     }
 
-    /// Whether thread mode has no time left: then stretches are longer, which leaves it more.
+    /// Whether thread mode has no time left. Stretches are longer then, which leaves more time to thread mode.
     fn is_busy(&self) -> bool {
         self.busy >= BUSY
     }
 
-    /// Whether enough waits, and thread mode is asked for something: it gets the CPU then until less does.
+    /// Whether thread mode gets the CPU because somebody asks it for something and enough motion waits.
     #[inline(always)]
     fn gives_way(&self) -> bool {
         event::is_asked() && self.sum >= USUAL.least
@@ -564,11 +576,12 @@ impl Waiting {
         if self.pressed > 0 { &PRESSED } else { &USUAL }
     }
 
-    /// Whether exec is late. Motion that has just begun, or `rests`, has not much waiting yet.
+    /// Whether exec is late. Never true for motion that has just begun, or for a machine that `rests`: not much can
+    /// wait yet.
     #[inline(always)]
     fn is_short(&mut self, rests: bool) -> bool {
         self.moved = if rests { 0 } else { self.moved.saturating_add(1) };
-        // The end of a block behind a long segment waits alone for a moment.
+        // After a long segment, the end of a block may wait alone for a moment.
         let is_end = self.fewest == 1 && self.length(1) < USUAL_LENGTH && self.length(2) >= LONG;
         let short = usize::from(self.moved) > SEGMENTS && self.sum < WAITING_SHORT && !is_end;
         if short {
@@ -577,7 +590,8 @@ impl Waiting {
         short
     }
 
-    /// Whether so little waits, with what the segment that runs takes yet, that it would not outlast the end of an acceleration and a ramp behind it.
+    /// Whether too little is queued to outlast the end of an acceleration and a ramp behind it. The rest of the
+    /// segment that runs is included.
     #[inline(always)]
     fn is_tight(&self) -> bool {
         let all = self.length(self.used + 1);
@@ -586,7 +600,7 @@ impl Waiting {
         running + self.sum < TIGHT
     }
 
-    /// Whether thread mode gets a turn before more is prepared, after so many segments without one.
+    /// Whether enough is queued for thread mode to get a turn. `passed_over` is how many segments it has had none for.
     #[inline(always)]
     fn is_enough(&self, passed_over: u8) -> bool {
         let has_just_begun = usize::from(self.moved) <= SEGMENTS && passed_over >= FIRST_TURN;
@@ -594,7 +608,8 @@ impl Waiting {
         self.used >= self.fewest && (self.sum >= least || self.gives_way())
     }
 
-    /// Whether another one may wait: what is queued cannot be slowed down any more, nor kept from beginning.
+    /// Returns what there is room for. The queued amount is limited because queued segments can be neither slowed down
+    /// nor kept from beginning.
     #[inline(never)]
     fn room(&self) -> Room {
         if self.used >= SEGMENTS as u8 - 1 {
@@ -608,7 +623,8 @@ impl Waiting {
         if self.coarse && self.fewest == 1 {
             return match fits(COARSE) {
                 true => Room::Long,
-                // It costs as much, and thread mode has the rest: only if little waits.
+                // A usual segment costs as much CPU time as a long one, which thread mode then lacks. So it is made
+                // only if little waits.
                 false if self.sum < LONG && fits(USUAL_LENGTH) => Room::Usual,
                 false => Room::None,
             };

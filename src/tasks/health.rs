@@ -1,14 +1,17 @@
-//! Whether the firmware is well: if so the watchdog is fed, else the chip resets in half a second, with the outputs
-//! off and the motors without power.
+//! Whether the firmware is well. If it is, the watchdog is fed; otherwise the chip resets within half a second, with
+//! the outputs off and the motors without power.
 //!
-//! The power task asks, every 20 ms: that it has its turn says that ticks come, that timers are served and that no
-//! task of thread mode keeps the others waiting. Exec answers each time ([`answer`]), and while ticks of the step timer
-//! come it has to have queued a segment since, for which the step interrupt must have taken one.
+//! The power task asks every 20 ms. That it has its turn shows that ticks come, that timers are served, and that no
+//! task of thread mode keeps the others waiting. Exec answers each time ([`answer`]). While ticks of the step timer
+//! come, exec must also have queued a segment since, for which the step interrupt must have taken one.
 //!
-//! While motors move on fine ticks, thread mode may have a few percent of the CPU, and one report may take all of half a
-//! second. So exec feeds the watchdog as well, each [`OFTEN`] segments, as long as it has [`PATIENCE`]: 3 s of the
-//! shortest segments, 8 s of usual ones. Exec counts as well how often the steppers have waited for it in mid-motion
-//! ([`starvations`]), which is a fault, but none that a reset mends: `{stv:n}` tells it, and the reporter the first. Cost: 300 cycles a look, and one poll of exec.
+//! While motors move on fine ticks, thread mode may have a few percent of the CPU, and one report may take all of half
+//! a second. So exec feeds the watchdog as well, every [`OFTEN`] segments, [`PATIENCE`] times without thread mode:
+//! that is 3 s of the shortest segments, 8 s of usual ones.
+//!
+//! Exec also counts how often the steppers have waited for it in mid-motion ([`starvations`]). That is a fault, but no
+//! fault that a reset mends: `{stv:n}` tells the count, and the reporter tells the first one. Cost: 300 cycles a look,
+//! and one poll of exec.
 
 use kerf_macros::small;
 
@@ -27,9 +30,9 @@ pub enum Sign {
 
 const ALL: u8 = Sign::Exec as u8 | Sign::Segment as u8;
 
-/// After so many segments exec says so.
+/// Exec feeds the watchdog after every this many segments.
 const OFTEN: u8 = 16;
-/// How many times it does before thread mode has to.
+/// How many times exec feeds the watchdog before thread mode has to do so.
 const PATIENCE: u8 = 250;
 
 machine_static! {
@@ -42,13 +45,13 @@ machine_static! {
     fn patience() -> SharedByte = SharedByte::new(0);
 }
 
-/// Exec gives a sign of life. Exec only.
+/// Notes a sign of life of exec. Exec only.
 #[inline(always)]
 pub fn answer(sign: Sign) {
     signs().set(signs().get() | sign as u8);
 }
 
-/// Exec has queued a segment, the `count`th. Exec only.
+/// Notes that exec has queued a segment, the `count`th. Exec only.
 #[inline(always)]
 pub fn moves(count: u8) {
     answer(Sign::Segment);
@@ -66,7 +69,8 @@ machine_static! {
     fn late() -> SharedByte = SharedByte::new(0);
 }
 
-/// A segment follows one that ended at speed: if the steppers stand still, they have waited for it. Exec only.
+/// Counts a starvation: a segment follows one that ended at speed, but the steppers stand still, so they have waited
+/// for it. Exec only.
 #[inline(never)]
 #[small]
 pub fn look_for_starvation() {
@@ -75,12 +79,13 @@ pub fn look_for_starvation() {
     }
 }
 
-/// How many times the steppers have waited for a segment in mid-motion since the reset, 255 for more. Any level.
+/// Returns how many times the steppers have waited for a segment in mid-motion since the reset, 255 for more. Any
+/// level.
 pub fn starvations() -> u8 {
     late().get()
 }
 
-/// Feeds the watchdog if all is well, and asks for other signs. Thread mode.
+/// Feeds the watchdog if all is well, and asks exec for new signs of life. Thread mode.
 pub fn look() {
     let rests = if stepper::running() && !stepper::is_stopped() { 0 } else { Sign::Segment as u8 };
     if signs().get() | rests == ALL {

@@ -1,18 +1,22 @@
 //! Heaters and the fan, looked at within the turns of the power task.
 //!
-//! Owns the converter, the pins of heaters and fan, and [`Heaters`]. Reads what exec has been told by lines ([`Orders`] in `tasks::common`).
-//! Each turn, 20 ms, takes the reading of one heater and begins that of the other; so each has one in 40 ms, and a step of its control in
-//! 200. Heaters are driven at these turns alone: their power is that of pulses which the chip makes ([`PULSED`]), or it is spread over the turns. The power task feeds the watchdog in the same turn: if it
-//! gets none, the chip resets in half a second with its heaters off.
+//! Owns the converter, the pins of heaters and fan, and [`Heaters`]. Reads what lines have told exec ([`Orders`] in
+//! `tasks::common`). A turn comes every 20 ms. It takes the reading of one heater and begins that of the other, so
+//! that each heater has a reading every 40 ms, and a step of its control every 200 ms. Heaters are driven at these
+//! turns alone. Their power is that of pulses which the chip makes ([`PULSED`]), or it is spread over the turns. The
+//! power task feeds the watchdog in the same turn: if the watchdog gets nothing, the chip resets within half a second,
+//! with its heaters off.
 //!
-//! An autotune ([`tune`](crate::heat::tune)) is a wait: the lines behind it wait for its end, which M108, a flush or an alarm make.
-//! Filament that is being moved although the hot end has got colder than it must be, by more than 10 degrees, is an alarm.
+//! An autotune ([`tune`](crate::heat::tune)) is a wait: the lines behind it wait for its end. M108, a flush or an
+//! alarm end it, too. It is an alarm if filament is being moved although the hot end is more than 10 degrees colder
+//! than it must be.
 //!
-//! A fault ([`heater`](crate::heat::heater), [`fault`](crate::heat::fault)) switches all of them off in its turn, [locks](lock) them, and
-//! raises an alarm. Any alarm switches them off. While a wait is on ([`Heaters::begin_wait`]) the planner is woken when it is over.
+//! A fault ([`heater`](crate::heat::heater), [`fault`](crate::heat::fault)) switches all heaters off in its turn,
+//! [locks](lock) them, and raises an alarm. Any alarm switches them off. While a wait is on ([`Heaters::begin_wait`]),
+//! the planner is woken when the wait is over.
 //!
-//! Thread mode. Cost of a turn: 3,500 cycles, of every fifth 7,000. A turn that comes late switches late: thread mode has half a second under
-//! the hardest of motion.
+//! Thread mode. Cost of a turn: 3,500 cycles; 7,000 in every fifth turn. A turn that comes late switches late: thread
+//! mode has half a second under the hardest of motion.
 
 use core::cell::{Cell, RefCell};
 
@@ -42,13 +46,14 @@ use crate::machine::{self, Alarm};
 use crate::protocol::Cold;
 use crate::status::Status;
 
-/// So near a temperature counts as reached, 1/64 degree.
+/// A temperature this near to the target counts as reached, 1/64 degree.
 const NEAR: i16 = UNIT + UNIT / 2;
-/// For so many steps it has to be: 3 s.
+/// For how many steps the temperature has to be reached: 3 s.
 const STAYS: u8 = 15;
-/// So much colder than filament may be planned it may be moved, 1/64 degree: what is queued already is not stopped by a temperature that swings.
+/// By how much colder, than for planning a move, the hot end may be while filament moves, 1/64 degree. So a
+/// temperature that swings does not stop what is already queued.
 const GRACE: i16 = 10 * UNIT;
-/// How long a fan that is switched on has all of its power: 200 ms.
+/// How many turns a fan that is switched on has all of its power: 200 ms.
 const KICK: u8 = 10;
 
 /// What tasks share of heaters. Thread mode.
@@ -56,27 +61,27 @@ pub struct Heaters {
     parts: [Parts; PRINTERS],
 }
 
-/// Of a machine that has them.
+/// The heaters of a machine that has some.
 struct Parts {
     heaters: RefCell<[Heater; HEATERS]>,
     /// What the planner waits for.
     awaited: Cell<Heat>,
-    /// Steps for which it has been so.
+    /// For how many steps what is awaited has been reached.
     stays: Cell<u8>,
     /// The heater whose reading has been begun.
     next: Cell<u8>,
-    /// Turns for which the fan still has all its power, and what is owed to it.
+    /// For how many turns the fan still has all of its power; in `owed`, what power it is owed.
     kick: Cell<u8>,
     owed: Cell<u8>,
-    /// Cycles that an autotune is to have, and whether the heater is to have its factors.
+    /// How many cycles an autotune is to have, and whether the heater is to take over its factors.
     asked: Cell<(u8, bool)>,
     /// The autotune that is under way, or was last.
     tune: RefCell<Tune>,
-    /// The number of the heater that is tuned, and 1; 0 when all that belongs to that is done.
+    /// The number of the heater that is tuned, plus 1; 0 when everything that belongs to the autotune is done.
     tuned: Cell<u8>,
-    /// Factors of it that the settings have.
+    /// How many of the factors that it has found are in the settings.
     kept: Cell<u8>,
-    /// What has been told of it.
+    /// How far the autotune was when it was told last.
     told: Cell<(u8, Stage)>,
 }
 
@@ -98,7 +103,7 @@ impl Parts {
         }
     }
 
-    /// The power of the fan's pin until the next turn.
+    /// Returns the power of the fan's pin until the next turn.
     fn turn_fan(&self, speed: u8) -> u8 {
         if speed == 0 {
             self.kick.set(KICK);
@@ -112,7 +117,7 @@ impl Parts {
         if left > 0 { FULL } else { power }
     }
 
-    /// Whether what is waited for has come.
+    /// Whether the temperatures that are waited for have been reached.
     fn has_come(&self, orders: &Orders) -> bool {
         let awaited = self.awaited.get();
         let heaters = self.heaters.borrow();
@@ -124,7 +129,7 @@ impl Parts {
         })
     }
 
-    /// After a step: the planner goes on if what it waits for has come, and stays.
+    /// After a step, lets the planner go on if what it waits for has been reached for long enough.
     fn see_to_wait(&self, orders: &Orders) {
         if matches!(self.awaited.get().wait, Wait::Nothing | Wait::Tuned) {
             return;
@@ -136,7 +141,7 @@ impl Parts {
         }
     }
 
-    /// A wait for what is off is over, whatever its sensor says.
+    /// Ends a wait for a heater that is off, whatever its sensor says.
     fn end_idle_wait(&self, orders: &Orders) {
         let awaited = self.awaited.get();
         let [hot_end, bed] = orders.to;
@@ -150,7 +155,7 @@ impl Parts {
         }
     }
 
-    /// What the planner waits for is an autotune, whose heater has been switched on.
+    /// Begins an autotune, which the planner waits for. Its heater has been switched on.
     fn begin_tune(&self, heat: &Heat) {
         let (cycles, _) = self.asked.get();
         *self.tune.borrow_mut() =
@@ -168,12 +173,12 @@ impl Parts {
 
 #[small]
 impl Heaters {
-    /// Everything is off.
+    /// Returns heaters that are all off.
     pub const fn new() -> Self {
         Self { parts: [const { Parts::new() }; PRINTERS] }
     }
 
-    /// The planner waits for this from now on.
+    /// Notes what the planner waits for from now on.
     pub fn begin_wait(&self, heat: Heat) {
         if let Some(parts) = self.parts.first() {
             parts.stays.set(0);
@@ -184,17 +189,17 @@ impl Heaters {
         }
     }
 
-    /// Whether it waits still.
+    /// Whether the planner still waits.
     pub fn waits(&self) -> bool {
         self.parts.first().is_some_and(|parts| parts.awaited.get().wait != Wait::Nothing)
     }
 
-    /// It waits no more: motion goes on (M108, or the lines have been dropped).
+    /// Ends the wait of the planner: motion goes on (M108, or the lines have been dropped).
     pub fn end_wait(&self) {
         let Some(parts) = self.parts.first() else { return };
         match parts.tuned.get() {
             0 => parts.end_wait(),
-            // In the next turn, when its heater has been switched off: a line behind it may heat.
+            // An autotune ends in the next turn, when its heater has been switched off: a line behind it may heat.
             _ => parts.tune.borrow_mut().stop(),
         }
     }
@@ -207,13 +212,13 @@ impl Default for Heaters {
     }
 }
 
-/// What lines have asked for.
+/// Returns what lines have asked for.
 #[small]
 fn orders(thread: Thread) -> Orders {
     common::with(thread, |common| common.heat.first().copied()).unwrap_or(Orders::OFF)
 }
 
-/// Forgets what lines have asked for: everything is to be off.
+/// Forgets what lines have asked for: everything is to be off then.
 #[small]
 pub fn forget_orders(thread: Thread) {
     common::with(thread, |common| {
@@ -239,7 +244,7 @@ pub fn stop(links: &Links) {
     }
 }
 
-/// How a heater stands: 0 the hot end, 1 the bed. None without the capability.
+/// Returns how a heater stands: 0 is the hot end, 1 the bed. `None` without the capability.
 #[small]
 pub fn standing(links: &Links, heater: u8) -> Option<Standing> {
     let parts = links.heat.parts.first()?;
@@ -248,13 +253,13 @@ pub fn standing(links: &Links, heater: u8) -> Option<Standing> {
     Some(parts.heaters.borrow().get(heater)?.standing(to))
 }
 
-/// How fast the fan is to be, 255 for all it can.
+/// Returns how fast the fan is to be, 255 for full speed.
 #[small]
 pub fn fan(thread: Thread) -> u8 {
     orders(thread).fan
 }
 
-/// Takes over a setting, if it is a heater's. Whether it is.
+/// Takes over a setting, if it belongs to a heater. Returns whether it does.
 #[inline(never)]
 #[small]
 pub fn set(heaters: &Heaters, settings: &mut Settings, setting: Setting, value: i32) -> bool {
@@ -282,7 +287,7 @@ pub fn set(heaters: &Heaters, settings: &mut Settings, setting: Setting, value: 
     true
 }
 
-/// Takes over all of them.
+/// Takes over all settings of heaters.
 #[inline(never)]
 #[small]
 pub fn set_all(heaters: &Heaters, settings: &mut Settings, storage: &Storage) {
@@ -296,7 +301,7 @@ pub fn set_all(heaters: &Heaters, settings: &mut Settings, storage: &Storage) {
     }
 }
 
-/// A turn: see the module's text.
+/// Takes a turn: see the module's text.
 #[inline(never)]
 #[small]
 pub fn look(links: &Links) {
@@ -349,8 +354,8 @@ fn look_at(
     heater.sample(number, reading, to, orders.fan, tune)
 }
 
-/// Ends an autotune whose heater has been switched off. After the end of one switches the heater off, puts what has been found into the settings if that
-/// has been asked for, one at a time, and lets the planner go on.
+/// Ends an autotune whose heater has been switched off by lines. When an autotune has ended, switches its heater off,
+/// puts the factors into the settings if that has been asked for, one at a time, and lets the planner go on.
 #[inline(never)]
 #[small]
 fn see_to_tune(links: &Links, parts: &Parts, orders: &Orders) {
@@ -393,7 +398,7 @@ fn see_to_tune(links: &Links, parts: &Parts, orders: &Orders) {
     }
 }
 
-/// What the next autotune is to be like: so many cycles, and whether its heater is to have what is found.
+/// Says how many cycles the next autotune is to have, and whether its heater is to take over what is found.
 #[cfg(feature = "dialect-reprap")]
 #[small]
 pub fn ask_tune(heaters: &Heaters, cycles: u8, uses: bool) {
@@ -402,14 +407,14 @@ pub fn ask_tune(heaters: &Heaters, cycles: u8, uses: bool) {
     }
 }
 
-/// The autotune that is under way, or was last.
+/// Returns the autotune that is under way, or was last.
 #[cfg(feature = "dialect-reprap")]
 #[small]
 pub fn tune(heaters: &Heaters) -> Tune {
     heaters.parts.first().map_or(Tune::IDLE, |parts| *parts.tune.borrow())
 }
 
-/// Whether there is something new to tell of an autotune.
+/// Whether there is something new to tell of an autotune, since this was asked last.
 #[cfg(feature = "dialect-reprap")]
 #[small]
 pub fn takes_news(heaters: &Heaters) -> bool {
@@ -419,7 +424,7 @@ pub fn takes_news(heaters: &Heaters) -> bool {
     parts.told.replace(now) != now
 }
 
-/// Notes whether filament may be moved. Whether it is being moved although it has got far too cold.
+/// Notes whether filament may be moved. Returns whether it is being moved although the hot end has got far too cold.
 #[inline(never)]
 #[small]
 fn note_cold(links: &Links, parts: &Parts) -> bool {
@@ -442,7 +447,8 @@ fn moves_filament(thread: Thread, settings: &Settings) -> bool {
             .any(|(motor, steps)| *steps != 0 && usize::from(moved_by(settings, motor)) == EXTRUDER)
 }
 
-/// How cold filament may be moved: as `change` says, until the next start. How hot it must be, degrees, and whether it may be colder all the same.
+/// Changes how cold filament may be moved, until the next start. Returns how hot the hot end must be, degrees, and
+/// whether it may be colder all the same.
 #[cfg(feature = "dialect-reprap")]
 #[inline(never)]
 #[small]
@@ -460,7 +466,7 @@ pub fn extrude_cold(heaters: &Heaters, settings: &mut Settings, change: Cold) ->
     (hot_end.least(), heating.allows_cold)
 }
 
-/// A printing host has been heard: the A axis is an extruder.
+/// Notes that a printing host has been heard, so that the A axis is an extruder.
 #[cfg(feature = "dialect-reprap")]
 #[small]
 pub fn has_extruder(settings: &mut Settings) {
@@ -469,7 +475,8 @@ pub fn has_extruder(settings: &mut Settings) {
     }
 }
 
-/// A fault: everything is off, and no line may heat again until a reset, or until somebody [unlocks](unlock) the heaters.
+/// Handles a fault: everything is off, and no line may heat again until a reset, or until somebody [unlocks](unlock)
+/// the heaters.
 #[inline(never)]
 #[small]
 fn lock(links: &Links, fault: Status) {
@@ -487,7 +494,7 @@ fn lock(links: &Links, fault: Status) {
     }
 }
 
-/// Lines may heat again.
+/// Lets lines heat again.
 #[small]
 pub fn unlock(settings: &mut Settings) {
     if let Some(heating) = settings.heating.first_mut() {

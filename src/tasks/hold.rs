@@ -1,34 +1,40 @@
 //! Feedhold, resume, queue flush and kill: what real-time characters, and `{qf:1}`, lead to.
 //!
-//! Called by the control task, and by the reader where a tilde, `%` or `^d` stands in the stream; exec asks
-//! whether a hold is on. Thread mode decides, exec comes to rest, the planner drops what is queued:
+//! Called by the control task, and by the reader where a tilde, `%` or `^d` stands in the stream. Exec asks whether a
+//! hold is on. Thread mode decides, exec comes to rest, and the planner drops what is queued:
 //!
 //! ```text
 //!  !   Event::Hold: exec slows down               ~   Event::Resume: exec goes on, once it is at rest
 //!  %   in a hold, and ^d:
-//!      cut      Event::Cut, Event::Kill   lines of G-code that have come by then are refused, those behind wait
+//!      cut      Event::Cut, Event::Kill   lines of G-code that have come by then are refused, later ones wait
 //!      planner  drop_blocks               exec, at rest, drops its blocks and has the position, to the step
 //!               Event::Dropped            planner and model start from there; the hold is over
 //! ```
 //!
 //! The states that these events lead to are in [`machine`].
 //!
-//! A cut goes through the streams of all ports at once. The port of the character is cut at its place, the others at the
-//! byte that has come last. What the line pools hold is dropped at once. What is still in a receive ring is dropped when the
-//! reader comes to it ([`Port::cut`]). Neither planner nor exec wait for that: a pool may be full, and its sender may take no answers.
+//! A cut goes through the streams of all ports at once. The port of the character is cut where the character stands,
+//! the other ports behind the byte that has come last. What the line pools hold is dropped at once. What is still in a
+//! receive ring is dropped when the reader comes to it ([`Port::cut`]). Neither the planner nor exec waits for the
+//! reader, because a pool may be full and its sender may take no answers.
 //!
-//! A hold is on from the character on, whatever the machine does, as long as there is anything to do: also
-//! between two blocks, in a dwell, or while M0 waits. An idle machine has nothing to hold and takes no notice.
-//! A `%` that does not come in a hold is none, unless an exclamation mark comes right behind it: programs begin and end
-//! with one, and it may wait behind data. A tilde while the machine slows down waits until it stands. The machine does not go on if an
-//! exclamation mark comes behind the tilde, nor if there is a `%` on either side.
+//! A hold is on from the moment when the character comes, whatever the machine does, as long as there is anything to
+//! do: also between two blocks, in a dwell, or while M0 waits. An idle machine has nothing to hold and ignores the
+//! character.
 //!
-//! In a comment, tilde and `%` are text: the receive interrupt leaves marks where they stand (`serial::GO`,
-//! `serial::CUT`), and the reader knows what a comment is. The exclamation mark stops the machine wherever
-//! it stands, and at once.
+//! A `%` flushes only if it comes in a hold, or if an exclamation mark comes right behind it. Any other `%` begins or
+//! ends a program. Its arrival counts, not its place: the `%` of a program may still wait behind data when a hold
+//! begins.
 //!
-//! A line that is dropped is answered all the same, by [`Status::Terminated`], in an alarm by that of the alarm: senders
-//! count responses. Nothing here waits, and nothing can be full: all of it is states.
+//! A tilde that comes while the machine slows down has its effect when the machine stands. The machine does not go on
+//! if an exclamation mark comes behind the tilde, or a `%` before or behind it.
+//!
+//! In a comment, tilde and `%` are text. The receive interrupt leaves marks where they stand (`serial::GO`,
+//! `serial::CUT`), and the reader knows whether a mark is in a comment. The exclamation mark stops the machine
+//! wherever it stands, and at once.
+//!
+//! A dropped line still gets its response, because senders count responses: [`Status::Terminated`], or the status of
+//! the alarm if there is one. Nothing here waits, and nothing can be full: everything is kept as states.
 
 use super::jog;
 use super::lines::LinePool;
@@ -47,16 +53,16 @@ use crate::protocol::{Hold, Machine};
 use crate::realtime::{ENQUIRY, FLUSH, HOLD, KILL, LET_GO, RESET, RESUME, UNPLACED};
 use crate::status::Status;
 
-/// Whether a machine that is `running` is to come to rest: it does not wait for thread mode, which may have a report
-/// to put, to begin the hold. Exec only.
+/// Whether a machine that is `running` is to come to rest. A hold begins without thread mode, which may be busy with a
+/// report: the character alone is enough. Exec only.
 #[inline(always)]
 pub fn is_wanted(running: bool) -> bool {
     machine::is_held() || (running && uart::asks_hold())
 }
 
-/// An alarm has begun: what is queued is dropped when the machine has come to rest, which it does now, and so are the lines of
-/// G-code that have come by then. A pool that is in use is left to the task that uses it: the reader or the parser has found a line
-/// there that begins the alarm, and drops what that pool holds.
+/// Drops everything when an alarm begins: what is queued, when the machine has come to rest, and the lines of G-code
+/// that have come by now. A pool that is in use is left out: the reader or the parser has found the line there that
+/// begins the alarm, and drops what that pool holds.
 pub fn abandon(links: &Links) {
     links.signs.clear();
     for port in &links.ports {
@@ -68,8 +74,9 @@ pub fn abandon(links: &Links) {
     drop_queue(links);
 }
 
-/// A control line has come on a port in an alarm, whose pool this is: G-code that has come before it on any port is refused, also if
-/// the line ends the alarm. Behind a full pool of another port all that waits has come before it.
+/// Refuses G-code that came, on any port, before a control line that has just come in an alarm. This also holds if the
+/// control line ends the alarm. `pool` is the pool of that line. All bytes that wait behind a full pool of another
+/// port came before the line.
 #[cold]
 #[inline(never)]
 #[small]
@@ -85,7 +92,7 @@ pub fn refuse_older(links: &Links, pool: &mut LinePool) {
     }
 }
 
-/// Cuts the stream of a port at a slot of its receive ring, or at what the reader has got.
+/// Cuts the stream of a port: behind `slot` of its receive ring, or, if that is `None`, where the reader is.
 fn cut_up_to(port: &Port, lines: &mut LinePool, slot: Option<u8>) {
     match slot {
         Some(_) => port.cut.set(slot),
@@ -94,7 +101,7 @@ fn cut_up_to(port: &Port, lines: &mut LinePool, slot: Option<u8>) {
     }
 }
 
-/// What lines are answered that are dropped now.
+/// Returns the status with which lines are answered that are dropped now.
 #[inline(never)]
 pub fn dropped() -> Status {
     match machine::alarm() {
@@ -103,10 +110,11 @@ pub fn dropped() -> Status {
     }
 }
 
-/// The door has been opened: nothing moves. Or shut: what is held waits for a tilde, if there is anything.
+/// Takes a change of the door. An open door holds all motion. When the door has been shut, what is held waits for a
+/// tilde, if there is anything.
 pub fn door(links: &Links, open: bool) {
     if open && machine::goes_on() {
-        // A hold of its own: a percent sign was of one before it.
+        // The door begins a hold of its own: a percent sign belongs to an earlier one.
         links.signs.percent.set(false);
     }
     let works = links.has_data() || View::of(links, links.feeder()).has_work();
@@ -118,7 +126,8 @@ pub fn door(links: &Links, open: bool) {
     });
 }
 
-/// Opens the door and shuts it at once: nothing moves until a tilde, at rest too. While the door is open it does nothing.
+/// Holds the machine as if the door were opened and shut at once: nothing moves until a tilde, at rest too. Does
+/// nothing while the door is open, in an alarm, and in check mode.
 #[inline(never)]
 #[small]
 pub fn knock(links: &Links) {
@@ -129,16 +138,17 @@ pub fn knock(links: &Links) {
     }
 }
 
-/// Whether a machine that rests may be held: not in an alarm, and not while lines are checked alone.
+/// Whether a machine at rest may be held: not in an alarm, and not in check mode.
 fn may_hold_at_rest() -> bool {
     !machine::is_alarmed() && !machine::is_checking()
 }
 
-/// Acts upon the real-time characters that have come, on any port.
+/// Acts on the real-time characters that have come, on any port.
 pub fn serve(links: &Links) {
-    // Before the character is taken: exec has begun, and is not to go on in between.
+    // Before the character is taken: exec has begun the hold because the character waits, and must not go on in
+    // between.
     if uart::asks_hold() && is_busy(links) {
-        // Those of a hold before this one count for nothing.
+        // Signs of an earlier hold do not count.
         links.signs.percent.set(links.signs.percent.get() && machine::is_held());
         links.signs.door.set(links.signs.door.get() && machine::is_held());
         machine::take(machine::Event::Hold);
@@ -157,7 +167,7 @@ pub fn serve(links: &Links) {
 #[inline(never)]
 #[small]
 fn act(links: &Links, port: &Port, characters: u8) {
-    // A byte of a printing host that became one on its way is missing in its line, which is sent again.
+    // A printing host sends no such character. It is a damaged byte of a line, and the host sends that line again.
     let resets = characters & RESET != 0 && machine::is_alarmed();
     let characters = match port.is_plain() && !resets {
         true => characters & LET_GO,
@@ -176,7 +186,7 @@ fn act(links: &Links, port: &Port, characters: u8) {
     if characters & LET_GO != 0 {
         uart::kick(port.number);
     }
-    // Programs begin and end with a percent sign, and grbl's senders drop nothing by one.
+    // Senders of grbl's dialect flush nothing by a percent sign: it only begins and ends programs.
     let cuts = characters & FLUSH != 0 && !port.speech.get().is_in_order();
     let holds = characters & HOLD != 0;
     let (kills, busy) = (characters & KILL != 0, holds && is_busy(links));
@@ -200,7 +210,7 @@ fn act(links: &Links, port: &Port, characters: u8) {
     } else if cuts {
         signs.lone_percent(millis());
     } else if holds && signs.take_lone_percent(millis()) && busy {
-        // At the place of the percent sign, which the reader has passed, mostly: what has come since belongs to what follows.
+        // Cuts at the percent sign, which the reader has mostly passed: what has come since belongs to what follows.
         cut(links, port, uart::last_cut(port.number), machine::Event::Cut);
     }
     if characters & RESUME != 0 {
@@ -216,8 +226,9 @@ fn act(links: &Links, port: &Port, characters: u8) {
     links.reporter_wake.notify_now();
 }
 
-/// Whether a reset starts over instead of starting the board anew: in a dialect in which it does, and on a port that is undecided while the machine
-/// has nothing to do. There a sender may begin so, and goes on with lines that the start of a board would lose.
+/// Whether a reset character drops the job instead of resetting the chip. It does so in a dialect that keeps its lines
+/// in order, unless there is a panic. It does so too on an undecided port while the machine has nothing to do: a
+/// sender may begin with a reset there, and a start of the chip would lose the lines that follow.
 #[inline(never)]
 #[small]
 fn starts_over(links: &Links, port: &Port) -> bool {
@@ -227,14 +238,15 @@ fn starts_over(links: &Links, port: &Port) -> bool {
     port.speech.get().is_in_order() && machine::alarm() != Alarm::Panic
 }
 
-/// A reset in a dialect that keeps the position: what has come up to a slot of the receive ring is dropped, the program ends, overrides are as programmed; the reporter greets
-/// when that is done, and begins an alarm before if the machine `works`, which is interrupted.
+/// Carries out a reset in a dialect that keeps the position. What has come, up to a slot of the receive ring, is
+/// dropped; the program ends; overrides are as programmed. When that is done, the reporter greets. If the machine
+/// `works`, it is interrupted, and the reporter begins an alarm before the greeting.
 #[inline(never)]
 #[small]
 fn start_over(links: &Links, port: &Port, slot: Option<u8>, works: bool) {
     cut(links, port, slot, machine::Event::Kill);
     if port.cut.get().is_none() {
-        // What comes next begins a line.
+        // The next byte begins a line.
         port.lines.borrow_mut().forget();
     }
     for which in [Override::Feed, Override::Traverse, Override::Spindle] {
@@ -252,13 +264,14 @@ fn start_over(links: &Links, port: &Port, slot: Option<u8>, works: bool) {
     links.reporter_wake.notify_now();
 }
 
-/// Drops what is queued, as a `%` does: `{qf:1}`, unless the machine is busy without a hold.
+/// Drops what is queued, as a `%` in a hold does: for `{qf:1}`, and for the end of a jog. The caller has refused
+/// `{qf:1}` if the machine is busy without a hold.
 pub fn flush_here() {
     machine::take(machine::Event::Flush);
     flags::set(Event::Received);
 }
 
-/// The reader drops all that has come, if that is wanted.
+/// Drops all lines that have come, if [`flush_here`] has asked for it. Called by the reader.
 #[inline(always)]
 pub fn here(links: &Links) {
     if machine::is_to_cut() {
@@ -266,8 +279,8 @@ pub fn here(links: &Links) {
     }
 }
 
-/// Drops the lines of G-code that have come: on this port up to a slot of its receive ring, or what the reader has got;
-/// on others all. A line that has come in part goes whole.
+/// Drops the lines of G-code that have come. On this port that is up to `slot` of its receive ring, or, if that is
+/// `None`, up to where the reader is; on other ports it is everything. A line that has come in part is dropped whole.
 #[inline(never)]
 #[small]
 fn cut(links: &Links, port: &Port, slot: Option<u8>, event: machine::Event) {
@@ -282,7 +295,8 @@ fn cut(links: &Links, port: &Port, slot: Option<u8>, event: machine::Event) {
     drop_queue(links);
 }
 
-/// The reader has come to the place of a real-time character on a port, outside of comments, and behind all cuts.
+/// Acts on a real-time character where it stands: the reader has come to its mark, outside comments and behind all
+/// cuts.
 pub fn placed(links: &Links, port: &Port, mark: u8) {
     serve(links);
     if mark == GO {
@@ -292,8 +306,8 @@ pub fn placed(links: &Links, port: &Port, mark: u8) {
     }
 }
 
-/// A real-time character still waits in the receive ring, at `slot`, because the pool is full. One that is not there any
-/// more has left the mark of a loss.
+/// Acts on the mark of a real-time character that still waits in the receive ring, at `slot`, because the pool is
+/// full. A loss marker counts as any of them: a mark may have been lost there.
 pub fn ahead(links: &Links, port: &Port, mark: u8, slot: u8) {
     serve(links);
     if mark != CUT {
@@ -305,26 +319,27 @@ pub fn ahead(links: &Links, port: &Port, mark: u8, slot: u8) {
     }
 }
 
-/// What is held goes on; and what waits at a program stop.
+/// Lets what is held, or what waits at a program stop, go on, if a tilde has come.
 pub(super) fn go_on(links: &Links) {
     if links.signs.resume.take() && machine::may_resume() {
         machine::take(machine::Event::Resume);
         links.cycle_start.signal();
-        // It may have looked already, when the character came, and sleep again.
+        // The reporter may have looked already, when the character came, and sleep again.
         links.reporter_wake.notify_now();
     }
 }
 
-/// The planner is to drop the queue.
+/// Has the planner drop the queue.
 fn drop_queue(links: &Links) {
     links.parser_wake.signal();
-    // Wherever the planner waits.
+    // Wakes the planner wherever it waits.
     links.planner_wake.signal();
     links.cycle_start.signal();
     flags::set(Event::BlockDone);
 }
 
-/// Whether anything is carried out that is not held at rest, at a program stop, or only checked.
+/// Whether anything is being carried out. What is held at rest, waits at a program stop or is only checked does not
+/// count.
 #[inline(never)]
 #[small]
 fn is_moving(links: &Links, port: &Port) -> bool {

@@ -1,7 +1,8 @@
-//! Homing of an axis, as the settings say it: which switch, which way, how fast, and what the place is called.
+//! Homing of an axis, as the settings describe it: which switch, which way, how fast, and which position the place
+//! gets.
 //!
-//! Pure: asked by the interpreter before a line is taken (`Setup::homing`), by the planner at each stage, and by
-//! the view for `home`. Lengths are of [`Length`], speeds mm or degrees per minute.
+//! Pure functions. They are called by the interpreter before a line is taken (`Setup::homing`), by the planner at each
+//! stage, and by the view for `home`. Lengths are [`Length`]s, speeds are in mm or degrees per minute.
 //!
 //! ```text
 //!   lower switch                                          upper switch
@@ -10,11 +11,12 @@
 //!      |<-zb->| here the axis is at tn                  here at tm
 //! ```
 //!
-//! An axis of which a motor's driver tells the load ([`Settings::homes_by_stall`]) needs no switch: the pin of that driver is in its place.
+//! An axis needs no switch if the driver of its motor tells the motor's load ([`Settings::homes_by_stall`]): the pin
+//! of that driver takes the place of the switch.
 //!
 //! Where the axis ends up, `zb` off the switch, is the end of its travel, so that machine coordinates and soft limits
-//! fit the machine: `tn` at a lower switch, `tm` at an upper one. It is 0 where that end is not set or both
-//! are the same.
+//! fit the machine: `tn` at a lower switch, `tm` at an upper one. The place is 0 if that end is not set, or if both
+//! ends are equal.
 
 use super::switches;
 use crate::boards::{ACTIVE, inputs};
@@ -47,53 +49,53 @@ const SHARED: u8 = {
 /// How an axis is homed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Homing {
-    /// The input of its switch.
+    /// The input of the axis's switch.
     pub end: u8,
     /// The speed of the search.
     pub search: f32,
     /// The speed of the latching.
     pub latch: f32,
-    /// How far it searches at most.
+    /// How far the axis searches at most.
     pub way: Length,
-    /// How far it backs off the switch.
+    /// How far the axis backs off the switch.
     pub backoff: Length,
-    /// How far from the switch it ends.
+    /// How far from the switch the axis ends.
     pub zero: Length,
-    /// What the place is called.
+    /// The position that the place gets.
     pub place: Length,
-    /// The switch at its other end is on the same pin.
+    /// The switch at the other end of the axis is on the same pin.
     pub shared: bool,
 }
 
 impl Homing {
-    /// The bit of its switch.
+    /// Returns the bit of the switch.
     pub fn switch(&self) -> u16 {
         1 << self.end
     }
 
-    /// Whether its switch is on the pin of this input.
+    /// Whether the switch is on the pin of this input.
     pub fn has_pin(&self, input: u8) -> bool {
         input == self.end || (input == self.end ^ 1 && SHARED >> self.end & 1 != 0)
     }
 
-    /// Both ends of the axis.
+    /// Returns both ends of the axis, as bits.
     pub fn ends(&self) -> u8 {
         3 << (self.end & !1)
     }
 
-    /// The place that is `way` from `from` towards the switch.
+    /// Returns the place that is `way` from `from` towards the switch.
     pub fn towards(&self, from: Length, way: Length) -> Length {
         let upper = self.end & 1 != 0;
         if upper { from.saturating_add(way) } else { from.saturating_sub(way) }
     }
 
-    /// The place that is `way` from `from` away from the switch.
+    /// Returns the place that is `way` from `from` away from the switch.
     pub fn away(&self, from: Length, way: Length) -> Length {
         self.towards(from, Length(-way.0))
     }
 }
 
-/// Which switch homes an axis, if exactly one does.
+/// Returns the switch that homes an axis, if exactly one does.
 fn switch_of(settings: &Settings, axis: u8) -> Option<u8> {
     let homes =
         |end: u8| switches::WIRED >> end & 1 != 0 && switches::mode(settings, end) & HOMING != 0;
@@ -105,7 +107,7 @@ fn switch_of(settings: &Settings, axis: u8) -> Option<u8> {
     }
 }
 
-/// The axes that have a homing switch, as bits.
+/// Returns the axes that have a homing switch, as bits.
 #[small]
 pub fn axes(settings: &Settings) -> u8 {
     (0..AXES)
@@ -113,7 +115,8 @@ pub fn axes(settings: &Settings) -> u8 {
         .fold(0, |bits, axis| bits | 1 << axis)
 }
 
-/// How an axis is homed, or why it cannot be. That `lb` is below 0, TinyG's 245, no setting can say.
+/// Returns how an axis is homed, or why it cannot be. TinyG's status 245, `lb` below 0, never occurs: no setting can
+/// say that.
 #[inline(never)]
 #[small]
 pub fn of(settings: &Settings, axis: u8) -> Result<Homing, Status> {
@@ -143,7 +146,7 @@ pub fn of(settings: &Settings, axis: u8) -> Result<Homing, Status> {
     Ok(Homing { end, search, latch, way, backoff, zero, place, shared: shares(settings, end) })
 }
 
-/// Whether a switch may be closed at the other end that is on the same pin.
+/// Whether the switch at the other end is on the same pin and in use.
 fn shares(settings: &Settings, end: u8) -> bool {
     SHARED >> end & 1 != 0 && switches::mode(settings, end ^ 1) != 0
 }

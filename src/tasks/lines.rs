@@ -1,15 +1,17 @@
 //! The line pool: received lines that wait for the parser.
 //!
-//! One for each port, filled by the reader, emptied by the parser, both in thread mode. Lines lie end to
-//! end in one buffer in order of arrival, so that eight short lines of G-code and one long line of JSON fit the same
-//! memory. Control lines (JSON, `$`, `?`) are taken before data lines, each kind in order.
+//! There is one pool for each port. The reader fills it and the parser empties it, both in thread mode. Lines lie end
+//! to end in one buffer in order of arrival, so that eight short lines of G-code or one long line of JSON fit in the
+//! same memory. Control lines (JSON, `$`, `?`) are taken before data lines, each kind in order.
 //!
-//! Lines that come in order leave a slot and some bytes free, the *reserve*, and no control line begins where a short one
-//! would not fit whole. The reserve is for such lines that wait behind data in the receive ring ([`overtake`](super::overtake)).
+//! Lines that come in order leave a slot and some bytes free, the *reserve*. The reserve is for short control lines
+//! that wait behind data in the receive ring ([`overtake`](super::overtake)). No control line begins in order where a
+//! short one would not fit whole.
 //!
-//! A line that cannot be kept whole is kept as a fault instead, with as much of it as is given back: the sender gets
-//! exactly one response for it either way. Senders may count characters, so every byte that comes belongs to a line:
-//! blanks before it, and what came between it and the line before, count with it. When the pool is full the reader leaves bytes in the receive ring.
+//! A line that cannot be kept whole is kept as a fault, with as much of its text as the answer gives back: the sender
+//! gets exactly one response for it either way. Senders may count characters, so every byte that comes is counted with
+//! some line: blanks before a line, and bytes between two lines, count with the line that follows. When the pool is
+//! full, the reader leaves bytes in the receive ring.
 
 mod entries;
 
@@ -26,23 +28,25 @@ use crate::protocol::{asks_alarm, is_control, may_be_control};
 use crate::realtime::ASCII;
 use crate::status::Status;
 
-/// Line slots, beside the one for control lines that overtake. Senders count on eight.
+/// Slots for lines in order; there is one more for control lines that overtake. Senders rely on eight.
 pub const SLOTS: usize = LINES;
-/// Longest line, in bytes without its end; less in a pool that has no more.
+/// The longest line, in bytes without its end. The limit is lower in a pool with less memory.
 pub const LINE_MAX: usize = 254;
-/// Asks for a status report. Senders of other firmwares say it without a line end, and then go on with their job.
+/// Asks for a status report. Senders made for other firmwares send it without a line end and then go on with their
+/// job.
 const ASKS: u8 = b'?';
-/// What is kept of a longer one, and in order of one that is dropped while it comes in.
+/// How many bytes are kept of a line that is too long. Where lines are answered in their order, as many are kept of a
+/// line that is dropped while it comes in.
 const REST_MAX: u8 = 32;
 
 /// What to do with a line.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Class {
-    /// Overtakes data.
+    /// The line overtakes data.
     Control,
-    /// Waits until the planner has room.
+    /// The line waits until the planner has room.
     Data,
-    /// Could not be kept; answered with this status.
+    /// The line could not be kept, and is answered with this status.
     Fault(Status),
 }
 
@@ -67,7 +71,7 @@ pub enum Aside {
 }
 
 impl Aside {
-    /// Where the text stands after one more byte.
+    /// Returns whether text behind one more byte is in a comment.
     pub fn after(self, byte: u8) -> Self {
         match (self, byte) {
             (_, b'\n' | b'\r') => Self::None,
@@ -79,20 +83,20 @@ impl Aside {
     }
 }
 
-/// The pool.
+/// The line pool of a port.
 // In this order: AVR reaches a field within 63 bytes of the first in one instruction.
 #[repr(C)]
 pub struct LinePool {
     bytes: &'static mut [u8],
     /// Where the oldest line begins.
     start: u16,
-    /// Behind the last complete line.
+    /// The end of the last complete line.
     end: u16,
     /// Bytes of the line that is coming in, from `end` on.
     partial: u8,
-    /// How many of them are control lines.
+    /// How many complete lines are control lines.
     controls: u8,
-    /// Bytes since the last line that are not kept.
+    /// Bytes that have come since the last line and are not kept.
     besides: u16,
     /// Why the line that is coming in cannot be kept.
     fault: Option<Status>,
@@ -102,21 +106,22 @@ pub struct LinePool {
     keep_empty: bool,
     /// No line is a control line: all are answered in their order.
     in_order: bool,
-    /// A printing host speaks: other lines are control lines.
+    /// A printing host speaks, which has control lines of its own.
     #[cfg(feature = "dialect-reprap")]
     plain: bool,
     /// Longest line.
     longest: u8,
-    /// Bytes left to control lines that overtake: as long as they may be.
+    /// Bytes that are left free for control lines that overtake: the greatest length of such a line.
     reserve: u8,
-    /// The worst alarm that lines have begun which have come.
+    /// The worst alarm that complete lines have asked for since the last [`take_stop`](Self::take_stop).
     stop: Alarm,
     /// Complete lines, in order; their bytes lie end to end.
     entries: Entries,
 }
 
 impl LinePool {
-    /// An empty pool that keeps its lines in `bytes`, and leaves `reserve` of them to control lines that overtake.
+    /// Returns an empty pool that keeps its lines in `bytes` and leaves `reserve` of them to control lines that
+    /// overtake.
     pub const fn new(bytes: &'static mut [u8], reserve: u8) -> Self {
         let room = bytes.len().saturating_sub(reserve as usize);
         Self {
@@ -139,17 +144,17 @@ impl LinePool {
         }
     }
 
-    /// Whether empty lines are lines, from now on.
+    /// Sets whether empty lines count as lines from now on.
     pub fn keep_empty(&mut self, keep: bool) {
         self.keep_empty = keep;
     }
 
-    /// Whether this byte acts, and is no part of a line.
+    /// Whether this byte acts where it stands and belongs to no line.
     pub fn leaves(&self, byte: u8) -> bool {
         self.in_order && acts(byte)
     }
 
-    /// Whether a printing host speaks, from now on.
+    /// Sets whether a printing host speaks from now on.
     pub fn keep_plain(&mut self, keep: bool) {
         #[cfg(feature = "dialect-reprap")]
         {
@@ -167,7 +172,8 @@ impl LinePool {
         false
     }
 
-    /// Whether all lines are answered in their order, from now on: those that have come, too.
+    /// Sets whether all lines are answered in their order from now on. Control lines that already wait become data
+    /// lines.
     pub fn keep_order(&mut self, keep: bool) {
         self.in_order = keep;
         if keep && self.controls > 0 {
@@ -189,12 +195,12 @@ impl LinePool {
         }
     }
 
-    /// The line that has come last.
+    /// Returns the line that has come last.
     pub fn newest(&self) -> &[u8] {
         self.text(LineId((self.entries.len() as u8).wrapping_sub(1)))
     }
 
-    /// What to do with a line that has come whole.
+    /// Returns the class of a line that has come whole.
     #[inline(never)]
     fn classify(&self, line: &[u8]) -> Class {
         if !self.in_order && is_control(line, self.is_plain()) {
@@ -204,7 +210,7 @@ impl LinePool {
         }
     }
 
-    /// Free slots, not counting the one a line is coming into.
+    /// Returns the number of free slots, the slot for the line that is coming in included.
     pub fn free(&self) -> u8 {
         SLOTS.saturating_sub(self.entries.len()) as u8
     }
@@ -214,14 +220,14 @@ impl LinePool {
         self.entries.is_empty() && self.partial == 0
     }
 
-    /// Whether the next byte can be taken, whatever it is.
+    /// Whether there is room for the next byte, whatever it is.
     #[inline(never)]
     pub fn ready(&self) -> bool {
         let need = if self.is_within_line() { 1 } else { u16::from(self.reserve) + 1 };
         self.entries.len() < SLOTS && self.room() >= need
     }
 
-    /// Bytes that lines in order may take.
+    /// Returns how many more bytes lines in order may take.
     #[inline(always)]
     pub fn room(&self) -> u16 {
         let used = self.end - self.start + u16::from(self.partial) + u16::from(self.reserve);
@@ -234,19 +240,19 @@ impl LinePool {
         self.partial > 0 || self.fault.is_some()
     }
 
-    /// Longest control line that may overtake, without its end.
+    /// Returns the greatest length of a control line that may overtake, without its end.
     pub fn reserve(&self) -> u8 {
         self.reserve
     }
 
-    /// Whether a control line of so many bytes may overtake now.
+    /// Whether a control line of `len` bytes may overtake now.
     pub fn has_reserve(&self, len: u8) -> bool {
         let used = self.end - self.start + u16::from(self.partial) + u16::from(len);
         self.entries.len() <= SLOTS && usize::from(used) <= self.bytes.len()
     }
 
-    /// Whether so many bytes of a ring are a control line; there is [room](Self::has_reserve) for it. It is laid behind the line that
-    /// is coming in.
+    /// Whether `len` bytes of a ring, from `from` on, are a control line. Copies them behind the line that is coming
+    /// in; the caller has made sure that there is [room](Self::has_reserve).
     #[inline(never)]
     #[small]
     pub fn is_control(&mut self, ring: &Window<'_>, from: u8, len: u8) -> bool {
@@ -258,7 +264,8 @@ impl LinePool {
         self.classify(self.slice(at, len)) == Class::Control
     }
 
-    /// Puts that control line before the line that is coming in; its sender counts so many bytes besides.
+    /// Puts a control line of a ring before the line that is coming in. Its sender counts `besides` more bytes for it;
+    /// `u16::MAX` is one byte less.
     #[inline(never)]
     #[small]
     pub fn put_before(&mut self, ring: &Window<'_>, from: u8, len: u8, besides: u16) {
@@ -277,13 +284,13 @@ impl LinePool {
         }
     }
 
-    /// The worst alarm that lines ask for which have come since this was called last ([`stop`](super::stop)).
+    /// Returns the worst alarm that lines have asked for since the last call ([`stop`](super::stop)).
     #[inline(always)]
     pub fn take_stop(&mut self) -> Alarm {
         core::mem::replace(&mut self.stop, Alarm::None)
     }
 
-    /// A control line has come whole.
+    /// Counts a new control line, and notes the alarm that it asks for.
     #[inline(never)]
     #[small]
     fn note_control(&mut self, start: usize, len: u8) {
@@ -292,7 +299,7 @@ impl LinePool {
         self.stop = self.stop.max(asked.unwrap_or(Alarm::None));
     }
 
-    /// Copies bytes of a ring to a place.
+    /// Copies bytes of a ring to the place `at` in the buffer.
     #[inline(never)]
     #[small]
     fn lay(&mut self, ring: &Window<'_>, from: u8, len: u8, at: usize) -> &[u8] {
@@ -301,8 +308,9 @@ impl LinePool {
         line
     }
 
-    /// Takes the printing bytes that `bytes` begins with, as far as they fit and are no matter for
-    /// [`LinePool::put`], and the line feed behind them if they are a whole line. Returns how many bytes that was, and whether it was such a line. Cost: 10 cycles a byte, and 150.
+    /// Takes the printing bytes at the beginning of `bytes` into the line that is coming in, as far as there is room.
+    /// Stops at a byte that needs [`LinePool::put`]. If the bytes are a whole line, takes the line feed behind them
+    /// too. Returns how many bytes were taken, and whether they were a whole line. Cost: 10 cycles a byte, and 150.
     #[inline(never)]
     pub fn put_text(&mut self, bytes: &[u8]) -> (u8, bool) {
         let begins = self.partial == 0;
@@ -326,8 +334,8 @@ impl LinePool {
         (count + u8::from(ends), ends)
     }
 
-    /// Whether a line may begin with these bytes at once: [`LinePool::put`] sees to all others. A control line waits in the ring, where
-    /// it may overtake, rather than come in half.
+    /// Whether a line may begin with these bytes now. If not, [`LinePool::put`] takes the first of them, or it waits:
+    /// a control line stays in the ring, where it may overtake, until it is sure to fit.
     #[inline(always)]
     fn may_begin(&self, bytes: &[u8]) -> bool {
         match bytes.first() {
@@ -336,7 +344,7 @@ impl LinePool {
         }
     }
 
-    /// Takes a byte. Returns true when it completes a line.
+    /// Takes one byte. Returns whether it completes a line.
     #[inline(never)]
     pub fn put(&mut self, byte: u8) -> bool {
         let returned = core::mem::replace(&mut self.returned, byte == b'\r');
@@ -366,20 +374,21 @@ impl LinePool {
         asks
     }
 
-    /// Ends the line that is coming in if that is a question mark, and this byte begins another. Returns true if that was a line.
+    /// Ends the line that is coming in if it is a question mark and `next` begins another line. Returns whether it
+    /// has.
     #[inline(never)]
     #[small]
     pub fn end_question(&mut self, next: u8) -> bool {
         let ends = self.is_asking() && next > b' ' && next != TAKEN_RETURN;
         if ends {
-            // It has no end of its own.
+            // There is no line end that the sender counts.
             self.besides = self.besides.wrapping_sub(1);
             self.end_line();
         }
         ends
     }
 
-    /// Whether the line that is coming in is a question mark so far: whatever follows is another line.
+    /// Whether the line that is coming in is a question mark. Whatever follows is another line then.
     pub fn is_asking(&self) -> bool {
         self.partial > 0
             && !self.in_order
@@ -387,15 +396,15 @@ impl LinePool {
             && self.bytes.get(usize::from(self.end)) == Some(&ASKS)
     }
 
-    /// Bytes have come that are not kept.
+    /// Counts bytes that are not kept.
     #[inline(never)]
     #[small]
     fn pass(&mut self, count: u8) {
         self.besides = self.besides.saturating_add(count.into());
     }
 
-    /// Where the next byte goes. When the lines have reached the end of the buffer they all move to its
-    /// beginning, which with short lines happens once in thirty.
+    /// Returns where the next byte goes. When the lines have reached the end of the buffer, they all move to its
+    /// beginning; with short lines this happens once in thirty.
     #[inline(always)]
     fn room_at(&mut self) -> usize {
         let at = usize::from(self.end) + usize::from(self.partial);
@@ -415,9 +424,10 @@ impl LinePool {
 
     /// Gives up the line that is coming in: it will be answered with `status`.
     pub fn spoil(&mut self, status: Status) {
-        // In a small pool less, to leave room for control lines.
+        // A small pool keeps less, to leave room for control lines.
         let most = REST_MAX.min(self.longest / 4);
-        // Where all lines are answered in their order the beginning tells what has been dropped: a jog is over, G-code is refused.
+        // Where lines are answered in their order, the answer depends on whether the dropped line was a jog or other
+        // G-code.
         let tells = status == Status::InputTooLong || self.in_order && status == Status::Terminated;
         let kept = if tells { self.partial.min(most) } else { 0 };
         self.pass(self.partial - kept);
@@ -425,14 +435,14 @@ impl LinePool {
         self.fault = Some(status);
     }
 
-    /// Forgets the line that is coming in.
+    /// Forgets the line that is coming in. Its bytes count with the next one.
     pub fn forget(&mut self) {
         self.pass(self.partial);
         self.partial = 0;
         self.fault = None;
     }
 
-    /// Whether what comes next is in a comment.
+    /// Returns whether the next byte is in a comment.
     pub fn aside(&self) -> Aside {
         let text = self.slice(usize::from(self.end), self.partial);
         text.iter().fold(Aside::None, |aside, byte| aside.after(*byte))
@@ -463,7 +473,8 @@ impl LinePool {
         self.drop_data(status, false);
     }
 
-    /// Drops data lines as [`terminate`](Self::terminate) does, in an alarm, but keeps the end of a program, which ends an alarm, and what is behind it.
+    /// Drops data lines as [`terminate`](Self::terminate) does, in an alarm. Keeps the end of a program, which ends
+    /// the alarm, and everything behind it.
     pub fn refuse(&mut self, status: Status) {
         self.drop_data(status, true);
     }
@@ -486,12 +497,12 @@ impl LinePool {
         }
     }
 
-    /// What has become of a line.
+    /// Returns the class of a line as it is now: the line may have been dropped since it was taken.
     pub fn class(&self, id: LineId) -> Class {
         self.entries.get(usize::from(id.0)).map_or(Class::Data, |entry| entry.class)
     }
 
-    /// Drops the line that is coming in, if that is one of data.
+    /// Drops the line that is coming in, if it is a data line so far.
     #[inline(never)]
     pub fn terminate_partial(&mut self, status: Status) {
         let text = self.slice(usize::from(self.end), self.partial);
@@ -500,12 +511,12 @@ impl LinePool {
         }
     }
 
-    /// The next byte follows a carriage return, or does not.
+    /// Sets whether the next byte follows a carriage return.
     pub fn follow(&mut self, returned: bool) {
         self.returned = returned;
     }
 
-    /// Takes the end of a line; `returned` if it was a carriage return. Returns true if that was a line.
+    /// Takes the end of a line; `returned` if it was a carriage return. Returns whether a line has been completed.
     pub fn end(&mut self, returned: bool) -> bool {
         self.returned = returned;
         self.end_line()
@@ -524,13 +535,13 @@ impl LinePool {
         true
     }
 
-    /// The line that was coming in has come, without a fault.
+    /// Adds the line that was coming in, which has no fault.
     #[inline(never)]
     fn keep_whole(&mut self) {
         self.keep(self.classify(self.slice(self.end.into(), self.partial)));
     }
 
-    /// The line that was coming in has come.
+    /// Adds the line that was coming in, as one of `class`.
     #[inline(always)]
     fn keep(&mut self, class: Class) {
         let len = core::mem::take(&mut self.partial);
@@ -548,8 +559,8 @@ impl LinePool {
         self.bytes.get(start..start + usize::from(len)).unwrap_or(&[])
     }
 
-    /// The line to process next; data lines (and faults, which keep their place among them) only if
-    /// `data` is wanted. Where lines keep their order, one that asks or sets something is none of these.
+    /// Returns the line to process next. Data lines, and faults, which keep their place among them, are returned only
+    /// if `data` is wanted. Where lines keep their order, a line that asks or sets something is returned in any case.
     pub fn next(&self, data: bool) -> Option<(LineId, Class)> {
         let index = match self.controls {
             0 if !data && !self.is_command() => return None,
@@ -559,7 +570,8 @@ impl LinePool {
         self.entries.get(index).map(|e| (LineId(index as u8), e.class))
     }
 
-    /// Whether lines keep their order, and the oldest begins with a dollar and is no jog: it waits for no motion.
+    /// Whether lines keep their order, and the oldest begins with a dollar sign and is no jog. Such a line waits for
+    /// no motion.
     fn is_command(&self) -> bool {
         if !self.in_order {
             return false;
@@ -570,7 +582,7 @@ impl LinePool {
             && self.entries.first().is_some_and(|first| first.class == Class::Data)
     }
 
-    /// The text of the oldest line, if that is next, and data.
+    /// Returns the text of the oldest line, if it is next and a data line.
     pub fn oldest(&self) -> Option<&[u8]> {
         match self.entries.first() {
             Some(Entry { len, class: Class::Data, .. }) if self.controls == 0 => {
@@ -580,7 +592,7 @@ impl LinePool {
         }
     }
 
-    /// Removes it.
+    /// Removes the oldest line.
     #[inline(never)]
     pub fn remove_oldest(&mut self) {
         let Some(oldest) = self.entries.pop_first() else { return };
@@ -589,7 +601,7 @@ impl LinePool {
         self.rewind();
     }
 
-    /// Without any line the next one begins where the buffer does.
+    /// If there is no line, has the next one begin at the start of the buffer.
     #[inline(always)]
     fn rewind(&mut self) {
         if self.entries.is_empty() && self.partial == 0 {
@@ -597,7 +609,7 @@ impl LinePool {
         }
     }
 
-    /// The text of a line.
+    /// Returns the text of a line.
     pub fn text(&self, id: LineId) -> &[u8] {
         let index = usize::from(id.0);
         match self.entries.get(index) {
@@ -606,13 +618,13 @@ impl LinePool {
         }
     }
 
-    /// How many bytes its sender counts for a line, with its end.
+    /// Returns how many bytes the sender counts for a line, with its end.
     pub fn length(&self, id: LineId) -> u16 {
         let length = |entry: &Entry| entry.besides.wrapping_add(u16::from(entry.len) + 1);
         self.entries.get(usize::from(id.0)).map_or(0, length)
     }
 
-    /// How many bytes its sender counts for the oldest line, with its end.
+    /// Returns how many bytes the sender counts for the oldest line, with its end.
     pub fn oldest_length(&self) -> u16 {
         self.length(LineId(0))
     }
@@ -625,7 +637,7 @@ impl LinePool {
         before.fold(usize::from(self.start), |at, e| at + usize::from(e.len))
     }
 
-    /// Removes a line: the oldest, or any other for about 8 cycles for each byte behind it.
+    /// Removes a line. Any line but the oldest costs about 8 cycles for each byte behind it.
     #[inline(never)]
     pub fn remove(&mut self, id: LineId) {
         let index = usize::from(id.0);
@@ -655,7 +667,7 @@ pub fn acts(byte: u8) -> bool {
     byte == ASKS || byte > ASCII
 }
 
-/// The bytes before the first that acts.
+/// Returns the bytes before the first one that acts.
 #[inline(never)]
 #[small]
 fn before_realtime(bytes: &[u8]) -> &[u8] {

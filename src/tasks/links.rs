@@ -19,14 +19,14 @@
 //! | [`Links::cleared_by`] | who has ended an alarm last | 1 | 1 B | parser | parser | overwritten |
 //! | [`Links::feeder`] | which port's lines are carried out | 1 | 1 B | parser | all | never: it changes at rest |
 //!
-//! What the machine is doing is no link: that is in [`machine`](crate::machine). [`Links::signs`] belong to the control task
-//! and the reader.
+//! What the machine is doing is no link: that is in [`machine`](crate::machine). [`Links::signs`] belong to the
+//! control task and the reader.
 //!
-//! So back-pressure runs from the pins to the sender: segments full, blocks full, `commands` taken, data
-//! lines wait in the pool, and their responses wait with them. The sender has at most its lines in
-//! flight there.
+//! Back-pressure runs from the pins to the sender: when segments are full, blocks become full, then `commands` stays
+//! taken, then data lines wait in the pool, and their responses wait with them. A sender that counts responses has no
+//! more lines in flight than those.
 //!
-//! All but the interrupt rings belong to thread-mode tasks of one executor, which take turns: plain
+//! All links except the interrupt rings belong to thread-mode tasks of one executor, which take turns. They are plain
 //! `RefCell`s, never borrowed across an `.await`.
 
 use core::cell::{Cell, RefCell};
@@ -47,37 +47,37 @@ use crate::machine::{Notices, Probe, Signs};
 use crate::motion::queue;
 use crate::protocol::Memory;
 
-/// The links. One for the machine, made at start-up.
+/// The links. There is one for the machine, made at start-up.
 // In this order: AVR reaches a field within 63 bytes of the first in one instruction.
 #[repr(C)]
 pub struct Links {
-    /// All of this is thread mode's.
+    /// Shows that all of this belongs to thread mode.
     pub thread: Thread,
     /// The number of the port that feeds the machine.
     pub feeder: Cell<u8>,
     /// The planner works on `commands`.
     pub commands_taken: Cell<bool>,
-    /// There is a line, or the planner is ready: the parser looks again.
+    /// A line has come, or the planner is ready: the parser looks again.
     pub parser_wake: Wake,
-    /// `commands` was filled.
+    /// `commands` has been filled.
     pub planner_wake: Wake,
     /// Something that reports show may have changed.
     pub reporter_wake: ReporterWake,
-    /// The reader waits for it when a pool is full.
+    /// A line has left a pool. The reader waits for this when a pool is full.
     pub pool_space: Wake,
-    /// A chain of lines may wait for more: the power task has the planner look.
+    /// A chain of lines may wait for more. The power task then has the planner look.
     pub chain_waits: Cell<bool>,
     /// What the planner has to look at before the next line.
     pub changes: Changes,
     /// The built-in job that runs.
     pub job: Cell<Job>,
-    /// A new rate of USB, in bits a second: the parser sets it when its response has left.
+    /// A new rate of USB, in bits a second. The parser sets it when its response has left.
     pub rate: Cell<Option<u32>>,
-    /// The machine is to start anew, in its boot loader if so: the parser sees to it when its response has left.
+    /// The machine is to be reset; `true` starts its boot loader. The parser does so when its response has left.
     pub restart: Cell<Option<bool>>,
-    /// What has to be put away, and where the rest is.
+    /// What has to be saved, and where the other settings are.
     pub storage: &'static Storage,
-    /// A tilde: what has stopped goes on.
+    /// A tilde has come: what has stopped goes on.
     pub cycle_start: Wake,
     /// Blocks that came and went, for queue reports.
     pub queue_count: QueueCount,
@@ -87,14 +87,15 @@ pub struct Links {
     pub notices: Notices,
     /// What probing has found.
     pub probe: Probe,
-    /// Real-time characters that have not had all their effect yet. Of the control task and the reader, with `tasks::hold`.
+    /// Real-time characters that have not had all their effect yet. They belong to the control task and the reader,
+    /// with `tasks::hold`.
     pub signs: Signs,
-    /// How heaters stand, and what the planner waits for.
+    /// The state of the heaters, and what the planner waits for.
     pub heat: Heaters,
     /// The SD card, and the file that is printed from it.
     #[cfg(feature = "sd")]
     pub card: &'static RefCell<crate::card::Card>,
-    /// What dialects keep between reports.
+    /// What dialects remember between reports.
     pub report: RefCell<Memory>,
     /// The serial ports.
     pub ports: [Port; PORTS],
@@ -106,34 +107,35 @@ pub struct Links {
     pub settings: RefCell<Settings>,
 }
 
-/// What has changed beside the lines: whoever changes it notes it, the planner takes it before the next line.
+/// What has changed other than by lines. Whoever changes it notes it, and the planner takes it before the next line.
 pub struct Changes(Cell<u8>);
 
 impl Changes {
-    /// What steps mean: they are counted anew.
+    /// The meaning of steps has changed: they are to be counted anew.
     pub const STEPS: u8 = 1;
-    /// A setting.
+    /// A setting has changed.
     pub const SETTINGS: u8 = 2;
 
-    /// Coolant has been switched, not by a line: which output, as bits of [`outputs`]. Twice is as if it had not.
+    /// Coolant outputs that have been switched other than by a line, as bits of [`outputs`]. To switch one twice is no
+    /// change.
     pub const COOLANT: u8 = outputs::MIST | outputs::FLOOD;
 
-    /// With these.
+    /// A set in which these bits are noted.
     pub const fn new(bits: u8) -> Self {
         Self(Cell::new(bits))
     }
 
-    /// These have changed.
+    /// Notes that these bits have changed.
     pub fn note(&self, bits: u8) {
         self.0.set(self.0.get() | bits);
     }
 
-    /// These outputs have been switched.
+    /// Notes that these outputs have been switched.
     pub fn flip(&self, outputs: u8) {
         self.0.set(self.0.get() ^ outputs & Self::COOLANT);
     }
 
-    /// The outputs that have been switched, since this was asked last.
+    /// Returns the outputs that have been switched since the last call.
     #[inline(always)]
     pub fn take_flipped(&self) -> u8 {
         let bits = self.0.get();
@@ -141,19 +143,19 @@ impl Changes {
         bits & Self::COOLANT
     }
 
-    /// Whether nothing has.
+    /// Whether nothing has changed.
     #[inline(always)]
     pub fn is_empty(&self) -> bool {
         self.0.get() == 0
     }
 
-    /// Whether this has.
+    /// Whether this bit has changed.
     #[inline(always)]
     pub fn has(&self, bit: u8) -> bool {
         self.0.get() & bit != 0
     }
 
-    /// Whether this has, since it was taken last.
+    /// Whether this bit has changed since it was taken last.
     #[inline(always)]
     pub fn take(&self, bit: u8) -> bool {
         let bits = self.0.get();
@@ -171,18 +173,18 @@ pub struct QueueCount {
 }
 
 impl QueueCount {
-    /// A block has been queued.
+    /// Counts a block that has been queued.
     pub fn add(&self) {
         self.added.set(self.added.get().wrapping_add(1));
     }
 
-    /// Blocks added since the last call.
+    /// Returns how many blocks have been added since the last call.
     pub fn take_added(&self) -> i32 {
         let added = self.added.get();
         added.wrapping_sub(self.told_added.replace(added)).into()
     }
 
-    /// Blocks removed since the last call.
+    /// Returns how many blocks have been removed since the last call.
     pub fn take_removed(&self) -> i32 {
         let removed = self.added.get().wrapping_sub(queue::used_here() as u16);
         removed.wrapping_sub(self.told_removed.replace(removed)).into()
@@ -193,12 +195,13 @@ machine_static! {
     fn waits() -> SharedByte = SharedByte::new(1);
 }
 
-/// Exec waits for a block, or no more. Exec only.
+/// Notes whether exec waits for a block. Exec only.
 pub fn wait_for_block(yes: bool) {
     waits().set(yes.into());
 }
 
-/// A block has been queued: exec is pended if it waits for one. Else it looks when a segment has been used up.
+/// Pends exec if it waits for a block, now that one has been queued. Otherwise exec looks when a segment has been used
+/// up.
 pub fn feed() {
     if waits().get() != 0 {
         crate::hal::exec::pend();

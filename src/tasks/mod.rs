@@ -1,8 +1,9 @@
-//! The tasks. Each is a thin `async fn` around a part that knows nothing of tasks; `links` lists
-//! everything that connects them.
+//! The tasks. Each is a thin `async fn` around a part that knows nothing of tasks; `links` lists everything that
+//! connects them.
 //!
-//! An `async fn` keeps its arguments beside what it makes of them, for as long as it runs. Where that tells, `run` is
-//! a function that returns an async block instead, which keeps what it uses.
+//! The future of an `async fn` stores the arguments beside what the function makes of them, for as long as it runs.
+//! Where that costs too much RAM, `run` is a function that returns an async block instead: its future stores only what
+//! the block uses.
 
 pub mod alarm;
 #[cfg(feature = "sd")]
@@ -41,7 +42,7 @@ pub mod wake;
 
 pub use crate::hal::Never;
 
-/// Tasks that wait for a time. `xtask/src/layers.rs` looks whether these are all.
+/// Tasks that wait for a time. `xtask/src/layers.rs` checks that the list is complete.
 pub const WAIT_FOR_TIME: [&str; 3] = ["power", "reporter", "storage"];
 const _: () = assert!(
     WAIT_FOR_TIME.len() <= avr_embassy::timers::TIMERS,

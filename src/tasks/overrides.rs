@@ -1,11 +1,11 @@
-//! The overrides in force: one state for all who change it, and all who go by it.
+//! The overrides in force: one state for everyone who changes overrides or goes by them.
 //!
-//! Changed by requests and real-time characters ([`change`]), and by M48 to M51 and the end of a
-//! program when exec comes to them ([`change_in_stream`]). Exec goes by the factors from its next stretch on: what is
-//! queued takes 9 ms at most. A factor that rises waits for the planner (`motion::replan`), which the
+//! Requests and real-time characters change overrides ([`change`]). So do M48 to M51 and the end of a program, when
+//! exec comes to them ([`change_in_stream`]). Exec goes by the factors from its next stretch on: the stretches that
+//! are queued already take 9 ms at most. A factor that rises waits for the planner (`motion::replan`), which the
 //! control task wakes: [`Event::Realtime`]. Nothing here waits, and nothing can be full.
 //!
-//! [`tell`] passes the factor of the spindle's speed on to those who drive it.
+//! [`tell`] passes the factor of the spindle's speed on to the spindle.
 
 use super::common::{self, Common};
 use super::jog;
@@ -20,16 +20,16 @@ use crate::motion::factors::Factors;
 use crate::motion::queue::{self, BlockSource};
 use crate::realtime::{Asked, NO_JOG, TRAVERSE};
 
-/// The least that characters ask for in grbl's dialect.
+/// The least override that characters ask for in grbl's dialect, thousandths.
 const LEAST_IN_ORDER: u16 = 100;
 
-/// The overrides as they are.
+/// Returns the overrides as they are.
 #[small]
 pub fn now(thread: Thread) -> Overrides {
     common::with(thread, |common| common.overrides)
 }
 
-/// Changes them at once.
+/// Changes the overrides at once.
 #[small]
 pub fn change(thread: Thread, change: Change) {
     exec::lock(thread, |ceiling| {
@@ -42,7 +42,7 @@ pub fn change(thread: Thread, change: Change) {
     flags::set(Event::Realtime);
 }
 
-/// Has feed rates be as programmed whatever overrides are, or not any more. Planner only.
+/// Fixes feed rates as programmed, whatever the overrides are, or ends that. Planner only.
 #[cfg(feature = "drivers")]
 pub fn fix_feed(thread: Thread, fixed: bool) {
     exec::lock(thread, |ceiling| {
@@ -55,12 +55,12 @@ pub fn fix_feed(thread: Thread, fixed: bool) {
     flags::set(Event::Realtime);
 }
 
-/// Nothing fixes them.
+/// In an image without drivers, nothing fixes feed rates.
 #[cfg(not(feature = "drivers"))]
 #[inline(always)]
 pub fn fix_feed(_thread: Thread, _fixed: bool) {}
 
-/// The moves behind which the change stands have been prepared. Exec only.
+/// Makes a change that stands in the stream: the moves before it have been prepared. Exec only.
 #[small]
 pub fn change_in_stream(overrides: &mut Overrides, change: Change, blocks: &mut BlockSource) {
     overrides.change(change);
@@ -68,8 +68,8 @@ pub fn change_in_stream(overrides: &mut Overrides, change: Change, blocks: &mut 
     flags::set(Event::Realtime);
 }
 
-/// Does what real-time characters ask for. A step that would go too far goes as far as may be; whatever they ask for
-/// counts from then on. Control only.
+/// Does what real-time characters ask for, at once. A step that would go too far goes as far as possible, and further
+/// steps count from there. Control only.
 #[small]
 pub fn serve(links: &Links) {
     for port in &links.ports {
@@ -107,13 +107,13 @@ fn step(thread: Thread, which: Override, percent: i8, anew: bool, least: u16) {
         return;
     }
     let before = if anew { FULL } else { now(thread).factor(which) };
-    // One that has been set lower is not raised by asking for less.
+    // If it has been set lower, asking for less does not raise it.
     let least = least.min(before).cast_signed();
     let factor = (before.cast_signed() + 10 * i16::from(percent)).max(least);
     change(thread, Change::to(which, factor.cast_unsigned().min(which.most())));
 }
 
-/// Tells the others that they may have changed. Control only.
+/// Tells other tasks that overrides may have changed. Control only.
 #[small]
 pub fn tell(links: &Links) {
     spindle::follow(links.thread, now(links.thread).in_force(Override::Spindle));
@@ -122,7 +122,7 @@ pub fn tell(links: &Links) {
     links.reporter_wake.signal();
 }
 
-/// What motion goes by. 1 is exact: velocities are as programmed, to the bit.
+/// Returns the factors that motion goes by. A factor of 1 is exact: velocities are then as programmed, to the bit.
 #[inline(never)]
 #[small]
 fn factors(overrides: &Overrides) -> Factors {

@@ -1,7 +1,7 @@
 //! Control lines that overtake data in the receive ring.
 //!
-//! When the pool takes no more lines in order, bytes stay in the ring. The reader looks on through them for short control lines,
-//! so that a stop or a question never waits for the moves before it:
+//! When the pool takes no more lines in order, bytes stay in the ring. The reader looks on through them for short
+//! control lines, so that a stop or a question never waits for the moves before it:
 //!
 //! ```text
 //!  pool  | g1x1.. | g1x2.. | g1x3   part |  reserve  |
@@ -9,12 +9,17 @@
 //!             | 00 | g1x4 |                   and what is before it in the ring moves up
 //! ```
 //!
-//! A line overtakes if it has come whole, is no longer than the pool's reserve and is a control line. A longer one waits in order, and
-//! shorter ones overtake it. Its sender's count stays right: its bytes count with it, and their room is free when it is answered.
-//! Only of its end one byte may stay, which counts nothing: of a carriage return, which a line feed may follow, and of one that is the
-//! newest of a full ring. While lines are being dropped, up to a slot of the ring, nothing moves there, and `serial::TAKEN` stands
-//! for each byte.
-//! Each byte is looked at once (11 cycles), those of a line whose end has not come each time that the reader looks.
+//! A line overtakes if it has come whole, is no longer than the pool's reserve, and is a control line. A longer
+//! control line waits in order, and shorter ones overtake it. The sender's count stays right: the bytes of the line
+//! count with the line, and their room is free when the line has been answered. At most one byte of the line's end
+//! stays in the ring and counts nothing. It is a carriage return that a line feed may follow, or the newest byte of a
+//! full ring.
+//!
+//! While lines are being dropped, up to a slot of the ring, bytes there do not move: `serial::TAKEN` stands for each
+//! byte of a line that has been taken.
+//!
+//! Each byte is looked at once (11 cycles). The bytes of a line whose end has not come are looked at each time that
+//! the reader looks.
 
 use super::lines::{LinePool, is_blank};
 use super::links::Links;
@@ -26,17 +31,17 @@ use crate::protocol::may_be_control;
 pub struct Scan {
     /// How many of the bytes that wait have been looked at.
     pub(super) looked: u8,
-    /// What follows is a part of a line that does not overtake.
+    /// What follows is the rest of a line that does not overtake.
     pub(super) within: bool,
     /// How many of the bytes that wait have been searched for alarms: 0, or up to the beginning of a line.
     pub(super) stops: u8,
-    /// How many of the lines there have begun an alarm.
+    /// How many of the lines in the ring have begun an alarm.
     pub(super) begun: u8,
 }
 
-/// What begins at a place.
+/// What begins at a place in the ring.
 enum Found {
-    /// A line that may overtake, of so many bytes without its end.
+    /// A line that may overtake, of this many bytes without its end.
     Line(u8),
     /// A question mark, which needs no end.
     Question,
@@ -47,10 +52,10 @@ enum Found {
 }
 
 impl Scan {
-    /// A scan that has looked at nothing.
+    /// A scan that has looked at nothing yet.
     pub const NONE: Self = Self { looked: 0, within: false, stops: 0, begun: 0 };
 
-    /// The reader has taken so many bytes in order.
+    /// Notes that the reader has taken this many bytes in order.
     #[inline(always)]
     pub fn pass(&mut self, count: u8) {
         if self.looked | self.stops != 0 {
@@ -65,8 +70,8 @@ impl Scan {
         self.stops != 0
     }
 
-    /// Looks on; takes the lines that overtake, as long as there is room for them. Whether there were any. If the ring `closes`
-    /// behind them it has fewer bytes then, which are to be released.
+    /// Looks on, and takes the lines that overtake, as long as there is room for them. Returns whether there were any.
+    /// If the ring `closes` behind them, it has fewer bytes afterwards, and the difference is to be released.
     #[inline(never)]
     #[small]
     pub fn run(
@@ -77,7 +82,7 @@ impl Scan {
         closes: bool,
     ) -> bool {
         if self.looked == 0 {
-            // A question has no end of its own: what follows is another line.
+            // A question mark has no end: what follows is another line.
             self.within = pool.is_within_line() && !pool.is_asking();
         }
         let mut took = false;
@@ -90,7 +95,7 @@ impl Scan {
             }
             let byte = ring.get(self.looked);
             if byte < MARKS && byte != CUT && byte != GO {
-                // Bytes were lost here. The newest mark may tell of more.
+                // Bytes were lost here. If the mark is the newest byte, it may yet come to tell of more.
                 if self.looked + 1 == ring.len() {
                     break;
                 }
@@ -125,12 +130,12 @@ impl Scan {
     }
 }
 
-/// Whether a byte between two lines belongs to none.
+/// Whether a byte between two lines belongs to no line.
 fn is_nothing(byte: u8) -> bool {
     is_blank(byte) || byte < MARKS || byte == TAKEN || byte == TAKEN_RETURN
 }
 
-/// What begins at a place in the ring, if it is no longer than `most`.
+/// Returns what begins at a place in the ring. A line longer than `most` does not overtake.
 #[inline(never)]
 #[small]
 fn find(ring: &Window<'_>, at: u8, most: u8) -> Found {
@@ -153,8 +158,8 @@ fn find(ring: &Window<'_>, at: u8, most: u8) -> Found {
     }
 }
 
-/// Takes a line out of the ring into the pool, with its end if it `ends`. False if it is no control line, or its end has been lost
-/// meanwhile.
+/// Takes a line out of the ring into the pool, with its end if it `ends`. Returns false if the line is no control
+/// line, or if its end has been lost meanwhile.
 #[inline(never)]
 #[small]
 fn take(pool: &mut LinePool, ring: &mut Window<'_>, at: u8, len: u8, ends: bool) -> bool {
@@ -165,8 +170,8 @@ fn take(pool: &mut LinePool, ring: &mut Window<'_>, at: u8, len: u8, ends: bool)
     true
 }
 
-/// The place of a line that has been taken, with its end if that was a line feed, is free; or it is nobody's. How many bytes it took
-/// that are free.
+/// Frees the place of a line that has been taken, with its end if that was a line feed. If the ring does not close,
+/// marks the place as taken instead. Returns how many bytes have been freed.
 #[inline(never)]
 #[small]
 fn close(ring: &mut Window<'_>, at: u8, len: u8, closes: bool) -> u8 {
@@ -183,13 +188,14 @@ fn close(ring: &mut Window<'_>, at: u8, len: u8, closes: bool) -> u8 {
     0
 }
 
-/// Takes the end of a line. It is the only byte that may change meanwhile: if it is the newest, and the ring is full, it becomes the
-/// mark of what is lost behind it. A line feed that is lost there behind a carriage return must not count as an end.
+/// Takes the end of a line. Returns false if the end is no longer there. The end is the only byte that may change
+/// meanwhile: if it is the newest byte of a full ring, it becomes the mark of what is lost behind it. A line feed that
+/// is lost behind a carriage return there must not count as another end.
 fn take_end(ring: &mut Window<'_>, at: u8, plain: bool) -> bool {
     match ring.get(at) {
         b'\n' => ring.replace(at, b'\n', TAKEN),
         b'\r' if ring.is_full() && at + 1 == ring.len() => false,
-        // There TAKEN_RETURN is text.
+        // In the dialect of a printing host, TAKEN_RETURN is text.
         b'\r' if plain => false,
         b'\r' => ring.replace(at, b'\r', TAKEN_RETURN),
         _ => false,

@@ -1,14 +1,15 @@
 //! The parser task: takes lines, answers them, and hands what they ask for to the planner.
 //!
-//! Reads the line pools, writes `Links::commands`, the G-code model, the settings and the response;
-//! waits for lines, for the planner, and for room to transmit. Control lines are taken at any time,
-//! data lines of the port that feeds the machine only while the planner is free and no built-in job runs, so that a long job never locks the sender out. A line
-//! that has to wait for the tables ([`Status::Again`]) stays where it is, and so do those behind it. A line
-//! keeps its slot until its response has been written. Plain moves are done with at once, in a [`row`]. In an
-//! alarm lines of G-code are refused.
+//! Reads the line pools, writes `Links::commands`, the G-code model, the settings and the response; waits for lines,
+//! for the planner, and for room to transmit. Control lines are taken at any time. Data lines of the port that feeds
+//! the machine are taken only while the planner is free and no built-in job runs, so that a long job never locks the
+//! sender out. A line that has to wait for the tables ([`Status::Again`]) stays where it is, and so do the lines
+//! behind it. A line keeps its slot until its response has been written. Plain moves are carried out at once, in a
+//! [`row`]. In an alarm, lines of G-code are refused.
 //!
-//! Each port has a [`Session`] of its own, so that no port waits for the other's line: no line is begun before the first part
-//! of its response has room in the transmit ring, and a response that lacks room stays half written until there is some.
+//! Each port has a [`Session`] of its own, so that no port waits for a line of another. No line is begun before the
+//! first part of its response has room in the transmit ring. A response that lacks room stays half written until there
+//! is some.
 
 mod answer;
 mod block;
@@ -39,45 +40,46 @@ use crate::status::Status;
 use answer::{Answer, finish, go_on, has_room, leave};
 use block::{has_room_for_startup, is_working, job_line};
 
-/// Turns that an answer leaves in a row to those on other ports that have had none.
+/// How many turns in a row an answer leaves to answers on other ports that have had no turn yet.
 const PATIENCE: u8 = 8;
 /// What [`Parser::turns`] returns for a port on which no answer can go on.
 const NONE: u8 = u8::MAX;
 
-/// How many turns in a row an answer leaves to a report that ends its line for it.
+/// How many turns in a row are left to a report that ends its line early for an answer.
 const LEAVES: u8 = 2;
 
-/// A port's transmitter, while it is the parser's.
+/// The transmitter of a port, while the parser has it.
 pub(super) type Line = MutexGuard<'static, NoopRawMutex, Tx>;
 
-/// What the parser is about on a port.
+/// What the parser does on a port.
 enum Session {
     /// The parser does nothing on the port.
     Idle,
     /// The parser answers a line.
     Answer(Answer),
-    /// The line has been answered; it changes the rate, or resets the machine, when the response has left: since when
-    /// there is nothing more of that in the ring, ms.
+    /// The line has been answered. The rate changes, or the machine is reset, when the response has left. The number
+    /// is the time at which the transmit ring was first seen empty, ms.
     Leave(Line, Option<u16>),
 }
 
-/// What has been done at once.
+/// What a turn has come to.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Turn {
-    /// Something; there may be more.
+    /// Something has been done; there may be more to do.
     More,
     /// Nothing has been done.
     Nothing,
 }
 
-/// Whether the next line of G-code of the feeder, which has its place in the order again when it is begun anew, waits for rest. Lines that overtake come before it.
+/// Whether the feeder's next line of G-code waits for the machine to rest. The line stays in the pool and is begun
+/// anew then. Lines that overtake come before it.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Deferred {
-    /// It does not.
+    /// The line does not wait.
     No,
-    /// It is carried out at rest.
+    /// The line is carried out when the machine rests.
     Line,
-    /// It has been carried out, and is answered at rest.
+    /// The line has been carried out, and is answered when the machine rests.
     Answer,
 }
 
@@ -87,15 +89,17 @@ enum Deferred {
 struct Parser {
     links: &'static Links,
     planner: &'static planner::Shared,
-    /// The ports, as bits, that have something to say and lack room.
+    /// The ports, as bits, that have something to send and lack room for it.
     lacking: u8,
-    /// The port whose line had its turn last, the first turn of G-code of the feeder aside: it is the other one's turn.
+    /// The port that had the last turn; the other port is next. The first turn of a feeder's line of G-code does not
+    /// count.
     last: u8,
-    /// A line of G-code was begun last: others come before the next one.
+    /// The line that was begun last is G-code of the feeder: other lines come before the next one.
     has_fed: bool,
-    /// The next line of G-code waits for rest.
+    /// Whether the next line of G-code waits for rest.
     deferred: Deferred,
-    /// How many turns in a row have been left to others: by a long answer to short ones, by a line that waits to a report.
+    /// How many turns in a row have been left to others: by a long answer to short ones, or by a line that waits to a
+    /// report.
     waited: u8,
     sessions: [Session; PORTS],
     /// The line of a file on the SD card.
@@ -126,7 +130,7 @@ pub fn run(
                 yield_now().await;
             }
             match parser.turn() {
-                // The reader has its turn, and stops the sender in time.
+                // The reader has its turn, so that it stops the sender in time.
                 Turn::More => yield_now().await,
                 Turn::Nothing => parser.wait().await,
             }
@@ -135,8 +139,8 @@ pub fn run(
 }
 
 impl Parser {
-    /// Does what can be done at once. A [row](row::run) of lines begins when nothing else is to be done: they come as fast as
-    /// they are answered, and would keep the other port waiting.
+    /// Does what can be done at once. A [row](row::run) of lines begins only when there is nothing else to do: its
+    /// lines come as fast as they are answered, and would keep the other port waiting.
     #[inline(always)]
     fn turn(&mut self) -> Turn {
         let links = self.links;
@@ -146,7 +150,7 @@ impl Parser {
         let waits = self.deferred != Deferred::No && is_working(links);
         let data = free && !runs_job && !self.is_feeding() && !waits;
         let straight = !alarmed && !matches!(machine::cycle(), Cycle::Check | Cycle::Jog);
-        // What a port is told at once goes first: an acknowledgement is not to wait for a move.
+        // What a port is told at once goes first: an acknowledgement must not wait for a move.
         let declined = if data && straight && self.is_idle() && !self.has_more() {
             match row::run(links, self.planner) {
                 Row::Over => false,
@@ -186,7 +190,8 @@ impl Parser {
         self.feed.is_busy()
     }
 
-    /// Goes on with the line of the SD card, or begins with the next one. Whether there may be more to do at once.
+    /// Goes on with the line of the SD card, or begins with the next one. Returns whether there may be more to do at
+    /// once.
     #[cfg(feature = "sd")]
     fn feed(&mut self) -> bool {
         let more = self.is_quiet() && self.deferred == Deferred::No && self.feed.turn(self.links);
@@ -221,7 +226,7 @@ impl Parser {
         self.sessions.iter().all(|session| matches!(session, Session::Idle))
     }
 
-    /// Whether anything is under way, or to be told on a port alone.
+    /// Whether anything is under way, or is to be told on one port alone.
     #[inline(always)]
     fn has_work(&self) -> bool {
         !self.is_quiet()
@@ -240,7 +245,8 @@ impl Parser {
         self.has_work() || self.links.ports.iter().any(has_lines)
     }
 
-    /// Goes on with what is under way, and tells what a port alone is told. Whether something has come to its end.
+    /// Goes on with what is under way, and tells what one port alone is told. Returns whether something has come to
+    /// its end.
     #[inline(never)]
     fn go_on(&mut self) -> bool {
         let (mut ended, after) = (false, self.last + 1);
@@ -254,7 +260,8 @@ impl Parser {
         ended
     }
 
-    /// Goes on on one port, while another is `awaited` or not.
+    /// Goes on with one port, while an answer on another is `awaited` or not. Returns whether something has come to
+    /// its end.
     #[inline(never)]
     fn go_on_at(&mut self, number: u8, awaited: bool) -> bool {
         let links = self.links;
@@ -278,14 +285,14 @@ impl Parser {
             return told;
         }
         if port.number == USB && links.rate.get().is_some() {
-            // The other port has asked for it.
+            // The other port has asked for the new rate.
             leave(port.tx.try_lock().ok(), session);
         }
         false
     }
 
-    /// Whether the answer on a port leaves its turn to a control line that waits on another, [`PATIENCE`] times in a row at most: short
-    /// answers come first. If not, the port has its turn.
+    /// Whether the answer on a port leaves its turn to a control line that waits on another port: short answers come
+    /// first. This happens [`PATIENCE`] times in a row at most. If the result is false, the port has its turn.
     #[inline(never)]
     fn leaves_its_turn(&mut self, number: u8) -> bool {
         let leaves = self.is_awaited(number);
@@ -300,15 +307,16 @@ impl Parser {
         false
     }
 
-    /// Whether an answer is under way on a port, and one on another has had no turn yet.
+    /// Whether an answer is under way on a port while one on another port has had no turn yet.
     #[inline(never)]
     fn is_awaited(&self, number: u8) -> bool {
         let turns = self.turns(number);
         turns != NONE && (0..PORTS as u8).any(|other| other != number && self.turns(other) < turns)
     }
 
-    /// How many turns the answer on a port has had. 0: a control line waits for its first, or a `?` is being answered. 1: another answer is
-    /// under way. [`NONE`]: nothing of that waits there, or the port has no room for an answer.
+    /// Returns how many turns the answer on a port has had. 0: a control line or a `?` waits for its first turn, or a
+    /// `?` is being answered. 1: another answer is under way, or the answer lacks room. [`NONE`]: there is nothing to
+    /// answer, or the port has no room to begin an answer.
     #[inline(never)]
     fn turns(&self, number: u8) -> u8 {
         let at = usize::from(number);
@@ -320,14 +328,15 @@ impl Parser {
             Some((port, Session::Idle))
                 if port.asks_report() || port.lines.borrow().has_controls() =>
             {
-                // A report that is being told there ends its line soon.
+                // A report that is being sent there does not count as a lack of room: it ends its line soon.
                 if has_room(port) == Some(false) { NONE } else { 0 }
             }
             _ => NONE,
         }
     }
 
-    /// Whether the report on the port whose turn it is gets a turn first: it ends its line for the answer that waits.
+    /// Whether a report on the port whose turn it is goes on first. It ends its line early for the control line that
+    /// waits there.
     #[inline(never)]
     fn leaves_to_report(&mut self) -> bool {
         let at = usize::from((self.last + 1) % PORTS as u8);
@@ -345,7 +354,8 @@ impl Parser {
         leaves
     }
 
-    /// The line to begin with. Ports have their turn one after the other, and G-code has its own between two other lines.
+    /// Returns the line to begin with. Ports take turns, and between two lines of the feeder's G-code another line has
+    /// its turn.
     #[inline(never)]
     fn next_line(&mut self, data: bool) -> Option<Chosen> {
         let first = if self.has_fed { self.in_turn(false) } else { None };
@@ -358,15 +368,16 @@ impl Parser {
         Some(chosen)
     }
 
-    /// The next line of the first port that has one, beginning behind the one that was last.
+    /// Returns the next line of the first port that has one. The search starts behind the port that was last.
     #[inline(never)]
     fn in_turn(&mut self, data: bool) -> Option<Chosen> {
         let after = usize::from(self.last) + 1;
         (after..after + PORTS).find_map(|n| self.line_of(n % PORTS, data))
     }
 
-    /// The next line of a port. G-code of the feeder is taken only if `data` is wanted; G-code of another port is taken at any time, and
-    /// refused. During a flush only lines that have been dropped are taken, to be refused.
+    /// Returns the next line of a port. G-code of the feeder is taken only if `data` is wanted. G-code of another port
+    /// is taken at any time, and refused. During a flush, only control lines and lines that have been dropped are
+    /// taken.
     #[inline(never)]
     fn line_of(&mut self, number: usize, data: bool) -> Option<Chosen> {
         let links = self.links;
@@ -374,7 +385,7 @@ impl Parser {
         let flushes = machine::is_flushing();
         let any = data || flushes || port.number != links.feeder.get();
         let (id, class) = port.lines.borrow().next(any)?;
-        // What follows a reset waits for the greeting.
+        // A line that follows a reset waits for the greeting.
         let waits = (flushes && class == Class::Data)
             || (port.is_resetting() && !matches!(class, Class::Fault(_)));
         if !matches!(session, Session::Idle) || waits {
@@ -385,7 +396,7 @@ impl Parser {
         has_room.then_some(Chosen { port, id, class })
     }
 
-    /// Takes a line: most are answered to the end at once.
+    /// Begins with a line. Most lines are answered to the end in this turn.
     #[inline(never)]
     fn take(&mut self, chosen: Chosen, declined: bool) {
         let (links, awaited) = (self.links, self.is_awaited(chosen.port.number));
@@ -402,7 +413,7 @@ impl Parser {
     /// Waits until something may go on.
     fn wait(&self) -> impl Future<Output = ()> + '_ {
         let links = self.links;
-        // Whoever still waits does not wait for the CPU.
+        // An answer that is still due does not wait for the CPU.
         set_asked(false);
         let mut asked = false;
         poll_fn(move |cx| {
@@ -443,7 +454,7 @@ impl Parser {
                 }
             }
             if ready && !waited {
-                // Others have their turn first.
+                // Other tasks have their turn first.
                 cx.waker().wake_by_ref();
                 return Poll::Pending;
             }
@@ -452,7 +463,8 @@ impl Parser {
     }
 }
 
-/// Answers who asks whether anybody is there, or tells of bytes that were lost. False if that has to wait.
+/// Answers a sender that asks whether anybody is there, or tells it that bytes were lost. Returns false if that has to
+/// wait.
 #[inline(never)]
 #[small]
 fn tell(links: &Links, port: &Port) -> bool {
@@ -465,7 +477,7 @@ fn tell(links: &Links, port: &Port) -> bool {
     told
 }
 
-/// How it goes on with a line.
+/// What has become of a line that was begun.
 enum Begun {
     /// The line is being answered.
     Answer,
@@ -475,8 +487,8 @@ enum Begun {
     Again,
 }
 
-/// Begins with a line. One of G-code has run after that, for data lines are taken only while the
-/// planner is free.
+/// Begins with a line. Its G-code has run when the answer begins, because data lines are taken only while the planner
+/// is free.
 #[inline(never)]
 fn begin(
     links: &Links,
@@ -514,7 +526,7 @@ fn begin(
             _ => run_block(links, port, block.of(line), declined),
         };
         if status == Status::Again {
-            // Its number counts when it is begun for good.
+            // The line number counts only when the line is begun for good.
             port.speech.set(before);
             if machine::cycle() == Cycle::Jog {
                 *deferred = Deferred::Line;
@@ -545,7 +557,7 @@ fn begin(
     Begun::Answer
 }
 
-/// Begins to answer a `?`, which is no line, if there is room for that.
+/// Begins to answer a `?`, which is no line, if there is room. Returns whether the answer has begun.
 #[inline(never)]
 #[small]
 fn begin_report(port: &Port, session: &mut Session) -> bool {

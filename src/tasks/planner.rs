@@ -1,9 +1,9 @@
 //! The planner task: canonical commands into blocks.
 //!
-//! Reads `Links::commands` and the settings, writes the block queue, waits for commands, for room in
-//! the queue, and at a program stop for cycle start if the settings say so. One turn builds one block.
-//! While the task waits for a line the parser has plain moves carried out itself ([`take_at_once`]).
-//! In a queue flush it forgets the line, has exec drop the blocks, and starts from where the motors are.
+//! Reads `Links::commands` and the settings, writes the block queue. Waits for commands, for room in the queue, and at
+//! a program stop for cycle start if the settings say so. One turn builds one block. While the task waits for a line,
+//! the parser has plain moves carried out itself ([`take_at_once`]). In a queue flush the planner forgets the line,
+//! has exec drop the blocks, and starts from where the motors are.
 
 #[cfg(feature = "bed-plane")]
 mod bed;
@@ -63,31 +63,31 @@ use crate::units::{AXES, Length, PerAxis};
 #[repr(C)]
 pub struct Planner {
     links: &'static Links,
-    /// The N word of the line that is carried out.
+    /// The N word of the line that is being carried out.
     line: u32,
-    /// Since when a chain waits, ms.
+    /// When the chain that waits got its last line, ms.
     waits_since: u16,
-    /// Chains in a row that nothing went on with.
+    /// How many lines in a row have not gone on with a chain.
     alone: u8,
-    /// What is told before anything else of the line.
+    /// What exec is told before anything else of the line.
     announcement: Announcement,
     queue: BlockQueue,
     /// What exec has been told to switch.
     outputs: Outputs,
-    /// Exec has been told of a surface speed, and in `per_turn` whether feeds are per turn.
+    /// Exec has been told of a surface speed; in `per_turn`, that feeds are per turn.
     has_surface: bool,
     per_turn: bool,
     begun: Begun,
-    /// Where the last block ends, machine coordinates.
+    /// Where the last block ends, in machine coordinates.
     position: PerAxis<Length>,
     builder: Builder,
     dynamics: Dynamics,
-    /// What exec has been told that drivers ask for.
+    /// The demands of the drivers that exec has been told of.
     drivers: Drivers,
     /// A heater or the fan has been switched on since the last end of a program.
     #[cfg(feature = "printer")]
     heats: bool,
-    /// What exec has been told of the extruder's lead.
+    /// The extruder's lead that exec has been told of.
     #[cfg(feature = "printer")]
     lead: Lead,
     /// How far the line has been carried out.
@@ -95,32 +95,32 @@ pub struct Planner {
     walk: Ongoing,
 }
 
-/// What a line has left to be done.
+/// What of a line is left to be done.
 enum Begun {
     /// Nothing is left.
     Nothing,
     /// The rest of the line's parts.
     Parts(Parts),
-    /// Nothing is left, but lines are checked only: these are the modes before the line.
+    /// Nothing is left. Lines are only checked, and these are the modes from before the check.
     Check(Modes),
-    /// The line and those before it, from `position` on: the next line may go on with them.
+    /// A chain: the line and lines before it, from `position` on. The next line may go on with it.
     Chain(Chain),
 }
 
-/// What has changed beside the line.
+/// What exec is to be told that no line says.
 #[derive(Clone, Copy, PartialEq)]
 enum Announcement {
     /// Nothing has changed.
     None,
-    /// What steps mean: they are counted anew.
+    /// The meaning of steps has changed: they are counted anew.
     Position,
-    /// What the drivers ask for, perhaps.
+    /// The demands of the drivers may have changed.
     Drivers,
-    /// The extruder's lead, perhaps.
+    /// The extruder's lead may have changed.
     Lead,
 }
 
-/// What a turn of the planner led to.
+/// What a turn of the planner has led to.
 #[derive(Clone, Copy, PartialEq)]
 enum Turn {
     /// There is more to do.
@@ -144,8 +144,8 @@ enum Turn {
     Done,
 }
 
-/// The planner, lent to one at a time: to its task from a line's first block to the last one, to the parser, for a [row](super::row), while the task waits
-/// for a line.
+/// The planner, lent to one task at a time. Its own task has it from the first block of a line to the last. The parser
+/// has it for a [row](super::row), while the planner's task waits for a line.
 pub type Shared = Mutex<NoopRawMutex, Planner>;
 
 /// The task.
@@ -176,14 +176,14 @@ pub fn run(links: &'static Links, shared: &'static Shared) -> impl Future<Output
                         Turn::Pause => planner.cycle_start().await,
                         #[cfg(feature = "probing")]
                         Turn::Probe => planner.probe().await,
-                        // No line asks for it.
+                        // No line probes without the feature.
                         #[cfg(not(feature = "probing"))]
                         Turn::Probe => {}
                         #[cfg(feature = "lathe")]
                         Turn::AwaitSpindle | Turn::Thread => {
                             planner.thread(turn == Turn::Thread).await
                         }
-                        // No line asks for it.
+                        // No line cuts a thread without the feature.
                         #[cfg(not(feature = "lathe"))]
                         Turn::AwaitSpindle | Turn::Thread => {}
                         Turn::Home => planner.home().await,
@@ -209,9 +209,10 @@ pub fn run(links: &'static Links, shared: &'static Shared) -> impl Future<Output
     }
 }
 
-/// Carries out the move in `Links::commands`, while the planner's task waits for a line, if there is room: neither a wake-up of the task nor a turn of
-/// the executor comes between. False, and nothing done that the task would not do, if that has to. Thread mode, the parser's turn. Cost: that of a
-/// block, 9,000 cycles; of a move that goes on with those before it 1,400.
+/// Carries out the move in `Links::commands` while the planner's task waits for a line, if there is room. Neither a
+/// wake-up of that task nor a turn of the executor comes between. Returns false if the task has to carry the move out;
+/// nothing has been done then that the task would not do. Thread mode, in the parser's turn. Cost: 9,000 cycles if a
+/// block is planned; 1,400 for a move that goes on with those before it.
 pub fn take_at_once(planner: &mut Planner) -> bool {
     if planner.is_flushed() || planner.owes_answers() {
         return false;
@@ -221,24 +222,24 @@ pub fn take_at_once(planner: &mut Planner) -> bool {
     if planner.has_chain() {
         planner.links.chain_waits.set(true);
         if queue::used_here() <= 1 {
-            // Exec may have finished a block meanwhile, of which the task has not heard.
+            // Exec may have finished a block meanwhile without the planner's task having heard of it.
             planner.make_up();
         }
         if !had_chain {
-            // The task sees to it that nothing waits long.
+            // The task sees to it that the chain does not wait long.
             planner.links.planner_wake.signal();
         }
     }
     done
 }
 
-/// With this many blocks queued answers come before another block.
+/// With this many blocks queued, answers come before another block.
 const ENOUGH: usize = CAPACITY / 2;
-/// How many turns answers have then: two answers, and what else thread mode does meanwhile.
+/// How many turns answers get then: enough for two answers and for what else thread mode does meanwhile.
 const PATIENCE: u8 = 16;
 
 impl Planner {
-    /// A planner that knows of no move, for a queue that is empty.
+    /// Returns a planner that knows of no move, for a queue that is empty.
     pub fn new(links: &'static Links, queue: BlockQueue) -> Self {
         Self {
             links,
@@ -264,14 +265,14 @@ impl Planner {
         }
     }
 
-    /// Whether answers that are due come before the line: a long one takes up to 40,000 cycles.
+    /// Whether answers that are due come before the line, which may take up to 40,000 cycles.
     #[inline(always)]
     fn owes_answers(&self) -> bool {
         is_asked() && queue::used_here() >= ENOUGH
     }
 
-    /// Most lines are a straight move for which there is room: no need to be prepared for a wait. False,
-    /// and nothing done, for all others.
+    /// Carries out a straight move for which there is room, as most lines are, without the means to wait. Returns
+    /// false for all other lines, without having done anything of the line.
     #[inline(never)]
     fn carry_out_at_once(&mut self) -> bool {
         let commands = self.links.commands.borrow();
@@ -293,7 +294,7 @@ impl Planner {
             self.wait_for_more(commands.line);
             return true;
         }
-        // A block is to be planned, perhaps for other overrides.
+        // A block is to be planned, and overrides may have changed.
         self.replan();
         if self.has_chain() && (self.queue.free() == 0 || !self.close_chain()) {
             return false;
@@ -320,7 +321,7 @@ impl Planner {
         true
     }
 
-    /// Begins with a line.
+    /// Begins with the line in `Links::commands`.
     #[inline(never)]
     fn begin(&mut self) {
         if !self.has_chain() {
@@ -330,7 +331,7 @@ impl Planner {
         self.take_up_changes();
     }
 
-    /// Takes up settings that have changed. Of some exec has to be told before anything else.
+    /// Takes up settings that have changed. Exec has to be told of some of them before anything else.
     #[inline(never)]
     fn take_up_changes(&mut self) {
         if self.links.changes.take(Changes::SETTINGS) {
@@ -346,7 +347,7 @@ impl Planner {
         }
     }
 
-    /// Carries out a part of the line that takes one block at most, for which there is room.
+    /// Carries out the next part of the line, which takes one block at most. There is room for a block.
     #[inline(never)]
     fn turn(&mut self) -> Turn {
         if self.is_flushed() {
@@ -453,8 +454,8 @@ impl Planner {
         Turn::More
     }
 
-    /// Whether feeds of this motion are a turn of the spindle (G95), and exec does not know of it; or the other way round. The model is where the line leads
-    /// to, and no further.
+    /// Whether the feed of this motion is per turn of the spindle (G95) while exec takes feeds as per minute, or the
+    /// other way round. The G-code model has interpreted this line and none behind it.
     #[inline(never)]
     #[small]
     fn turns_otherwise(&self, motion: &Motion) -> bool {
@@ -468,7 +469,7 @@ impl Planner {
         per_turn != self.per_turn
     }
 
-    /// Queues a straight move, or begins with its parts.
+    /// Queues a straight move, or begins with its parts if it is too long for one block.
     fn straight(&mut self, target: &PerAxis<Length>, feed: Option<Feed>) {
         match self.line(target, feed, false) {
             Built::Parts(of) => self.begun = Begun::Parts(Parts::new(target, feed, of)),
@@ -479,7 +480,7 @@ impl Planner {
         }
     }
 
-    /// Queues the next part of a move, or makes parts of it in turn.
+    /// Queues the next part of a move, or divides all parts that are left if it is still too long.
     #[inline(never)]
     #[small]
     fn part(&mut self, commands: &Commands) {
@@ -502,7 +503,7 @@ impl Planner {
         self.announce();
     }
 
-    /// Queues a straight move, for which there is room, unless it is to be made in parts or merged.
+    /// Queues a straight move, for which there is room. Queues nothing if the move is to be made in parts or merged.
     fn line(&mut self, target: &PerAxis<Length>, feed: Option<Feed>, may_merge: bool) -> Built {
         let settings = self.links.settings.borrow();
         let curve = match &self.walk {
@@ -528,14 +529,14 @@ impl Planner {
         built
     }
 
-    /// A move of the line has been queued.
+    /// Notes that the move of the line has been queued. After an exact stop the next move begins at rest.
     fn moved(&mut self, commands: &Commands) {
         if commands.exact_stop {
             self.builder.stopped();
         }
     }
 
-    /// Tells exec what has changed beside the line, one thing at a time.
+    /// Tells exec what has changed besides lines, one thing at a time.
     #[inline(never)]
     #[small]
     fn tell(&mut self) {
@@ -558,7 +559,7 @@ impl Planner {
         }
     }
 
-    /// G28.3: the position is called something else; no motor moves.
+    /// Gives the place of the machine other coordinates, as G28.3 does. No motor moves.
     #[inline(never)]
     #[small]
     fn set_position(&mut self, position: &PerAxis<Length>) {
@@ -571,7 +572,7 @@ impl Planner {
         self.push(Block::action(action, self.line));
     }
 
-    /// Tells exec what the drivers ask for, if that has changed.
+    /// Tells exec what the drivers demand, if that has changed.
     fn set_drivers(&mut self) {
         let drivers = MachineLimits::drivers(&*self.links.settings.borrow());
         if drivers != self.drivers {
@@ -580,7 +581,7 @@ impl Planner {
         }
     }
 
-    /// Plans for the overrides that are wanted.
+    /// Plans the queue anew if other overrides are wanted.
     fn replan(&mut self) {
         if let Some(wanted) = self.queue.wanted() {
             self.queue.replan(wanted);
@@ -595,7 +596,7 @@ impl Planner {
         self.announce();
     }
 
-    /// Something that is done at rest.
+    /// Queues an action that is done at rest.
     #[inline(never)]
     #[small]
     fn pause(&mut self, action: QueuedAction) {
@@ -606,7 +607,7 @@ impl Planner {
     #[inline(never)]
     #[small]
     fn push(&mut self, block: Block) {
-        // There is room: this task alone fills the queue, and asks before each turn.
+        // There is room: only this task fills the queue, and it looks for room before each turn.
         let _ = self.queue.push(block);
         self.announce();
     }
@@ -628,7 +629,7 @@ impl Planner {
             return;
         }
         machine::carry_out(machine::Event::Stopped);
-        // Who does not know of the stop would wait for ever.
+        // A sender that does not hear of the stop would wait for ever.
         self.links.except(Status::ProgramStopped);
         self.links.cycle_start.take();
         self.links.cycle_start.wait().await;
@@ -640,7 +641,8 @@ impl Planner {
         machine::is_dropping()
     }
 
-    /// Exec has dropped its blocks: planner and model start from where the motors are. Whether the program is to end.
+    /// Starts planner and model from where the motors are, when exec has dropped its blocks. Returns whether the
+    /// program is to end.
     #[inline(never)]
     #[small]
     fn restart(&mut self) -> bool {
@@ -651,7 +653,7 @@ impl Planner {
         } else {
             let motion = common::snapshot(links.thread);
             self.relocate(&motion);
-            // The line that was dropped may have been to tell of it.
+            // The announcement of the lead may have been dropped.
             self.announcement = if Capability::Printer.is_built_in() {
                 Announcement::Lead
             } else {
@@ -673,14 +675,14 @@ impl Planner {
         let (cycle, killed) = machine::dropped();
         match cycle {
             Cycle::Jog => links.notices.jogged.set(true),
-            // Motors of an axis may have moved apart.
+            // The motors of an axis may have moved apart, so that steps are counted anew.
             Cycle::Homing => links.changes.note(Changes::STEPS),
             Cycle::Probe => links.probe.abandon(),
-            // It was to begin.
+            // Check mode was about to begin.
             Cycle::Check if !self.checks() => machine::carry_out(machine::Event::Done),
             Cycle::Lines | Cycle::Stopped | Cycle::Check => {}
         }
-        // Of a reset that a sender begins with nobody is told: there was no job.
+        // If a sender begins with a reset, nobody is told: there was no job.
         let ended = !links.ports.iter().any(|port| port.asked.get() & OTHERS != 0);
         if killed && ended {
             links.except(Status::KillJob);
@@ -690,13 +692,13 @@ impl Planner {
         killed
     }
 
-    /// Says what the machine does besides carrying out lines.
+    /// Sets what the machine does besides carrying out lines, and has it reported at once.
     fn enter(&self, cycle: machine::Event) {
         machine::carry_out(cycle);
         self.links.reporter_wake.notify_now();
     }
 
-    /// Tells the others that a block has been queued.
+    /// Tells exec and the reporter that a block has been queued.
     fn announce(&self) {
         links::feed();
         self.links.queue_count.add();

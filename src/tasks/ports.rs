@@ -1,11 +1,11 @@
 //! The serial ports as tasks see them: what each has to itself, and which of them feeds the machine.
 //!
-//! Each port is answered on itself, in the mode that it was spoken to last. Control lines of every port are taken
-//! at any time. G-code comes from one port at a time, the *feeder*: the first to send some while the machine is
-//! at rest, until it is at rest again. From any other it is refused meanwhile, with status 117: to let it wait
-//! would mean to move later, when nobody expects it.
+//! Each port is answered on itself, in the mode that it was spoken to last. Control lines of every port are taken at
+//! any time. G-code comes from one port at a time, the *feeder*: the first port to send some while the machine is at
+//! rest. It stays the feeder until the machine is at rest again. G-code from any other port is refused meanwhile, with
+//! status 117: if it waited instead, it would move the machine later, when nobody expects that.
 //!
-//! Reports that nobody asked for go to the feeder, or to USB while that is on a bus that others share.
+//! Reports that nobody asked for go to the feeder, or to USB while the feeder is on a bus that it shares with others.
 
 use core::cell::{Cell, RefCell};
 
@@ -26,30 +26,31 @@ use crate::protocol::Speech;
 use crate::status::Status;
 use crate::units::{Length, PerAxis};
 
-/// How long control lines of USB may be that overtake, and those of the other port.
+/// The greatest length of control lines of USB that may overtake.
 const RESERVE: u8 = 40;
-/// See [`RESERVE`].
+/// See [`RESERVE`]; for the second port.
 pub const AUX_RESERVE: u8 = 16;
-/// How long lines may be of which footers tell how many may come: powers of two.
+/// Footers tell how many lines of this length, end included, may come. A power of two.
 const PROMISED: u8 = 32;
-/// See [`PROMISED`]; of the other port.
+/// See [`PROMISED`]; for the second port.
 const AUX_PROMISED: u8 = 16;
 
-/// The turns that a report leaves to control lines before it begins, and that it leaves to others while it is told.
+/// How many turns a report leaves to control lines before it begins, and how many to others while it is sent.
 pub const COURTESY: u8 = 8;
 
 /// A bit of [`Port::asked`]: a status report.
 pub const REPORT: u8 = 1;
-/// A bit of [`Port::asked`]: the greeting, for the machine has been reset by its sender. Lines that were dropped thereby are not answered.
+/// A bit of [`Port::asked`]: the greeting, because the sender has reset the machine. Lines that the reset has dropped
+/// are not answered.
 pub const GREETING: u8 = 2;
 /// A bit of [`Port::asked`]: before the greeting, the report that motion was interrupted.
 pub const INTERRUPTED: u8 = 4;
-/// A bit of [`Port::asked`]: before the greeting, the greeting in the other dialect, for it is not decided which one is spoken.
+/// A bit of [`Port::asked`]: before the greeting, the greeting in the other dialect, because the dialect is undecided.
 pub const OTHERS: u8 = 32;
 
-/// A bit of [`Port::asked`], beside [`INTERRUPTED`]: the motion was homing.
+/// A bit of [`Port::asked`], beside [`INTERRUPTED`]: the motion that was interrupted was homing.
 pub const HOMING: u8 = 8;
-/// A bit of [`Port::asked`]: the machine is to be reset, which control does.
+/// A bit of [`Port::asked`]: the machine is to be reset. The control task does so.
 pub const RESET: u8 = 16;
 
 /// A bit of [`Port::asked`], beside [`GREETING`]: a program has opened the port, and nothing has been reset.
@@ -69,27 +70,28 @@ pub enum Choice {
     Open = 3,
 }
 
-/// What a port has to itself.
+/// What belongs to one port.
 // In this order: AVR reaches a field within 63 bytes of the first in one instruction.
 #[repr(C)]
 pub struct Port {
-    /// Which one it is.
+    /// The number of the port.
     pub number: u8,
     /// How the sender wants to be answered.
     pub speech: Cell<Speech>,
-    /// What has decided in which dialect it is spoken.
+    /// What has decided in which dialect the port is spoken to.
     pub choice: Cell<Choice>,
-    /// What a sender has asked for by a byte, as bits: the reporter answers, a [`REPORT`] the parser.
+    /// What a sender has asked for by a byte, as bits. The parser answers a [`REPORT`]; control does a [`RESET`]; the
+    /// rest is the reporter's.
     pub asked: Cell<u8>,
-    /// The sender asks whether anybody is there: control sets it, the parser answers.
+    /// The sender asks whether anybody is there. Control sets this, and the parser answers.
     pub enquiry: Cell<bool>,
-    /// Bytes have been lost, which the parser tells.
+    /// Bytes have been lost, which the parser is to tell.
     pub lost: Cell<bool>,
-    /// The slot of the receive ring up to which lines of G-code are dropped, by a kill or flush that has come behind it.
+    /// The slot of the receive ring up to which lines of G-code are dropped. A kill or a flush has set it.
     pub cut: Cell<Option<u8>>,
-    /// The line that is being answered has begun the alarm that it asks for when it arrived ([`stop`](super::stop)).
+    /// The line that is being answered has begun its alarm when it arrived ([`stop`](super::stop)).
     pub has_stopped: Cell<bool>,
-    /// The alarm that a line is to end which waits for the machine to come to rest.
+    /// The alarm that is to be ended by a line that waits for the machine to come to rest.
     pub clears: Cell<Alarm>,
     /// Received lines.
     pub lines: RefCell<LinePool>,
@@ -99,14 +101,15 @@ pub struct Port {
     pub seen: Cell<Option<Seen>>,
 }
 
-/// Of a port on which nothing has been told. By a call: the image would have all of a new port in RAM once more, to copy this from it.
+/// Returns [`Port::seen`] of a port on which nothing has been told. By a call: the image would otherwise hold a whole
+/// new port in RAM once more, to copy this value from it.
 #[inline(never)]
 fn nothing_seen() -> Option<Seen> {
     None
 }
 
 impl Port {
-    /// A port that keeps its lines in `bytes`.
+    /// Returns a port that keeps its lines in `bytes`.
     pub fn new(number: u8, bytes: &'static mut [u8], tx: Tx) -> Self {
         Self {
             number,
@@ -127,12 +130,12 @@ impl Port {
         }
     }
 
-    /// A sender asks for something by a byte.
+    /// Notes that the sender asks for these bits of [`Port::asked`].
     pub fn ask(&self, bits: u8) {
         self.asked.set(self.asked.get() | bits);
     }
 
-    /// Takes the first of these that is asked for.
+    /// Takes a bit of [`Port::asked`]. Returns whether it was set.
     pub fn take_asked(&self, bit: u8) -> bool {
         let asked = self.asked.get();
         self.asked.set(asked & !bit);
@@ -144,12 +147,12 @@ impl Port {
         self.asked.get() & GREETING != 0
     }
 
-    /// Whether lines that nothing has been answered to are never answered: their sender has reset the machine.
+    /// Whether lines that have got no answer yet are never answered, because their sender has reset the machine.
     pub fn drops_unanswered(&self) -> bool {
         self.is_resetting() && !(uart::sees_opening() && self.asked.get() & OPENED != 0)
     }
 
-    /// Whether nothing has been said that only one dialect says, so that the first such thing decides.
+    /// Whether the dialect is undecided: the first line that is in one dialect alone will decide.
     pub fn is_undecided(&self) -> bool {
         self.choice.get() == Choice::Open
     }
@@ -159,18 +162,19 @@ impl Port {
         self.waits_for_question() || self.speech.get().is_in_order()
     }
 
-    /// Whether a `?` at the beginning of a line decides.
+    /// Whether a `?` at the beginning of a line decides the dialect.
     pub fn waits_for_question(&self) -> bool {
         Speech::HAS_QUESTION && self.is_undecided()
     }
 
-    /// Whether a printing host speaks there.
+    /// Whether a printing host speaks on the port.
     #[inline(always)]
     pub fn is_plain(&self) -> bool {
         Speech::HAS_PLAIN && self.speech.get().is_plain()
     }
 
-    /// How the two sides stop each other: characters for it are for dialects whose senders know them.
+    /// Returns how the two sides stop each other. Characters do so only in dialects whose senders know these
+    /// characters.
     pub fn flow(&self, settings: &Settings) -> Flow {
         match Flow::of(self.number, settings.flow_control()) {
             Flow::Characters if self.speech.get().is_in_order() || self.is_plain() => Flow::None,
@@ -178,7 +182,8 @@ impl Port {
         }
     }
 
-    /// How many lines may come: what footers tell. Each may be [`PROMISED`] bytes long with its end, a longer one takes several.
+    /// Returns how many lines may come, which footers tell. Each may be [`PROMISED`] bytes long with its end; a longer
+    /// one counts as several.
     #[inline(never)]
     pub fn promise(&self, lines: &LinePool) -> u8 {
         let (slots, room) = (lines.free(), lines.room());
@@ -190,8 +195,8 @@ impl Port {
         slots.min((all >> shift) as u8)
     }
 
-    /// The transmitter for a report: the answers to control lines that wait come first, as far as they take
-    /// [`COURTESY`] turns.
+    /// Returns the transmitter for a report. Answers to control lines that wait come first, for [`COURTESY`] turns at
+    /// most.
     pub async fn tx_behind_answers(&self) -> MutexGuard<'_, NoopRawMutex, Tx> {
         if is_unheard() {
             yield_now().await;
@@ -205,7 +210,7 @@ impl Port {
         self.tx.lock().await
     }
 
-    /// Whether there is something to tell on this port alone, or to answer that is no line.
+    /// Whether there is something to tell on this port alone, or a byte to answer that is no line.
     #[inline(always)]
     pub fn tells(&self) -> bool {
         self.enquiry.get() || self.lost.get() || self.asks_report()
@@ -218,45 +223,45 @@ impl Port {
     }
 }
 
-/// A line that is next.
+/// A line that is to be taken next.
 pub struct Chosen {
     /// Where it came from, and where the answer goes.
     pub port: &'static Port,
-    /// It, in the port's pool.
+    /// The line, in the port's pool.
     pub id: LineId,
-    /// What to do with it.
+    /// What to do with the line.
     pub class: Class,
 }
 
 impl Links {
-    /// The port of a number.
+    /// Returns the port with a number.
     #[inline(always)]
     pub fn port(&self, number: u8) -> &Port {
-        // There is always USB.
+        // USB always exists.
         self.ports.get(usize::from(number)).unwrap_or(&self.ports[usize::from(USB)])
     }
 
-    /// The port whose G-code is taken.
+    /// Returns the port whose G-code is taken.
     #[inline(always)]
     pub fn feeder(&self) -> &Port {
         self.port(self.feeder.get())
     }
 
-    /// The model of the machine is where the machine is.
+    /// Tells the model that the machine is at `position`.
     #[inline(never)]
     #[small]
     pub fn set_position(&self, position: &PerAxis<Length>) {
         self.model.borrow_mut().set_position(position);
     }
 
-    /// The port that is told what nobody asked for.
+    /// Returns the port that is told what nobody asked for.
     #[inline(never)]
     pub fn told(&self) -> &Port {
         let feeder = self.feeder.get();
         self.port(if is_shared(feeder) { USB } else { feeder })
     }
 
-    /// A line decides for a dialect on a port if it is said in one alone.
+    /// Decides in which dialect a port is spoken to, if `line` exists in one dialect alone.
     #[inline(never)]
     #[small]
     pub fn decide_by(&self, port: &Port, line: &[u8]) {
@@ -266,7 +271,7 @@ impl Links {
         }
     }
 
-    /// A port speaks so from now on, and does not wait for a decision any more.
+    /// Sets the dialect of a port. The port does not wait for a decision any more.
     #[inline(never)]
     #[small]
     pub fn decide(&self, port: &Port, speech: Speech, settings: &Settings) {
@@ -275,8 +280,9 @@ impl Links {
         self.decided(settings);
     }
 
-    /// A program has opened the first port. While nothing runs it is greeted as at the start, and what it says first decides anew; else it is told nothing, for
-    /// many senders take a greeting for a reset.
+    /// Handles a program that has opened the first port. While nothing runs, the program is greeted as at the start,
+    /// and what it says first decides the dialect anew. Otherwise it is told nothing, because many senders take a
+    /// greeting for a reset.
     #[inline(never)]
     #[small]
     pub fn open_anew(&self) {
@@ -297,8 +303,8 @@ impl Links {
         self.reporter_wake.notify_now();
     }
 
-    /// Ports may have begun to speak otherwise: which are eager ([`Port::is_eager`]), how the sides stop each other, and which motion mode there
-    /// is at first.
+    /// Follows a change of dialect on any port: which ports are eager ([`Port::is_eager`]), how the sides stop each
+    /// other, and which motion mode is in force at first.
     #[inline(never)]
     #[small]
     pub fn decided(&self, settings: &Settings) {
@@ -313,7 +319,7 @@ impl Links {
         }
     }
 
-    /// How the sides of each line stop each other follows from the settings and the dialect.
+    /// Sets how the sides of each line stop each other, by the settings and the dialect.
     #[inline(never)]
     #[small]
     pub fn set_flow(&self, settings: &Settings) {
@@ -325,7 +331,8 @@ impl Links {
         self.ports.iter().any(Port::is_resetting)
     }
 
-    /// Reports an exception to whoever feeds the machine, in the place of one that waits. In an alarm the one that waits may be its reason, and is kept.
+    /// Reports an exception to whoever feeds the machine. It replaces one that waits, except in an alarm, where the
+    /// one that waits may be the reason of the alarm.
     #[inline(never)]
     #[small]
     pub fn except(&self, status: Status) {
@@ -334,7 +341,7 @@ impl Links {
         }
     }
 
-    /// Reports an exception in the place of one that waits: the reason of an alarm.
+    /// Reports an exception that is the reason of an alarm. It replaces one that waits.
     #[inline(never)]
     #[small]
     pub fn except_at_once(&self, status: Status) {
@@ -342,8 +349,9 @@ impl Links {
         self.reporter_wake.signal();
     }
 
-    /// Gives the other tasks up to so many `turns`, as long as control lines wait or are being answered and `counts` says that they come
-    /// first; and one turn if bytes have come that may be such a line. A turn is 300 cycles if nobody has anything to do.
+    /// Gives other tasks up to `turns` turns, as long as control lines wait or are being answered and `counts` says
+    /// that they come first. Gives them one more turn first if bytes have come that may be such a line. A turn costs
+    /// 300 cycles if nobody has anything to do.
     pub async fn give_way(&self, turns: u8, counts: impl Fn() -> bool) {
         if is_unheard() {
             yield_now().await;
@@ -356,14 +364,14 @@ impl Links {
         }
     }
 
-    /// Whether lines of G-code wait, on any port.
+    /// Whether lines of G-code wait on any port.
     pub fn has_data(&self) -> bool {
         self.ports.iter().any(|port| port.lines.borrow().has_data())
     }
 
-    /// Whether G-code of this port is taken. It feeds the machine from now on, if that is at rest.
+    /// Whether G-code of this port is taken. If the machine is at rest, the port becomes the feeder.
     pub fn may_feed(&self, port: &Port) -> bool {
-        // A view borrows the settings.
+        // Only if needed: a view borrows the settings.
         port.number == self.feeder.get() || View::of(self, port).may_feed()
     }
 }

@@ -1,8 +1,9 @@
 //! The power task: gives motors power, and takes it from them when they have been idle.
 //!
-//! Reads the settings, the milliseconds and exec's snapshot; writes the drivers' enables. Waits for
-//! [`LOOK_MS`] between looks, and sees to the [`health`] of all besides. Exec calls [`segment`] before it queues one, so that a driver is on before
-//! its step; that costs 40 cycles a segment. Everyone else changes the state under the ceiling.
+//! Reads the settings, the milliseconds and exec's snapshot; writes the drivers' enables. Waits for [`LOOK_MS`]
+//! between looks, and also looks after the [`health`] of the firmware. Exec calls [`segment`] before it queues a
+//! segment, so that a driver is on before its step; that costs 40 cycles a segment. All others change the state under
+//! the ceiling.
 
 use super::common;
 use super::health;
@@ -30,7 +31,7 @@ pub async fn run(links: &'static Links) -> ! {
         turning::look(links);
         surface::look(links);
         if links.chain_waits.take() {
-            // Perhaps for long enough.
+            // The chain may have waited long enough.
             links.planner_wake.signal();
         }
         after_ms(LOOK_MS).await;
@@ -57,8 +58,8 @@ fn look(links: &Links) {
     }
 }
 
-/// Before a segment of a block that moves the motors `moving` (bits) is queued: they get power. Its
-/// increments would not tell: a motor may have a rest of the block before. Exec only.
+/// Gives power to the motors `moving` (bits), before a segment of a block that moves them is queued. The increments of
+/// the segment alone would not tell: a motor may still have a rest of the block before. Exec only.
 #[small]
 pub fn segment(motors: &mut Motors, moving: u8) {
     carry_out(motors, |motors| motors.segment(moving));

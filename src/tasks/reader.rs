@@ -1,10 +1,10 @@
 //! The reader task: bytes from the receive ring of each port into its line pool.
 //!
-//! Reads the receive rings, writes the line pools, waits on [`Event::Received`] or for pool space; never
-//! runs longer than the ring is full (255 bytes, about 6,000 cycles). When the pool is full the bytes
-//! stay in the ring, but for short control lines, which [overtake](super::overtake); and when that is full too bytes are lost: the line that is damaged thereby is
-//! refused, and so is each line that is lost whole. With `ex` 1 the sender is stopped before that by XOFF, and
-//! stops the machine's answers so; with `ex` 2 both are done by pins.
+//! Reads the receive rings, writes the line pools, waits on [`Event::Received`] or for pool space. Never runs longer
+//! than a full ring takes (255 bytes, about 6,000 cycles). When the pool is full, bytes stay in the ring, except for
+//! short control lines, which [overtake](super::overtake). When the ring is full too, bytes are lost: the line that is
+//! damaged is refused, and so is each line that is lost whole. With `ex` 1, XOFF stops the sender before that, and the
+//! sender may stop the machine's answers by XOFF; with `ex` 2, pins do both.
 
 use embassy_futures::select::select;
 use embassy_futures::yield_now;
@@ -28,19 +28,19 @@ use crate::machine;
 use crate::protocol::Speech;
 use crate::status::Status;
 
-/// Pieces taken before others get a turn: a piece is a line, or a part of one, and its end.
+/// How many pieces are taken before others get a turn: a piece is a line, or a part of one, and its end.
 const TURN: usize = 16;
 
-/// What a turn came to.
+/// What a turn has left.
 #[derive(PartialEq, Eq, PartialOrd, Ord)]
 enum Left {
     Nothing,
-    /// Bytes, and no room in the pool.
+    /// There are bytes, but no room in the pool.
     Full,
     Bytes,
-    /// Bytes, perhaps, behind this mark: the place of a real-time character.
+    /// There may be bytes behind this mark, which stands for a real-time character.
     Placed(u8),
-    /// Bytes, perhaps, behind a mark in a comment: there a real-time character is text, but for `^d`, which kills anywhere.
+    /// There may be bytes behind a mark in a comment. `%` and `~` are text there; only `^d` acts.
     Aside,
 }
 
@@ -76,18 +76,18 @@ pub fn run(
     }
 }
 
-/// How many bytes wait in a ring when its sender is stopped, and when it may go on.
+/// How many bytes may wait in a ring before its sender is stopped, and when the sender may go on.
 struct Levels {
-    /// More stop it by XOFF.
+    /// With more bytes than this, XOFF stops the sender.
     characters: u8,
-    /// More stop it by a pin.
+    /// With more bytes than this, a pin stops the sender.
     pins: u8,
-    /// With fewer it goes on.
+    /// With fewer bytes than this, the sender goes on.
     low: u8,
 }
 
 impl Levels {
-    /// Those of a ring of so many bytes.
+    /// Returns the levels of a ring of this size.
     const fn of(ring: usize) -> Self {
         Self {
             characters: high_water(Flow::Characters, ring) as u8,
@@ -101,17 +101,17 @@ impl Levels {
 struct Intake {
     port: &'static Port,
     received: Received,
-    /// Lost line ends that have been seen to, of `lost_ends`.
+    /// How many of the lost line ends (`lost_ends`) have been seen to.
     seen: u16,
-    /// Lines that are still to be refused.
+    /// How many lost lines are still to be refused.
     refused: u16,
-    /// The mark that told of them.
+    /// The mark that has told of the lost lines.
     then: u8,
     /// How the sender has been stopped.
     stopped: Flow,
-    /// The receive interrupt may have stopped it too, by a pin.
+    /// The port has pins, so that the receive interrupt may have stopped the sender as well.
     has_pins: bool,
-    /// How far control lines have been looked for.
+    /// How far the ring has been searched for control lines.
     scan: Scan,
 }
 
@@ -131,12 +131,13 @@ impl Intake {
         }
     }
 
-    /// Whether there is nothing to do: most of the time, on a port that nobody uses.
+    /// Whether there is nothing to do, as is mostly so on a port that nobody uses.
     fn is_idle(&self) -> bool {
         self.received.is_empty() && self.refused == 0 && self.stopped == Flow::None
     }
 
-    /// Takes a turn's bytes, stops the sender or lets it go on, and sees to real-time characters where they stand.
+    /// Takes the bytes of a turn, stops the sender or lets it go on, and sees to real-time characters where they
+    /// stand.
     fn take(&mut self, links: &Links) -> Left {
         if self.port.is_eager() {
             let taken = realtime::pick(links, self.port, &mut self.received.window());
@@ -161,14 +162,15 @@ impl Intake {
         left
     }
 
-    /// Of a program that has closed the port half a line may be there: the next program's first line would go on with it.
+    /// Drops the half line of a program that has closed the port. Otherwise the first line of the next program would
+    /// be appended to it.
     fn see_to_closing(&self) {
         if self.port.number == USB && uart::take_closed() {
             self.port.lines.borrow_mut().forget();
         }
     }
 
-    /// Takes a turn's bytes.
+    /// Takes the bytes of a turn.
     #[inline(never)]
     fn turn(&mut self, links: &Links) -> Left {
         let mut pool = self.port.lines.borrow_mut();
@@ -202,11 +204,11 @@ impl Intake {
             let decides =
                 next == Some(b'?') && self.port.waits_for_question() && !pool.is_within_line();
             if decides || next.is_some_and(|next| pool.leaves(next)) {
-                // It has come since the ring was looked through.
+                // The byte has come after the ring was searched for such bytes.
                 return Left::Bytes;
             }
             if next.is_some_and(|next| pool.end_question(next)) {
-                // There may be no room for what it begins.
+                // There may be no room for the line that begins.
                 links.parser_wake.signal();
                 continue;
             }
@@ -220,7 +222,7 @@ impl Intake {
                 CUT | GO if pool.aside() != Aside::None => return Left::Aside,
                 CUT | GO => return Left::Placed(byte),
                 ..MARKS => self.loss(pool, byte, links),
-                // A line was here that has overtaken. It counts already.
+                // A line stood here that has overtaken. It has been counted already.
                 TAKEN_RETURN if pool.is_plain() => pool.put(byte),
                 TAKEN | TAKEN_RETURN => {
                     pool.follow(byte == TAKEN_RETURN);
@@ -238,7 +240,8 @@ impl Intake {
         Left::Bytes
     }
 
-    /// A line has come whole, in which alarms have been `looked` for in the ring, or not.
+    /// Acts on a line that has come whole. `looked`: alarms have been looked for in that line while it was in the
+    /// ring.
     #[inline(always)]
     fn ended(&mut self, pool: &mut LinePool, looked: bool, links: &Links) {
         self.scan.serve(links, pool, looked);
@@ -254,7 +257,7 @@ impl Intake {
         links.parser_wake.signal();
     }
 
-    /// How lines are taken follows from the dialect.
+    /// Has the pool take lines as the dialect of the port wants.
     #[inline(never)]
     fn speak(&self, pool: &mut LinePool) {
         let speech = self.port.speech.get();
@@ -265,7 +268,8 @@ impl Intake {
         }
     }
 
-    /// The line that has come last may decide for a dialect: those right behind it are taken as it has them.
+    /// The line that has come last may decide the dialect. The lines right behind it are then taken as that dialect
+    /// wants.
     #[cold]
     #[inline(never)]
     #[small]
@@ -274,7 +278,8 @@ impl Intake {
         self.speak(pool);
     }
 
-    /// Whether the next byte is one of those that are dropped. It is taken by itself then.
+    /// Whether the next byte lies before the cut and is dropped. The reader then takes it alone, not as part of a run
+    /// of text.
     #[inline(always)]
     fn cuts(&self, pool: &mut LinePool, links: &Links) -> bool {
         self.port.cut.get().is_some_and(|last| self.cuts_up_to(last, pool, links))
@@ -291,19 +296,19 @@ impl Intake {
                 pool.terminate_partial(hold::dropped());
             }
             self.port.cut.set(None);
-            // A greeting may wait for that.
+            // A greeting may wait for the end of the cut.
             links.reporter_wake.notify_now();
         }
         cuts
     }
 
-    /// Stops the sender, or lets it go on, when so many bytes wait.
+    /// Stops the sender, or lets it go on, with this many bytes waiting.
     #[inline(never)]
     fn control_flow(&mut self, waiting: u8, links: &Links) {
         let levels =
             if self.port.number == USB { Levels::of(RX_RING) } else { Levels::of(AUX_RING) };
         if self.stopped == Flow::None && uart::is_stopped(self.port.number) {
-            // By exec.
+            // Exec has stopped the sender.
             self.stopped = Flow::Characters;
         }
         let stop = match self.stopped {
@@ -312,11 +317,11 @@ impl Intake {
             Flow::None => waiting > levels.pins,
             _ => waiting >= levels.low,
         };
-        // One that was stopped must not stay so when the setting changes.
+        // If the setting has changed, the sender must not stay stopped by the old means.
         let flow = if stop { self.flow(links) } else { Flow::None };
         if flow != self.stopped {
             let port = self.port.number;
-            // There is time to wait for the end of a line, unless it is late already.
+            // There is time to wait for the end of a line, unless even the level for pins has been passed.
             let waits = waiting <= levels.pins;
             uart::stop_sender(port, self.stopped, false, true);
             uart::stop_sender(port, flow, true, waits);
@@ -330,7 +335,7 @@ impl Intake {
         self.port.flow(&links.settings.borrow())
     }
 
-    /// Bytes were lost here. Returns whether the mark stands for the end of a whole line.
+    /// Handles a mark of lost bytes. Returns whether the mark stands for the end of a whole line.
     #[cold]
     #[inline(never)]
     fn loss(&mut self, pool: &mut LinePool, mark: u8, links: &Links) -> bool {
@@ -344,7 +349,7 @@ impl Intake {
         if self.refused == 0 {
             self.after(pool);
         }
-        // A bus is not told: the line is refused anyway.
+        // On a bus the sender is not told: the line is refused anyway.
         if (self.refused > 0 || mark & CLEAN == 0) && !is_shared(self.port.number) {
             self.port.lost.set(true);
             links.parser_wake.signal();
@@ -352,7 +357,7 @@ impl Intake {
         is_line
     }
 
-    /// Enters the lines that were lost. False if there is no room for all of them.
+    /// Puts a fault into the pool for each line that was lost. Returns false if there is no room for all of them.
     #[cold]
     #[inline(never)]
     fn refuse(&mut self, pool: &mut LinePool, links: &Links) -> bool {
@@ -368,7 +373,7 @@ impl Intake {
         self.refused == 0
     }
 
-    /// What follows is a line of its own, or the rest of one that is damaged.
+    /// Decides, behind lost bytes, whether what follows is a line of its own or the rest of a damaged line.
     fn after(&mut self, pool: &mut LinePool) {
         if self.then & CLEAN == 0 {
             pool.spoil(Status::BufferFull);
@@ -379,8 +384,8 @@ impl Intake {
     }
 }
 
-/// No line can be taken before the machine goes on: looks for real-time characters in the ring that have it do so, and for lines that
-/// overtake. Returns how many bytes of these are to be released.
+/// Looks through the ring while no line can be taken before the machine goes on. Acts on real-time characters that let
+/// it go on, and takes lines that overtake. Returns how many bytes of these lines are to be released.
 #[inline(never)]
 #[small]
 fn look_ahead(links: &Links, port: &Port, scan: &mut Scan, ring: &mut Window<'_>) -> u8 {
@@ -393,7 +398,7 @@ fn look_ahead(links: &Links, port: &Port, scan: &mut Scan, ring: &mut Window<'_>
         links.parser_wake.signal();
         if machine::is_alarmed() {
             hold::refuse_older(links, &mut pool);
-            // What has been looked through came before the line, or with it.
+            // What has been looked through came before the control line, or is that line.
             port.cut.set(scan.looked.checked_sub(1).map(|last| ring.slot(last)).or(port.cut.get()));
         }
     }
@@ -401,12 +406,12 @@ fn look_ahead(links: &Links, port: &Port, scan: &mut Scan, ring: &mut Window<'_>
     waiting - ring.len()
 }
 
-/// Acts upon real-time characters in the ring. Cost: 30 cycles a byte.
+/// Acts on real-time characters in the ring. Cost: 30 cycles a byte.
 #[inline(never)]
 #[small]
 fn look_for_marks(links: &Links, port: &Port, ring: &Window<'_>) {
     let mut aside = port.lines.borrow().aside();
-    // Marks before a cut have had their effect.
+    // Marks before a cut have had their effect already.
     let mut last = port.cut.get();
     for n in 0..ring.len() {
         let (byte, slot) = (ring.get(n), ring.slot(n));

@@ -1,11 +1,13 @@
-//! Bytes that act at once where they stand, on a port whose dialect has more of them than the receive interrupt knows: `?`, and those
-//! above 0x7F.
+//! Bytes that act at once where they stand: `?`, and those above 0x7F. They act on a port whose dialect has more such
+//! bytes than the receive interrupt knows.
 //!
-//! Called by the reader before it takes a turn's bytes, 4 ms after they have come at the latest ([`set_eager`](crate::hal::event::set_eager)); it
-//! looks through the whole receive ring, also when the line pool is full. A byte that acts leaves the ring, and so does any other above 0x7F, so that
-//! questions take no room from lines that wait. Thread mode; 15 cycles a byte that waits.
+//! Called by the reader before it takes a turn's bytes, at the latest 4 ms after they have come
+//! ([`set_eager`](crate::hal::event::set_eager)). Looks through the whole receive ring, also when the line pool is
+//! full. A byte that acts leaves the ring, and so does any other byte above 0x7F, so that questions take no room from
+//! lines that wait. Thread mode. Cost: 15 cycles for each byte that waits.
 //!
-//! On a port that has not been decided ([`Port::is_undecided`]) a `?` at the beginning of a line decides, and acts.
+//! On a port whose dialect is undecided ([`Port::is_undecided`]) a `?` at the beginning of a line decides it, and
+//! acts.
 
 use kerf_macros::small;
 
@@ -21,26 +23,26 @@ use crate::hal::serial::{GO, MARKS};
 use crate::protocol::Speech;
 use crate::realtime::Asked;
 
-/// With more bytes than this in it, a ring is filling.
+/// A ring with more bytes than this is filling.
 const ROOMY: u8 = 64;
 
-/// Opens and shuts the door: what moves is held, and waits for a tilde.
+/// Opens the door and shuts it: what moves is held, and waits for a tilde.
 const DOOR: u8 = 0x84;
-/// Stops the spindle in a hold, or has it turn again.
+/// Stops the spindle in a hold, or lets it turn again.
 const SPINDLE_STOP: u8 = 0x9E;
-/// Switches flood and mist.
+/// Switches flood; [`MIST`] switches mist.
 const FLOOD: u8 = 0xA0;
 const MIST: u8 = 0xA1;
 const ASKS: u8 = b'?';
 
-/// Takes such bytes out of a ring, and does what they ask for. Returns how many bytes are to be released: in a ring that is filling no blanks
-/// stay, for the sender does not count these bytes.
+/// Takes bytes that act out of a ring, and does what they ask for. Returns how many bytes are to be released. In a
+/// ring that is filling no blanks are left in their place, because the sender does not count these bytes.
 #[inline(never)]
 #[small]
 pub fn pick(links: &Links, port: &Port, ring: &mut Window<'_>) -> u8 {
     let mut within = port.lines.borrow().is_within_line();
     let waiting = ring.len();
-    // The places of cuts stay what they are.
+    // If there is a cut, the slots of the bytes must not change.
     let mut closes = waiting > ROOMY && port.cut.get().is_none();
     let mut n = 0;
     while n < ring.len() {
@@ -65,7 +67,7 @@ pub fn pick(links: &Links, port: &Port, ring: &mut Window<'_>) -> u8 {
     waiting - ring.len()
 }
 
-/// A sender that asks so speaks another dialect.
+/// Decides the dialect of a port: a sender that asks by a `?` alone speaks one that has it.
 fn decide(links: &Links, port: &Port) {
     let settings = links.settings.borrow();
     if let Some(speech) = Speech::of_question(&settings) {

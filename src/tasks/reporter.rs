@@ -1,10 +1,10 @@
 //! The reporter task: the greeting, then status and queue reports, and exceptions.
 //!
-//! Reads everything through [`View`], writes to the port that is told; what one port alone is told is the parser's ([`tell_at_once`]). Waits for something to report, and polls
-//! every [`POLL_MS`] while the machine moves; it is not woken besides then, unless queue reports are
-//! wanted. A change of what the machine is doing is told at once, anything else every
-//! `si` milliseconds. How it is told is the dialect's ([`Telling`]). While the sender is slow it waits, and then reports what is so by then: it never
-//! holds up anything else.
+//! Reads everything through [`View`], writes to the port that is told. What only one port is told is the parser's
+//! ([`tell_at_once`]). Waits for something to report, and polls every [`POLL_MS`] while the machine moves. While it
+//! polls it is not woken as well, unless queue reports are wanted. A change of what the machine is doing is told at
+//! once, anything else every `si` milliseconds. The dialect says how it is told ([`Telling`]). While the sender is
+//! slow the reporter waits, and then reports what is so by then: it never holds up anything else.
 
 use embassy_futures::select::select;
 use embassy_futures::yield_now;
@@ -31,16 +31,17 @@ use crate::motion::snapshot::Program;
 use crate::protocol::{Hold, Machine, Notice, Occasion, Speech, Telling, Tells};
 use crate::status::Status;
 
-/// How often a busy machine is looked at, ms.
+/// How often a machine that moves is looked at, ms.
 const POLL_MS: u64 = 10;
 /// How often a machine at rest is looked at for a printing host, ms.
 const LOOK_MS: u64 = 100;
 #[cfg(feature = "dialect-reprap")]
-/// A line that takes longer is told so, again and again, ms.
+/// A printing host is told again and again when a line takes longer than this, ms.
 const BUSY_MS: u32 = 2_000;
-/// How often room is looked for on a port that is told besides.
+/// How often room is looked for on a port that is told besides the usual one.
 const PATIENCE: u8 = 20;
-/// How many times a report ends its line early for an answer: each line of a report takes the serial line's time for its frame.
+/// How many times a report ends its line early for an answer. Each line of a report costs the serial line some time
+/// for its frame.
 const SPLITS: u8 = 2;
 
 /// What was told last.
@@ -51,7 +52,7 @@ struct Told {
     starved: bool,
 }
 
-/// The task; `occasion` is what has come of the start.
+/// The task. `occasion` says how the machine has started.
 pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
     greet_undecided(links);
     let mut greeting = Some(occasion);
@@ -67,7 +68,7 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
     let mut due = true;
     let mut clock = Clock::new();
     loop {
-        // Once: `stv` counts the others.
+        // Only once: `stv` counts further ones.
         let exception = &links.notices.exception;
         if !told.starved && health::starvations() > 0 && exception.get().is_none() {
             told.starved = true;
@@ -88,11 +89,11 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
                 start_up(links);
             }
         }
-        // All of them: what a probing has come to is told behind the alarm that it has raised.
+        // All of them in one turn: a probing is told behind the alarm that it has raised.
         while let Some(status) = links.notices.exception.take() {
             let notice = Notice::Exception(status);
             tell(links, links.told(), notice).await;
-            // Whoever is at hand may have it go on.
+            // Whoever is at the machine may have it go on.
             if status == Status::ProgramStopped {
                 tell_others(links, notice).await;
             }
@@ -101,10 +102,10 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
             }
         }
         if links.probe.take_news() {
-            // The planner waits for it.
+            // The planner waits for this.
             flags::set(Event::BlockDone);
             tell(links, links.told(), Notice::Probing).await;
-            // An answer may wait for that, whose task has been woken.
+            // An answer may wait for this; its task has been woken.
             links.probe.has_been_told();
         }
         if turning::take_news(links.thread) && links.settings.borrow().reports_each_turn() {
@@ -151,7 +152,7 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
 /// What a printing host is told again and again.
 #[cfg(feature = "dialect-reprap")]
 struct Clock {
-    /// Since when no line has been begun, and how many had been.
+    /// Since when no further line has been begun, ms; in `lines`, how many had been.
     since: u32,
     lines: u8,
     /// When temperatures were told last.
@@ -164,7 +165,7 @@ impl Clock {
         Self { since: millis(), lines: 0, told: millis() }
     }
 
-    /// What is due by now: temperatures where the host wants them, and that a line takes long.
+    /// Returns what is due by now: temperatures, if the host wants them, or that a line takes long.
     #[inline(never)]
     #[small]
     fn due(&mut self, links: &Links) -> Option<Notice> {
@@ -190,7 +191,7 @@ impl Clock {
     }
 }
 
-/// Nobody is told anything again and again.
+/// In an image without a dialect of printing hosts, nobody is told anything again and again.
 #[cfg(not(feature = "dialect-reprap"))]
 struct Clock;
 
@@ -205,12 +206,12 @@ impl Clock {
     }
 }
 
-/// A change of this is told at once.
+/// What is told at once when it changes.
 #[derive(Clone, Copy, PartialEq)]
 struct State {
     doing: Doing,
     hold: Hold,
-    /// While the machine rests.
+    /// The state of the program, while the machine rests.
     rest: Program,
 }
 
@@ -228,19 +229,19 @@ impl State {
     }
 }
 
-/// Whether the sender wants to know of each block that comes or goes.
+/// Whether the sender wants to be told of each block that comes or goes.
 fn reports_queue(links: &Links) -> bool {
     links.settings.borrow().queue_verbosity() != 0
 }
 
-/// Begins to tell it on a port. What is told is what is so by now.
+/// Begins to tell `notice` on a port. What is told is what is so by now.
 #[inline(never)]
 #[small]
 fn begin(notice: Notice, links: &Links, port: &Port) -> Telling {
     Telling::begin(notice, port.speech.get(), &mut View::of(links, port))
 }
 
-/// Puts the next part. Whether there is more.
+/// Puts the next part. Returns whether there is more.
 #[inline(never)]
 #[small]
 fn step(telling: &mut Telling, links: &Links, port: &Port, tx: &mut Tx) -> bool {
@@ -249,7 +250,8 @@ fn step(telling: &mut Telling, links: &Links, port: &Port, tx: &mut Tx) -> bool 
     more
 }
 
-/// Ends the line early if an answer waits for it. False if none does, or it can't be ended.
+/// Ends the line of a report early if an answer waits for it. Returns false if no answer waits, or if the line cannot
+/// end here.
 fn split(telling: &mut Telling, port: &Port, tx: &mut Tx) -> bool {
     let split = port.lines.borrow().has_controls() && telling.split(tx);
     if split {
@@ -258,9 +260,8 @@ fn split(telling: &mut Telling, port: &Port, tx: &mut Tx) -> bool {
     split
 }
 
-/// Tells it on a port, a part at a time: for a millisecond in one turn, if there is room. Of a queue
-/// report returns how many blocks are free in it, which may have changed during the wait for the
-/// transmitter.
+/// Tells `notice` on a port, a part at a time: for a millisecond in one turn, if there is room. For a queue report,
+/// returns how many blocks the report says are free; that may have changed while the transmitter was waited for.
 async fn tell(links: &Links, port: &Port, notice: Notice) -> usize {
     let mut tx = match notice {
         Notice::Status | Notice::Exception(_) => port.tx_behind_answers().await,
@@ -271,7 +272,7 @@ async fn tell(links: &Links, port: &Port, notice: Notice) -> usize {
         greet_otherwise(links, port, &mut tx);
     }
     let mut telling = begin(notice, links, port);
-    // For all of it: while it is being told, the port is not answered.
+    // For the whole notice: while it is sent, the port is not answered.
     let (mut turns, mut splits) = (COURTESY, SPLITS);
     loop {
         tx.room().await;
@@ -297,7 +298,7 @@ async fn tell(links: &Links, port: &Port, notice: Notice) -> usize {
     telling.blocks_free()
 }
 
-/// What a sender is told that has reset the machine, and on which port; `None` if nobody has.
+/// Returns what a sender is to be told that has reset the machine, and on which port; `None` if nobody has.
 #[inline(never)]
 #[small]
 fn asked(links: &Links) -> Option<(u8, Notice)> {
@@ -312,7 +313,7 @@ fn asked_on(port: &Port) -> Option<Notice> {
     }
     if port.take_asked(INTERRUPTED) {
         if !machine::is_alarmed() {
-            // All that came before has been dropped; what has come since is refused.
+            // What came before the reset has been dropped; what has come since is refused.
             machine::start_alarmed();
         }
         let homed = port.take_asked(HOMING);
@@ -323,7 +324,7 @@ fn asked_on(port: &Port) -> Option<Notice> {
     Some(Notice::Greeting(Occasion::Ready))
 }
 
-/// Whether a reset that a sender has asked for is over: all that had come has been dropped.
+/// Whether a reset that a sender has asked for is over: everything that had come has been dropped.
 #[inline(never)]
 #[small]
 fn is_over(port: &Port) -> bool {
@@ -331,8 +332,8 @@ fn is_over(port: &Port) -> bool {
     port.is_resetting() && !machine::is_flushing() && !drops()
 }
 
-/// Greets in another dialect as well where it is not decided which one is spoken: each sender finds its own. At the start, when the rings are
-/// empty.
+/// Greets in another dialect as well on ports whose dialect is undecided, so that each sender finds its own greeting.
+/// At the start, when the transmit rings are empty.
 #[inline(never)]
 #[small]
 fn greet_undecided(links: &Links) {
@@ -342,8 +343,8 @@ fn greet_undecided(links: &Links) {
     }
 }
 
-/// The lines that are kept for it are carried out, unless there is an alarm, before any other: they are the parser's. Of images without a dialect that
-/// keeps some there are none.
+/// Begins the job of the start-up lines, which are carried out before any other line, unless there is an alarm. The
+/// parser takes them. An image without a dialect that keeps start-up lines has none.
 #[inline(never)]
 #[small]
 fn start_up(links: &Links) {
@@ -357,7 +358,7 @@ fn start_up(links: &Links) {
     }
 }
 
-/// Tells what has become of such a line, if there is room for that, as the parser has seen to.
+/// Tells what has become of a start-up line. The parser has made sure that there is room.
 #[inline(never)]
 #[small]
 pub fn tell_startup(links: &Links, line: u8, status: Status) {
@@ -371,7 +372,7 @@ pub fn tell_startup(links: &Links, line: u8, status: Status) {
     while step(&mut telling, links, port, &mut tx) {}
 }
 
-/// The greeting of the dialect whose senders ask by a `?` alone: 30 bytes.
+/// Greets in the dialect whose senders ask by a `?` alone: 30 bytes.
 #[inline(never)]
 #[small]
 fn greet_otherwise(links: &Links, port: &Port, tx: &mut Tx) {
@@ -381,8 +382,8 @@ fn greet_otherwise(links: &Links, port: &Port, tx: &mut Tx) {
     while step(&mut telling, links, port, tx) {}
 }
 
-/// Tells something short on a port, if nobody else talks there and there is room for it: at most 64 bytes, or all of an
-/// empty ring for a greeting and a program stop. Else returns false.
+/// Tells something short on a port, if nobody else talks there and there is room: at most 64 bytes, or for a greeting
+/// and a program stop all of an empty ring. Returns false if it cannot be told now.
 #[inline(never)]
 #[small]
 pub fn tell_at_once(links: &Links, port: &Port, notice: Notice) -> bool {
@@ -396,7 +397,8 @@ pub fn tell_at_once(links: &Links, port: &Port, notice: Notice) -> bool {
     fits
 }
 
-/// Tells something on the ports that are not told everything. Not on one that cannot talk for long: its sender may hold it back.
+/// Tells something on the ports that are not told everything. Gives up on a port that cannot talk for long, because
+/// its sender may hold it back.
 async fn tell_others(links: &Links, notice: Notice) {
     let told = links.told().number;
     let others = links.ports.iter().filter(|port| port.number != told);

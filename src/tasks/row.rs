@@ -1,11 +1,12 @@
-//! A row: lines of the [fast path](crate::gcode::fast_path) that the parser carries out one behind the other, without a turn for others in between.
+//! A row: lines of the [fast path](crate::gcode::fast_path) that the parser carries out one after the other, without a
+//! turn for other tasks in between.
 //!
-//! Each is a move that is answered with a brief response: what the [parser](super::parser) does in four steps and with a `Request`
-//! for other lines is done here in half the time. Whose line it is, how it is answered, the transmitter and the planner are asked for once a
-//! row. Real-time characters, alarms, and a reader that must not wait end a row ([`is_wanted`]); what stands in the way of lines and comes from thread mode cannot
-//! come in between.
+//! Each line is a move with a brief response. For other lines the [parser](super::parser) takes four steps and a
+//! `Request`; in a row a line takes half the time. Whose line it is, how it is answered, the transmitter and the
+//! planner are found out once for a row. Real-time characters, alarms, and a reader that must not wait end a row
+//! ([`is_wanted`]). Nothing else can come in between, because whatever else keeps lines back comes from thread mode.
 //!
-//! Thread mode, the parser's turn. Cost: 2,400 cycles a line and what its block takes.
+//! Thread mode, in the parser's turn. Cost: 2,400 cycles a line, and the cost of its block.
 
 use super::links::Links;
 use super::planner::{self, Planner};
@@ -17,23 +18,23 @@ use crate::hal::flags;
 use crate::machine;
 use crate::protocol::{Ending, Speech};
 
-/// Lines at most: as many as may wait.
+/// The most lines of a row: as many as may wait.
 const MOST: u8 = 8;
 
 /// How a row has ended.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Row {
-    /// There is no other line, or it has to wait for something.
+    /// There is no further line, or the line has to wait for something.
     Over,
     /// The next line is not for the fast path.
     Declined,
-    /// Others are to have their turn before there are more.
+    /// Other tasks are to have their turn before there are more lines.
     Full,
-    /// The planner's task carries out the last one: no more are taken before that is done.
+    /// The planner's task carries out the last line. No further line is taken before that is done.
     Handed,
 }
 
-/// Carries out and answers lines of the port that feeds the machine. The caller has seen to it that they may be taken.
+/// Carries out and answers lines of the port that feeds the machine. The caller has made sure that lines may be taken.
 #[inline(never)]
 pub(super) fn run(links: &Links, shared: &planner::Shared) -> Row {
     let port = links.feeder();
@@ -88,8 +89,9 @@ pub(super) fn run(links: &Links, shared: &planner::Shared) -> Row {
     end
 }
 
-/// Has the planner carry out the move of a line of the fast path, at once if that can be and no real-time character waits. Whether it has, and the next line
-/// may be taken.
+/// Has the planner carry out the move of a line of the fast path: at once, if possible and if no real-time character
+/// waits, or else in the planner's task. Returns whether the move has been carried out, so that the next line may be
+/// taken.
 #[inline(always)]
 pub(super) fn hand_over(links: &Links, planner: Option<&mut Planner>) -> bool {
     let done = !flags::has(Event::Realtime) && planner.is_some_and(planner::take_at_once);
@@ -100,12 +102,12 @@ pub(super) fn hand_over(links: &Links, planner: Option<&mut Planner>) -> bool {
     done
 }
 
-/// Interprets a line of the SD card, if the fast path can. Its move has to be handed over then.
+/// Interprets a line of the SD card, if the fast path can. Returns whether it has; its move is to be handed over then.
 #[cfg(feature = "sd")]
 #[inline(never)]
 pub(super) fn interpret(links: &Links, line: &[u8]) -> bool {
     let port = links.told();
-    // It borrows the settings, too.
+    // Before the settings are borrowed: this borrows them, too.
     if machine::is_checking() || !links.may_feed(port) {
         return false;
     }
@@ -117,7 +119,7 @@ pub(super) fn interpret(links: &Links, line: &[u8]) -> bool {
     links.model.borrow_mut().fast_path(line, Writer::Prints, &*settings, &mut commands)
 }
 
-/// Whether the lines of a port are a printing host's, whose extruder is known to be one.
+/// Whether a printing host speaks on a port, and the A axis is known to be its extruder.
 #[inline(always)]
 fn is_printing(port: &Port, settings: &Settings) -> bool {
     Speech::HAS_PLAIN

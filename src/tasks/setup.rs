@@ -1,4 +1,4 @@
-//! What the settings say of the machine to those who interpret lines and those who plan moves.
+//! What the settings tell the interpreter of lines and the planner of moves.
 
 use kerf_macros::small;
 
@@ -113,8 +113,8 @@ impl Setup for Settings {
     }
 }
 
-/// What moves a motor: the position of an axis, or those of X and Y together ([`kinematics`]). One of an inhibited
-/// axis stands still.
+/// Returns what moves a motor: the position of an axis, or the positions of X and Y together ([`kinematics`]). A motor
+/// of an inhibited axis stands still.
 #[small]
 pub fn moved_by(settings: &Settings, motor: usize) -> u8 {
     let drives = settings.motor_axis(motor);
@@ -126,8 +126,9 @@ pub fn moved_by(settings: &Settings, motor: usize) -> u8 {
     if moved { drives } else { kinematics::NOTHING }
 }
 
-/// Where an axis is when the motors are at these steps, the first of several; none if none moves it. Motors at the steps of `end` are
-/// there: what is less than a step is not lost. Cost: 3,000 cycles.
+/// Returns where an axis is when the motors are at these steps; `None` if no motor moves it. Of several motors the
+/// first counts. If the motor is at the steps of `end`, the axis is at `end` exactly, so that what is less than a step
+/// is not lost. Cost: 3,000 cycles.
 #[inline(never)]
 #[small]
 pub fn counted(
@@ -146,7 +147,7 @@ pub fn counted(
     of(axis as u8)
 }
 
-/// Where the first motor is that drives this.
+/// Returns where the first motor is that `drives` moves.
 #[inline(never)]
 #[small]
 fn coordinate(
@@ -196,18 +197,18 @@ impl MachineLimits for Settings {
     }
 }
 
-/// How far steps can be counted if some motor makes several in the shortest length.
+/// Returns how far steps can be counted if some motor makes several in the shortest length.
 #[inline(never)]
 #[small]
 fn fine_reach(settings: &Settings) -> Length {
     match settings.octaves() {
         octaves @ ..=14 => Length((i32::MAX >> octaves) - REACH_SLACK),
-        // A block could not hold the steps of the shortest move: there is no way, not even from the origin.
+        // A block could not hold the steps of the shortest move: no move is possible, not even from the origin.
         _ => Length(-1),
     }
 }
 
-/// The travel of an axis where soft limits are on.
+/// Returns the travel of an axis if soft limits are on; `None` if the axis has no limits.
 #[inline(never)]
 #[small]
 fn limited_travel(settings: &Settings, axis: u8) -> Option<(Length, Length)> {
@@ -215,7 +216,7 @@ fn limited_travel(settings: &Settings, axis: u8) -> Option<(Length, Length)> {
     if low == high {
         return None;
     }
-    // The lowest that can be set, and anything below it, means no limit, at either end.
+    // The lowest value that can be set, and anything below it, means no limit, at either end.
     let end = |end, far| if end == TRAVEL_NONE { Length(far) } else { end };
     Some((end(low, i32::MIN), end(high, i32::MAX)))
 }

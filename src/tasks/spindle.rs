@@ -1,11 +1,13 @@
 //! The outputs of M3 to M9 and the spindle's speed, carried out in step with motion.
 //!
-//! Exec says what the program has switched and S ([`Snapshot`]); here it becomes levels and the width of pulses
-//! ([`Spindle`]). Exec calls [`switch`] when something of it may have changed, at rest, and waits as long as that
-//! says: a spindle that has been started takes its time. In a feedhold those outputs pause that the settings say,
-//! and are on again before motion goes on. Thread mode tells what settings ([`set`]) and the override ([`follow`])
-//! have changed; it is in force at once. A sender may [switch the coolant](flip), and [stop the spindle](pause) for the hold that is on. Cost of
-//! a change: 4,000 cycles.
+//! Exec says what the program has switched, and S ([`Snapshot`]). Here that becomes levels and the width of pulses
+//! ([`Spindle`]). Exec calls [`switch`] at rest, when something may have changed, and waits as long as that says: a
+//! spindle that has been started takes its time. In a feedhold, the outputs that the settings name pause, and they are
+//! on again before motion goes on.
+//!
+//! Thread mode takes over changes of settings ([`set`]) and of the override ([`follow`]), which are in force at once.
+//! A sender may [switch the coolant](flip), and [stop the spindle](pause) for the hold that is on. Cost of a change:
+//! 4,000 cycles.
 
 use super::common;
 use super::links::Links;
@@ -26,19 +28,19 @@ machine_static! {
     fn now_on() -> SharedByte = SharedByte::new(0);
 }
 
-/// The outputs that are on, which in a feedhold may be less than what the program has switched.
+/// Returns the outputs that are on. In a feedhold these may be fewer than the program has switched on.
 #[small]
 pub fn on() -> u8 {
     now_on().get()
 }
 
-/// Switches the outputs as they are to be now; how long motion has to wait for that, ms. `changed` says that S may
-/// be another. Exec, or who locks it out.
+/// Switches the outputs as they are to be now. Returns how long motion has to wait, ms. `changed` says that S may be
+/// another. Called by exec, or with exec locked out.
 #[inline(never)]
 #[small]
 pub fn switch(spindle: &Spindle, out: &Snapshot, changed: bool) -> u16 {
     let before = on();
-    // A probe that has made contact holds as well.
+    // A probe that has made contact holds motion as well; the outputs stay on then.
     let wanted = match out.held && machine::is_held() {
         _ if stepper::is_stopped() || machine::is_alarmed() => 0,
         true => spindle.held(out.outputs),
@@ -48,19 +50,19 @@ pub fn switch(spindle: &Spindle, out: &Snapshot, changed: bool) -> u16 {
         return 0;
     }
     now_on().set(wanted);
-    // A spindle that starts finds the speed there.
+    // A spindle that starts finds its speed set.
     pwm::set_share(spindle.share(wanted, out.speed));
     gpio::set_outputs(wanted);
     spindle.spin_up(before, wanted)
 }
 
-/// An alarm has begun: the outputs go off.
+/// Switches the outputs off, because an alarm has begun.
 #[small]
 pub fn stop(thread: Thread) {
     common::with(thread, |common| switch(&common.spindle, &common.motion, true));
 }
 
-/// Takes over all settings that concern the outputs, and then tells these.
+/// Takes over all settings that concern the outputs, and then sets the outputs by them.
 #[small]
 #[inline(never)]
 pub fn set_all(thread: Thread, storage: &Storage) {
@@ -88,7 +90,7 @@ pub fn set(thread: Thread, setting: Setting, value: i32) {
     tell(thread);
 }
 
-/// Multiplies S by so many thousandths from now on.
+/// Multiplies S by this many thousandths from now on.
 #[small]
 pub fn follow(thread: Thread, thousandths: u16) {
     if with(thread, |spindle| spindle.set_factor(thousandths)) {
@@ -96,7 +98,7 @@ pub fn follow(thread: Thread, thousandths: u16) {
     }
 }
 
-/// S is so many turns a minute from now on, by a surface speed; at most `most` under the override.
+/// Sets S to `speed` turns a minute, for a surface speed. Under the override S is `most` at most.
 #[small]
 pub fn turn_at(thread: Thread, speed: f32, most: f32) {
     common::with(thread, |common| {
@@ -114,7 +116,7 @@ fn with<R>(thread: Thread, what: impl FnOnce(&mut Spindle) -> R + Send) -> R {
     common::with(thread, |common| what(&mut common.spindle))
 }
 
-/// Tells the outputs what they are to be by now.
+/// Sets the outputs as they are to be by now.
 #[small]
 fn tell(thread: Thread) {
     common::with(thread, |common| {
@@ -123,8 +125,8 @@ fn tell(thread: Thread) {
     });
 }
 
-/// Switches a coolant output on, or off if it is on: at once, whatever lines have said. Not in an alarm, nor in check mode. A line that
-/// waits in the queue for its turn to switch an output switches all as they were when it was planned.
+/// Switches a coolant output over at once, whatever lines have said. Does nothing in an alarm or in check mode. A line
+/// that waits in the queue to switch an output later switches all outputs as they were when that line was planned.
 #[inline(never)]
 #[small]
 pub fn flip(links: &Links, output: u8) {
@@ -140,7 +142,7 @@ pub fn flip(links: &Links, output: u8) {
     links.model.borrow_mut().set_coolant(coolant(now));
 }
 
-/// Stops the spindle while the hold is on, at rest, or has it turn again.
+/// Stops the spindle while the machine rests in a hold, or lets it turn again.
 #[inline(never)]
 #[small]
 pub fn pause(links: &Links) {
@@ -152,7 +154,7 @@ pub fn pause(links: &Links) {
     });
 }
 
-/// The coolant, by the outputs.
+/// Returns the coolant that the outputs stand for.
 #[small]
 pub fn coolant(on: u8) -> u8 {
     let bit = |output, which: Coolant| if on & output != 0 { which as u8 } else { 0 };

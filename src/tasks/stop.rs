@@ -1,12 +1,12 @@
 //! Lines that begin an alarm: they act when they arrive, and are answered in their turn.
 //!
-//! Lines of one port are answered in their order, and the answers before one may take a second. So the reader looks at each short
-//! control line that completes in the pool ([`LinePool::take_stop`]), and at those that wait
-//! in a receive ring behind a full pool ([`Scan::look_for_stops`]), and raises the alarm at once. When the parser comes to
-//! the line it begins the alarm again if a line before it has ended it, but not if the other port has
-//! ([`Port::has_stopped`](super::ports::Port::has_stopped), [`Links::cleared_by`]).
+//! Lines of one port are answered in their order, and the answers before one may take a second. So the reader looks at
+//! each short control line that is completed in the pool ([`LinePool::take_stop`]), and at the lines that wait in a
+//! receive ring behind a full pool ([`Scan::look_for_stops`]), and raises the alarm at once. When the parser comes to
+//! such a line, it begins the alarm again if a line before it has ended the alarm. It does not if another port has
+//! ended the alarm ([`Port::has_stopped`](super::ports::Port::has_stopped), [`Links::cleared_by`]).
 //!
-//! Which lines these are is said by [`asks_alarm`]. Thread mode.
+//! [`asks_alarm`] says which lines these are. Thread mode.
 
 use heapless::Vec;
 use kerf_macros::small;
@@ -23,8 +23,8 @@ use crate::machine::Alarm;
 use crate::protocol::{STOP_MAX, asks_alarm};
 
 impl Scan {
-    /// Begins the alarms that lines ask for which have come into the pool, unless they have begun in the ring, where they have
-    /// been `looked` for.
+    /// Begins the alarms that lines in the pool ask for, unless they have already begun while the lines were in the
+    /// ring, where alarms have been `looked` for.
     #[inline(never)]
     #[small]
     pub fn serve(&mut self, links: &Links, pool: &mut LinePool, looked: bool) {
@@ -38,8 +38,8 @@ impl Scan {
         }
     }
 
-    /// Looks on behind a line that waits for room, through lines that have come whole, and begins the alarms that they ask for.
-    /// Cost: 40 cycles a byte.
+    /// Looks on behind a line that waits for room, through lines that have come whole, and begins the alarms that
+    /// these ask for. Cost: 40 cycles a byte.
     #[inline(never)]
     #[small]
     pub fn look_for_stops(
@@ -53,7 +53,7 @@ impl Scan {
             self.begun = 0;
         }
         let from = self.stops.max(self.looked);
-        // A line whose beginning has been looked at does not overtake, and asks for none.
+        // A line whose beginning has been looked at does not overtake, and asks for no alarm.
         let mut whole = from == self.stops || !self.within;
         let mut at = if whole { from } else { self.stops };
         let mut line = Vec::<u8, STOP_MAX>::new();
@@ -72,13 +72,13 @@ impl Scan {
                 CUT | GO | TAKEN => {}
                 mark if mark < MARKS => {
                     if n + 1 == ring.len() {
-                        // It may come to tell of more.
+                        // The mark may yet come to tell of more.
                         break;
                     }
                     line.clear();
                     whole = mark & CLEAN != 0;
                 }
-                // A question is a line of its own.
+                // A question mark is a line of its own.
                 b'?' | b' ' | b'\t' if line.is_empty() => {}
                 byte => whole &= line.push(byte).is_ok(),
             }

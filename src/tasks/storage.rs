@@ -1,14 +1,15 @@
-//! The storage task: puts away what has changed of the settings and tables, in the background.
+//! The storage task: saves what has changed of the settings and tables, in the background.
 //!
-//! [`Storage`] is what it shares with the others: which settings to look at; the row of the tables that is on its way
-//! ([`Edit`]), and so a setting that is in EEPROM alone; and where the log is, for all other rows and such settings
-//! are found there. The task writes the
-//! EEPROM, a byte each 3.4 ms, and waits for it by the millisecond. Whatever changes while it is written is written
-//! again. One look costs up to 3 ms of thread mode on AVR. If power fails meanwhile, the items that it has not come to
-//! are what they were. When the EEPROM is full: status 34, once, and a row is what it was.
+//! [`Storage`] is what the task shares with others: which settings may have changed; one row of the tables that is
+//! being saved ([`Edit`]), and one setting that is in EEPROM alone; and where the log is, in which all other rows and
+//! such settings are found. The task writes the EEPROM, a byte every 3.4 ms, and waits for it by the millisecond. A
+//! value that changes while it is written is written again. One look costs up to 3 ms of thread mode on AVR. If power
+//! fails meanwhile, items that the task has not come to keep their old values. When the EEPROM is full, status 34 is
+//! reported once, and a row keeps its old values.
 //!
-//! There is room for one row and one such setting. A line that changes another meanwhile is refused with [`Status::Again`]; the parser keeps it
-//! and is woken when the row has been put away, 0.3 s later at most unless the log is nearly full.
+//! There is room for one row and one such setting. A line that changes another one meanwhile is refused with
+//! [`Status::Again`]. The parser keeps the line and is woken when the row has been saved: 0.3 s later at most, unless
+//! the log is nearly full.
 
 use core::cell::Cell;
 
@@ -29,8 +30,8 @@ use crate::store::program::{self, Stored};
 use crate::store::{Log, Memory, record, tables};
 use crate::units::{Length, PerAxis};
 
-/// Keys without a record if every setting and every value of all 21 rows on six axes has been set: then a line is refused with status
-/// 34. Those of drivers are as many more. The program's area has the room.
+/// How many keys have no record if every setting and every value of all 21 rows on six axes has been set: then a line
+/// is refused with status 34. The settings of drivers add 15 such keys. The program's area could give up the room.
 const LEFT_OUT: u16 = if Capability::Drivers.is_built_in() { 31 } else { 16 };
 const _: () = assert!(
     kept::KEYS < Eeprom::LOG / record::SIZE + LEFT_OUT,
@@ -39,29 +40,29 @@ const _: () = assert!(
 
 const _: () = assert!(program::STARTUP_MAX as usize == STARTUP_MAX);
 
-/// What the storage task shares with those for whom it keeps things.
+/// What the storage task shares with the tasks for which it saves things.
 pub struct Storage {
     log: Cell<Log>,
-    /// The settings that may have changed: from one number to before another.
+    /// The settings that may have changed: from this number to before `to`.
     from: Cell<u8>,
     to: Cell<u8>,
-    /// The row that is on its way.
+    /// The row that is being saved.
     edit: Cell<Option<Edit>>,
-    /// The setting in EEPROM alone that is on its way: its number, and its value.
+    /// The setting in EEPROM alone that is being saved: its number and its value.
     cold: Cell<Option<(u8, i32)>>,
     /// Settings in EEPROM alone are to have their defaults from this number on.
     forgotten: Cell<u8>,
-    /// How long the program is that is being stored, if one is.
+    /// The length of the program that is being stored, if one is.
     program: Cell<Option<u16>>,
-    /// A line waits until it has arrived.
+    /// A line waits until a row or a setting has been saved.
     awaited: Cell<bool>,
     wake: Wake,
 }
 
-/// What the task turns to.
+/// What the task saves next.
 #[derive(Clone, Copy)]
 enum Work {
-    /// The row.
+    /// The row of the tables.
     Edit,
     /// The setting in EEPROM alone.
     Cold,
@@ -71,7 +72,7 @@ enum Work {
 
 #[small]
 impl Storage {
-    /// A storage with this log and nothing to write.
+    /// Returns a storage with this log and nothing to write.
     pub fn new(log: Log) -> Self {
         Self {
             log: Cell::new(log),
@@ -86,31 +87,31 @@ impl Storage {
         }
     }
 
-    /// The log as it is now.
+    /// Returns the log as it is now.
     pub fn log(&self) -> Log {
         self.log.get()
     }
 
-    /// These settings may have changed.
+    /// Notes that these settings may have changed.
     pub fn note(&self, from: u8, count: u8) {
         self.from.set(self.from.get().min(from));
         self.to.set(self.to.get().max(from + count));
         self.wake.signal();
     }
 
-    /// Whether a line waits for a row to be put away; then the parser is woken.
+    /// Whether a line waits for a row to be saved. The parser is woken then.
     pub fn is_awaited(&self) -> bool {
         self.awaited.get()
     }
 
     /// Whether EEPROM holds all that it is to hold.
     pub fn is_done(&self) -> bool {
-        // The end of the range is cleared when the last of it has been put away.
+        // The end of the range is cleared when all of the range has been saved.
         let waits = self.edit.get().is_some() || self.cold.get().is_some();
         !waits && self.to.get() == 0 && self.forgotten.get() >= Setting::COLD
     }
 
-    /// A value of a row. Cost as of [`Tables::row`].
+    /// Returns a value of a row. Cost: that of [`Tables::row`].
     #[inline(never)]
     pub fn value(&self, row: TableRow, axis: u8) -> Length {
         match self.edit.get() {
@@ -121,7 +122,7 @@ impl Storage {
         }
     }
 
-    /// A setting that is in EEPROM alone.
+    /// Returns a setting that is in EEPROM alone.
     #[inline(never)]
     pub fn cold(&self, setting: Setting) -> i32 {
         match self.cold.get() {
@@ -131,7 +132,7 @@ impl Storage {
         }
     }
 
-    /// Takes a new value of one, if there is room; else it is to be tried again.
+    /// Takes a new value of a setting in EEPROM alone, if there is room. Otherwise returns [`Status::Again`].
     pub fn set_cold(&self, setting: Setting, value: i32) -> Result<(), Status> {
         let takes = match self.cold.get() {
             Some((number, _)) => number == setting.number(),
@@ -146,14 +147,14 @@ impl Storage {
         Ok(())
     }
 
-    /// All of them have their defaults from now on.
+    /// Gives all settings in EEPROM alone their defaults from now on.
     pub fn forget_cold(&self) {
         self.cold.set(None);
         self.forgotten.set(Setting::WARM);
         self.wake.signal();
     }
 
-    /// The next of them that is on its way.
+    /// Returns the next setting in EEPROM alone that is to be saved.
     fn take_cold(&self) -> Option<Work> {
         let number = self.forgotten.get();
         if self.cold.get().is_none() && number < Setting::COLD {
@@ -164,7 +165,7 @@ impl Storage {
         self.cold.get().map(|_| Work::Cold)
     }
 
-    /// Does something to the program, a byte at most: [`Status::Again`] until it is done.
+    /// Does something to the program, writing one byte at most. Returns [`Status::Again`] until it is done.
     #[inline(never)]
     pub fn store(&self, what: Store<'_>) -> Result<(), Status> {
         let mut memory = Eeprom::take();
@@ -186,7 +187,7 @@ impl Storage {
         Ok(())
     }
 
-    /// What comes next.
+    /// Returns what is to be saved next.
     fn take(&self) -> Option<Work> {
         if self.edit.get().is_some() {
             return Some(Work::Edit);
@@ -222,14 +223,14 @@ impl Tables for &Storage {
     }
 
     fn takes(&self, row: TableRow) -> bool {
-        // The same row has only to be written once more.
+        // A row that is being saved only has to be written once more.
         let takes = self.edit.get().is_none_or(|edit| edit.row == row);
         self.awaited.set(!takes);
         takes
     }
 
     fn apply(&mut self, edit: &Edit) {
-        // What is only checked changes no table.
+        // A line that is only checked changes no table.
         if machine::is_checking() {
             return;
         }
@@ -238,7 +239,7 @@ impl Tables for &Storage {
     }
 }
 
-/// A byte is not written sooner than that: 3.4 ms.
+/// The first wait for a byte that is being written, ms: a byte takes 3.4 ms.
 const BYTE_MS: u64 = 3;
 
 /// The task.
@@ -269,7 +270,7 @@ pub async fn run(links: &'static Links) -> ! {
                 }
             }
             done(links, work);
-            // Others have their turn.
+            // Other tasks have their turn.
             embassy_futures::yield_now().await;
             if !links.storage.is_awaited() {
                 links.give_way(COURTESY, || true).await;
@@ -278,7 +279,7 @@ pub async fn run(links: &'static Links) -> ! {
     }
 }
 
-/// The next record to write, after `moved` others that made room for it; `None` when there is none left.
+/// Returns the next record to write, after `moved` others that made room for it; `None` when there is none left.
 #[inline(never)]
 #[small]
 fn next(links: &Links, memory: &Eeprom, work: Work, moved: u16) -> Option<Put> {
@@ -304,13 +305,13 @@ fn next(links: &Links, memory: &Eeprom, work: Work, moved: u16) -> Option<Put> {
     Some(put)
 }
 
-/// A key and its value, if the log has another.
+/// Returns a key and its value, if the log has another value.
 #[small]
 fn differs(log: &Log, memory: &Eeprom, key: u16, value: i32, default: i32) -> Option<(u16, i32)> {
     (log.newest(memory, key).unwrap_or(default) != value).then_some((key, value))
 }
 
-/// The key of a value of a row that the log does not have as it is to be, and that value.
+/// Returns the key and the value of the first value of a row for which the log has another one.
 #[inline(never)]
 #[small]
 fn changed(log: &Log, memory: &Eeprom, edit: &Edit) -> Option<(u16, i32)> {
@@ -319,7 +320,7 @@ fn changed(log: &Log, memory: &Eeprom, edit: &Edit) -> Option<(u16, i32)> {
     let differs = values.clone().zip(&kept).find(|((_, new), old)| new != old);
     let (axis, value) = match differs {
         Some((new, _)) => new,
-        // A position that is 0 leaves a trace of its own.
+        // A position that is 0 also gets a record, so that it counts as stored.
         None if edit.row.is_stored() && !tables::is_stored(log, memory, edit.row) => {
             values.next()?
         }
@@ -328,7 +329,7 @@ fn changed(log: &Log, memory: &Eeprom, edit: &Edit) -> Option<(u16, i32)> {
     Some((tables::key(edit.row, axis), value.0))
 }
 
-/// Something has arrived: there is room for another.
+/// Notes that a row or a setting has been saved: there is room for another.
 #[small]
 fn done(links: &Links, work: Work) {
     match work {

@@ -1,8 +1,8 @@
 //! Constant surface speed (G96): while X moves, the spindle turns as fast as its radius asks for.
 //!
-//! The power task calls [`look`] each 20 ms; it costs 60 cycles without a surface speed, and 5,000 with one. It reads where X is from exec's
-//! snapshot and sets S in `tasks::common`, under the ceiling. Nothing waits. Where X is not moved by any motor S stays as the planner has set it. D is the most
-//! under the override, too.
+//! The power task calls [`look`] every 20 ms. It costs 60 cycles without a surface speed, and 5,000 with one. It reads
+//! the position of X from exec's snapshot and sets S in `tasks::common`, under the ceiling. Nothing waits. If no motor
+//! moves X, S stays as the planner has set it. D limits S under the override, too.
 
 use kerf_macros::small;
 
@@ -13,7 +13,7 @@ use crate::boards::outputs;
 use crate::capability::Capability;
 use crate::gcode::command::Surface;
 
-/// X among the axes.
+/// The number of the X axis.
 const X: usize = 0;
 
 /// Has S follow X.

@@ -1,16 +1,19 @@
 //! Switches: what their settings make of them, and what the limits, the door and the emergency stop lead to.
 //!
-//! The interrupt that finds a limit hit, or the emergency stop, has stopped the steps already (`hal::inputs`).
-//! This, called by the control task, raises the [`alarm`]. Nothing here waits, and nothing can be full.
+//! When a limit or the emergency stop is hit, the interrupt that finds it has stopped the steps already
+//! (`hal::inputs`). The control task calls this module, which raises the [`alarm`]. Nothing here waits, and nothing
+//! can be full.
 //!
-//! A limit is a switch whose `sn` or `sx` says so; by default none does, so that a machine without switches runs.
-//! It counts when it closes (with `st` 1, opens), not if it stands so: a machine can start on its limit and move
-//! off it. The ends of an axis that is being homed are no limits for as long as it goes (`spare`).
+//! A limit is a switch whose `sn` or `sx` says so. By default none does, so that a machine without switches runs. A
+//! limit counts when it closes (with `st` 1: opens), not if it is closed already: a machine can start on its limit and
+//! move off it. While an axis is being homed, its ends are no limits (`spare`).
 //!
-//! The pins of an axis that homes by a stall ([`homing`](super::homing)) are at DIAG of its driver, which is high when it is worked, whatever `st` says.
+//! The pins of an axis that homes by a stall ([`homing`](super::homing)) are wired to DIAG of its driver, which is
+//! high when the motor is held up, whatever `st` says.
 //!
-//! Door and emergency stop count as they stand, if `saf` and `est` say that there are any. The door is a hold
-//! that no tilde ends before it is shut; one that is open when nothing runs keeps what comes from beginning.
+//! The door and the emergency stop count as they stand, if `saf` and `est` say that they exist. The door is a hold
+//! that no tilde ends before the door is shut. A door that is open while nothing runs keeps whatever comes from
+//! beginning.
 
 use kerf_macros::small;
 
@@ -41,10 +44,11 @@ pub const WIRED: u16 = {
     bits
 };
 
-/// The ends of axes, of the inputs.
+/// The inputs that are ends of axes.
 const ENDS: u16 = (1 << inputs::ENDS) - 1;
 
-/// What `sn` or `sx` says of the switch at an end: 0 off, 1 homing, 2 limit, 3 both. One whose pin is an encoder's is off.
+/// Returns what `sn` or `sx` says of the switch at an end: 0 off, 1 homing, 2 limit, 3 both. A switch whose pin is
+/// used by an encoder is off.
 pub fn mode(settings: &Settings, end: u8) -> u8 {
     let axis = end / 2;
     match end % 2 {
@@ -55,7 +59,8 @@ pub fn mode(settings: &Settings, end: u8) -> u8 {
     }
 }
 
-/// Takes over what the settings say. Those at no end close when they are worked, unless a setting says otherwise.
+/// Takes over the settings of all switches. Door and emergency stop close when they are worked, unless a setting says
+/// otherwise.
 #[inline(never)]
 #[small]
 pub fn set_up(settings: &Settings) {
@@ -75,7 +80,7 @@ pub fn set_up(settings: &Settings) {
         stops |= 1 << inputs::STOP;
     }
     pins::set_up(closing & WIRED, stops & WIRED);
-    // They may be worked already.
+    // Switches may be worked already.
     flags::set(Event::Realtime);
 }
 
@@ -84,7 +89,7 @@ pub fn is_stopped(settings: &Settings) -> bool {
     settings.stop_switch() != 0 && pins::worked() & 1 << inputs::STOP != 0
 }
 
-/// Looks for what has happened.
+/// Looks at what switches have done, and acts on it.
 pub fn serve(links: &Links) {
     let hits = pins::take_hits();
     let settings = links.settings.borrow();

@@ -1,7 +1,7 @@
-//! The encoder of the spindle, looked after in thread mode: its settings, its speed, pulses that do not fit.
+//! The encoder of the spindle, looked after in thread mode: its settings, its speed, and pulses that do not fit.
 //!
-//! The power task calls [`look`] each 20 ms; it costs 1,500 cycles then, and nothing without an encoder. The state is an [`Encoder`](crate::encoder::Encoder) in
-//! `tasks::common`, under the ceiling. Nothing waits.
+//! The power task calls [`look`] every 20 ms, which costs 1,500 cycles, or nothing without an encoder. The state is an
+//! [`Encoder`](crate::encoder::Encoder) in `tasks::common`, under the ceiling. Nothing waits.
 
 use kerf_macros::small;
 
@@ -19,16 +19,16 @@ use crate::hal::{encoder, flags};
 use crate::machine::Alarm;
 use crate::status::Status;
 
-/// Microseconds of a count of time.
+/// Microseconds in a count of time.
 const COUNT_US: i32 = 4;
 
-/// Whether it is a setting of the encoder.
+/// Whether a setting belongs to the encoder.
 #[small]
 pub fn is_own(setting: Setting) -> bool {
     setting.owner() == Owner::Spindle && setting.index() >= spindle::N
 }
 
-/// Takes over the settings.
+/// Takes over the settings of the encoder.
 #[inline(never)]
 #[small]
 pub fn set_up(thread: Thread, storage: &Storage) {
@@ -55,7 +55,7 @@ pub fn set_up(thread: Thread, storage: &Storage) {
     common::with(thread, |common| common.encoder.set_up(per_turn, tells, &pulses));
 }
 
-/// Looks at what the sensors have seen.
+/// Looks at what the sensors of the encoder have seen.
 #[inline(never)]
 #[small]
 pub fn look(links: &Links) {
@@ -65,11 +65,11 @@ pub fn look(links: &Links) {
     // Another exception is told first.
     let may_tell = links.notices.exception.get().is_none();
     let first_misfit = common::with(links.thread, |common| {
-        // In here: exec must not have looked at newer ones. In a pass it is exec that finds a misfit.
+        // Under the lock, so that exec cannot have looked at newer pulses before. In a pass exec finds the misfits.
         common.encoder.sample(&encoder::read());
         may_tell && common.encoder.take_misfit()
     });
-    // Who waits for the spindle asks again.
+    // Whoever waits for the spindle asks again.
     flags::set(Event::BlockDone);
     if first_misfit {
         links.except(Status::PulseMisfit);
@@ -86,7 +86,8 @@ pub fn look(links: &Links) {
     }
 }
 
-/// How fast the spindle turns, thousandths of a turn a minute, below 0 backwards if that is told; `None` without an encoder.
+/// Returns how fast the spindle turns, in thousandths of a turn a minute. Negative means backwards, if the encoder
+/// tells the direction. `None` without an encoder.
 #[small]
 pub fn speed(thread: Thread) -> Option<i32> {
     if !Capability::Lathe.is_built_in() {
@@ -101,7 +102,8 @@ pub fn speed(thread: Thread) -> Option<i32> {
     })
 }
 
-/// How the pass in step with the spindle stands, of [`Encoder::pass`](crate::encoder::Encoder::pass). A refusal is told once.
+/// Returns how the pass in step with the spindle stands ([`Encoder::pass`](crate::encoder::Encoder::pass)). A refusal
+/// is returned once.
 #[small]
 pub fn pass(thread: Thread) -> Status {
     if !Capability::Lathe.is_built_in() {
@@ -119,7 +121,7 @@ pub fn pass(thread: Thread) -> Status {
     })
 }
 
-/// How far the axes are ahead of the spindle in the pass, um.
+/// Returns how far the axes are ahead of the spindle in the pass, um.
 #[small]
 pub fn error(thread: Thread) -> i16 {
     if !Capability::Lathe.is_built_in() {
@@ -128,14 +130,14 @@ pub fn error(thread: Thread) -> i16 {
     common::with(thread, |common| common.encoder.error())
 }
 
-/// Whether the pass has come to another index since this was asked last.
+/// Whether the pass has come to another index pulse since this was asked last.
 #[inline(never)]
 #[small]
 pub fn take_news(thread: Thread) -> bool {
     Capability::Lathe.is_built_in() && common::with(thread, |common| common.encoder.take_news())
 }
 
-/// Pulses of the encoder in a turn; 0 without one.
+/// Returns the pulses of the encoder in a turn; 0 without an encoder.
 #[small]
 pub fn per_turn(thread: Thread) -> u16 {
     if !Capability::Lathe.is_built_in() {
@@ -144,7 +146,7 @@ pub fn per_turn(thread: Thread) -> u16 {
     common::with(thread, |common| common.encoder.per_turn())
 }
 
-/// Pulses that did not fit so far, 255 for more.
+/// Returns how many pulses did not fit so far, 255 for more.
 #[small]
 pub fn misfits(thread: Thread) -> u8 {
     if !Capability::Lathe.is_built_in() {

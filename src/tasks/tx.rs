@@ -12,10 +12,10 @@ use crate::protocol::Checksum;
 
 /// Most bytes written between two calls of [`Tx::room`].
 pub const PIECE: usize = 64;
-/// Most bytes of a report that wait to leave when its next piece is put: an answer that comes in between waits for these, 2 ms at
-/// 115,200 baud.
+/// The most bytes of a report that wait to leave when its next piece is put. An answer that comes in between waits for
+/// these bytes: 2 ms at 115,200 baud.
 const AHEAD: usize = 24;
-/// The bits of two bytes, times the milliseconds in a second.
+/// The bits of two bytes, times the milliseconds of a second.
 const TWO_BYTES_MS: u32 = 20 * 1_000;
 
 /// The transmit ring's filling end.
@@ -41,7 +41,7 @@ impl Tx {
         wait_transmitted(self.thread, self.port, is_due)
     }
 
-    /// Whether that may be put now.
+    /// Whether the next piece of a report may be put now.
     pub fn is_low(&self) -> bool {
         self.ring.free() >= TX_RING - 1 - AHEAD
     }
@@ -56,7 +56,7 @@ impl Tx {
         uart::kick(self.port);
     }
 
-    /// Goes on at `rate` bits a second. What has been put is to have left at the old rate; what the sender says
+    /// Goes on at `rate` bits a second. What has been put must have left at the old rate. What the sender says
     /// meanwhile may be spoilt.
     pub fn set_rate(&mut self, rate: u32) {
         uart::set_rate(self.port, rate);
@@ -68,20 +68,21 @@ impl Tx {
         self.ring.free() == TX_RING - 1
     }
 
-    /// How long what has been put may take to leave when the ring is empty, ms. The transmitter holds two bytes more. It
-    /// has a flag for their end, but the flag may be left from a pause in the middle of the line; their time is certain.
+    /// Returns how long, ms, what has been put may take to leave after the ring is empty. The transmitter holds two
+    /// bytes more. It has a flag for their end, but that flag may be left from a pause in the middle of the line; the
+    /// time of two bytes is certain.
     pub fn last_ms(&self) -> u16 {
         (TWO_BYTES_MS / self.rate) as u16 + 2
     }
 
-    /// Puts bytes up to the ring's end. What is left of them.
+    /// Puts bytes up to the ring's end. Returns the bytes that are left.
     #[inline(always)]
     fn fill(&mut self, bytes: Plain) -> Plain {
         let count = self.ring.fill(|slots| bytes.copy(slots));
         bytes.behind(count)
     }
 
-    /// Puts what is left when the ring's end came in between: there is room beyond it.
+    /// Puts the bytes that are left behind the ring's end: there is room at its beginning.
     #[inline(never)]
     fn fill_again(&mut self, bytes: Plain) {
         self.fill(bytes);
@@ -112,7 +113,7 @@ impl crate::protocol::Out for Tx {
         self.sum_behind(before);
     }
 
-    // By itself, for it is called in many places.
+    // Not inlined, because it is called in many places.
     #[inline(never)]
     fn put_plain(&mut self, bytes: Plain) {
         let before = self.ring.filled();

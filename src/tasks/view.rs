@@ -1,8 +1,8 @@
 //! What the protocol sees of the machine: the links, through one borrow at a time.
 //!
-//! Made anew for each step of a response or report, never kept across an `.await`. Positions and
-//! speed come from exec's snapshot while something runs, from the G-code model when nothing does. Steps of one report
-//! or group share what was [`Seen`] when the first of them told of motion, [`Port::seen`].
+//! A view is made anew for each step of a response or report, and never kept across an `.await`. Positions and speed
+//! come from exec's snapshot while something runs, and from the G-code model otherwise. All steps of one report or
+//! group share what was [`Seen`] when the first of them told of motion ([`Port::seen`]).
 
 #[cfg(feature = "bed-plane")]
 mod bed;
@@ -70,8 +70,8 @@ pub fn moves(doing: Doing, hold: Hold) -> bool {
     }
 }
 
-/// The least `qr` that is told. A full queue shows in responses that are not there yet; but a sender that is
-/// told of five or less (CNCjs) keeps the last response to itself, and forgets it if it is paused meanwhile.
+/// The least `qr` that is told. That the queue is full shows in responses that do not come yet. A sender that is told
+/// of five or less (CNCjs) keeps the last response to itself, and forgets it if it is paused meanwhile.
 const QUEUE_FREE_MIN: usize = 6;
 
 /// A look at the machine.
@@ -81,7 +81,7 @@ pub struct View<'a> {
     settings: RefMut<'a, Settings>,
     report: RefMut<'a, Memory>,
     seen: OnceCell<Seen>,
-    /// Values are those of the moment at which the report or group began.
+    /// Values are those of the moment at which the report or group first told of motion.
     shares: bool,
 }
 
@@ -94,9 +94,9 @@ pub struct Seen {
 }
 
 impl Seen {
-    /// How it stands now. Thread mode.
+    /// Returns how the machine stands now. Thread mode.
     fn now(links: &Links) -> Self {
-        // In this order: exec may take up what is queued in between.
+        // In this order, because exec may take up what is queued in between.
         let queued = is_queued(links);
         let motion = snapshot(links.thread).moment();
         Self { motion, carries_out: queued || motion.running }
@@ -122,7 +122,8 @@ impl<'a> View<'a> {
         }
     }
 
-    /// Cost: 6,000 cycles for the first value of a report or group that tells of motion, 700 for the others.
+    /// Returns how the machine stood. Cost: 6,000 cycles for the first value of a report or group that tells of
+    /// motion, 700 for further ones.
     fn seen(&self) -> &Seen {
         self.seen.get_or_init(|| {
             let shared = if self.shares { self.port.seen.get() } else { None };
@@ -158,7 +159,7 @@ impl<'a> View<'a> {
         self.works_now()
     }
 
-    /// Whether a line is being carried out at the moment, without positions, which take 6,000 cycles.
+    /// Whether a line is being carried out at the moment. Takes no positions, which would cost 6,000 cycles.
     #[inline(never)]
     fn works_now(&self) -> bool {
         is_queued(self.links) || with(self.links.thread, |state| state.motion.running)
@@ -169,27 +170,27 @@ impl<'a> View<'a> {
         self.links.job.get().is_over() && !self.carries_out()
     }
 
-    /// Whether a hold is on that anybody is to see.
+    /// Whether a hold is on that senders are to see.
     fn is_held(&self) -> bool {
         machine::shows_hold(|| self.has_work())
     }
 
-    /// The machine position of an axis.
+    /// Returns the machine position of an axis.
     fn position(&self, axis: usize) -> Length {
         let programmed = self.links.model.borrow().position().get(axis).copied();
         let programmed = programmed.unwrap_or(Length::ZERO);
-        // Until the planner has counted anew, steps mean what they meant before a setting changed.
+        // Until the planner has counted steps anew, they mean what they meant before a setting changed.
         if !self.is_busy() || self.links.changes.has(Changes::STEPS) {
             return programmed;
         }
-        // An axis that moves no motor is where it should be.
+        // An axis that moves no motor is where lines have sent it.
         let at = counted(&self.settings, &self.motion().position, axis, None);
         #[cfg(feature = "bed-plane")]
         let at = at.map(|at| bed::lowered(self, axis, at));
         at.unwrap_or(programmed)
     }
 
-    /// `home`: 2 while homing, 1 when all axes that have a switch for it are homed.
+    /// Returns `home`: 2 while homing, 1 when all axes that have a homing switch are homed, else 0.
     fn home_state(&self) -> i32 {
         if machine::cycle() == Cycle::Homing {
             return 2;
@@ -200,7 +201,7 @@ impl<'a> View<'a> {
         (axes != 0 && homed).into()
     }
 
-    /// Whether the machine is at rest, and something may begin that no line asks for.
+    /// Whether the machine is at rest, so that something may begin that no line asks for. If not, the error says why.
     fn may_begin(&self) -> Result<(), Status> {
         let alarm = machine::alarm();
         if alarm != Alarm::None {
@@ -210,7 +211,7 @@ impl<'a> View<'a> {
         if busy { Err(Status::NotAccepted) } else { Ok(()) }
     }
 
-    /// As [`Links::may_feed`], where this view is at hand: there is one at a time.
+    /// Does what [`Links::may_feed`] does, for callers that have a view already: there is one at a time.
     pub fn may_feed(&mut self) -> bool {
         let links = self.links;
         if self.port.number == links.feeder.get() {
@@ -220,13 +221,14 @@ impl<'a> View<'a> {
         let free = !waits && !self.is_busy();
         if free {
             links.feeder.set(self.port.number);
-            // It has been told nothing so far.
+            // The new feeder has been told nothing so far.
             self.report.refresh();
         }
         free
     }
 
-    /// Whether lines of G-code wait that are carried out first. Where lines are answered in their order those of the port come later.
+    /// Whether lines of G-code wait that are carried out first. Where lines are answered in their order, lines of the
+    /// port itself come later and do not count.
     fn has_others(&self) -> bool {
         let in_order = self.port.speech.get().is_in_order() || self.port.is_plain();
         self.links.ports.iter().any(|port| {
@@ -234,17 +236,17 @@ impl<'a> View<'a> {
         })
     }
 
-    /// Whether settings and offsets may change: not in check mode, in which a file may set them.
+    /// Whether settings and offsets may change. They may not in check mode, in which a file may set them.
     fn may_set(&self) -> Result<(), Status> {
         if machine::is_checking() { Err(Status::NotAccepted) } else { Ok(()) }
     }
 
-    /// Hands something to the planner that no line asks for. The port that did feeds the machine now.
+    /// Hands the planner something that no line asks for. The port that asked becomes the feeder.
     #[inline(never)]
     fn begin(&mut self, motion: Motion, cycle: machine::Event) -> Status {
         let links = self.links;
         if links.feeder.replace(self.port.number) != self.port.number {
-            // It has been told nothing so far.
+            // The new feeder has been told nothing so far.
             self.report.refresh();
         }
         let mut commands = links.commands.borrow_mut();
@@ -256,7 +258,7 @@ impl<'a> View<'a> {
         Status::Ok
     }
 
-    /// A setting is to be put away; if it has changed `others`, all of them.
+    /// Has a setting saved; or all of them, if the setting has changed `others`.
     fn note(&self, setting: Setting, others: bool) {
         match others {
             true => self.links.storage.note(0, ITEMS),
@@ -268,7 +270,7 @@ impl<'a> View<'a> {
         self.links.model.borrow().work_offset().get(axis).copied().unwrap_or(Length::ZERO)
     }
 
-    /// 1 if a switch is worked, 0 if not, -1 if there is none or it is off.
+    /// Returns 1 if a switch is worked, 0 if not, -1 if there is no switch or it is off.
     fn input(&self, input: u8) -> i32 {
         let off = usize::from(input) < inputs::ENDS && switches::mode(&self.settings, input) == 0;
         if off || (switches::WIRED & !pins::left_out()) >> input & 1 == 0 {
@@ -281,7 +283,7 @@ impl<'a> View<'a> {
         heat::standing(self.links, heater).unwrap_or_default()
     }
 
-    /// S, thousandths of a turn a minute.
+    /// Returns S, in thousandths of a turn a minute.
     fn programmed_speed(&self) -> i32 {
         values::modal(self, Value::SpindleSpeed).min(2_000_000) * 1_000
     }
@@ -332,7 +334,7 @@ impl Machine for View<'_> {
     }
 
     fn doing(&mut self) -> Doing {
-        // A jog of G-code ends when nothing is left of it: by now, not at the moment that a report is about.
+        // A jog of G-code ends when nothing of it is left now, whatever moment a report is about.
         if machine::cycle() == Cycle::Jog && !self.works_now() {
             machine::carry_out(machine::Event::Done);
         }
@@ -360,7 +362,7 @@ impl Machine for View<'_> {
     }
 
     fn alarm(&mut self, alarm: Alarm) {
-        // One that another port has ended since the line arrived does not begin again.
+        // An alarm that another port has ended since the line arrived does not begin again.
         let port = self.port;
         if !port.has_stopped.get() || self.links.cleared_by.get() == port.number {
             alarm::raise(self.links, alarm);
@@ -369,7 +371,7 @@ impl Machine for View<'_> {
 
     fn clear(&mut self) -> Status {
         self.links.cleared_by.set(self.port.number);
-        // One that has begun while the line waits for rest is another one.
+        // An alarm that has begun while the line waits for rest is not the one that the line is to end.
         let meant = self.port.clears.get();
         if meant.is_on() && meant.is_exceeded_by(machine::alarm()) {
             self.port.clears.set(Alarm::None);
@@ -417,7 +419,7 @@ impl Machine for View<'_> {
     }
 
     fn hold_back(&mut self) {
-        // A tilde that has come before is not meant.
+        // A tilde that has come before does not count for this hold.
         self.links.signs.clear();
         self.links.signs.door.set(false);
         machine::take(machine::Event::Hold);
@@ -540,13 +542,13 @@ impl Machine for View<'_> {
     }
 }
 
-/// Free blocks of the planner, as they are told.
+/// Returns how many blocks of the planner are free, as senders are told.
 #[small]
 pub fn queue_free() -> usize {
     queue::free().max(QUEUE_FREE_MIN)
 }
 
-/// Tells outputs and inputs what the settings say of them.
+/// Has outputs and inputs follow the settings.
 #[small]
 pub fn set_hardware(thread: Thread, settings: &Settings) {
     switches::set_up(settings);
@@ -556,7 +558,7 @@ pub fn set_hardware(thread: Thread, settings: &Settings) {
     drivers::tell(settings);
 }
 
-/// The motors of which something is so, as bits.
+/// Returns the motors for which `is` is true, as bits.
 #[small]
 fn motors(is: impl Fn(usize) -> bool) -> u8 {
     let mut bits = 0;

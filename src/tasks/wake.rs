@@ -1,7 +1,7 @@
 //! Wake-ups between thread-mode tasks.
 //!
-//! A wake-up is remembered until it is waited for; several before that are one. Each [`Wake`] has one
-//! waiting task. Cost on AVR: 20 cycles to signal a task that does not wait, 150 one that does.
+//! A wake-up is remembered until it is waited for; several before that count as one. Each [`Wake`] has one waiting
+//! task. Cost on AVR: 20 cycles to signal when no task waits, 150 when one does.
 
 use core::cell::Cell;
 use core::future::poll_fn;
@@ -15,7 +15,7 @@ pub struct Wake {
 }
 
 impl Wake {
-    /// Wakes the task that waits, or the next that will.
+    /// Wakes the task that waits, or the next task that will wait.
     #[inline(never)]
     pub fn signal(&self) {
         if !self.signalled.replace(true)
@@ -35,8 +35,8 @@ impl Wake {
         poll_fn(|cx| self.poll(cx))
     }
 
-    /// Ready, and the signal used up, if there is one; else `cx` is woken at the next. For a task that waits for
-    /// something else as well.
+    /// Returns `Ready` and uses the signal up, if there is one. Otherwise wakes `cx` at the next signal. For a task
+    /// that waits for something else as well.
     pub fn poll(&self, cx: &mut Context<'_>) -> Poll<()> {
         if self.signalled.replace(false) {
             return Poll::Ready(());
@@ -46,7 +46,7 @@ impl Wake {
     }
 }
 
-/// Wakes the reporter, unless it looks every few milliseconds anyway and nobody asked for more.
+/// Wakes the reporter, unless the reporter polls anyway and nobody asks for more.
 #[derive(Default)]
 pub struct ReporterWake {
     wake: Wake,
@@ -54,14 +54,14 @@ pub struct ReporterWake {
 }
 
 impl ReporterWake {
-    /// Something that reports show may have changed.
+    /// Tells the reporter that something that reports show may have changed. Does nothing while the reporter polls.
     pub fn signal(&self) {
         if !self.polling.get() {
             self.wake.signal();
         }
     }
 
-    /// Something that must not wait.
+    /// Wakes the reporter in any case.
     pub fn notify_now(&self) {
         self.wake.signal();
     }
@@ -71,7 +71,7 @@ impl ReporterWake {
         self.wake.wait()
     }
 
-    /// Whether signals may be left out from now on, for the reporter polls.
+    /// Sets whether signals may be left out from now on because the reporter polls.
     pub fn set_polling(&self, polling: bool) {
         self.polling.set(polling);
     }

@@ -1,10 +1,11 @@
 //! The lines of a pool in order of arrival: how long each is, and what to do with it.
 //!
-//! A ring, for the oldest line leaves most often. Owned by the pool. Cost on AVR: 15 cycles to find a line, 30 to add or to take one.
+//! A ring, because the oldest line leaves most often. Owned by the pool. Cost on AVR: 15 cycles to find a line, 30 to
+//! add or to remove one.
 
 use super::{Class, SLOTS};
 
-/// As many as the pool has slots, with that of control lines that overtake.
+/// The slots of the pool, and the one for control lines that overtake.
 const SIZE: usize = SLOTS + 1;
 
 /// A line.
@@ -13,13 +14,13 @@ pub struct Entry {
     /// Bytes that are kept.
     pub len: u8,
     pub class: Class,
-    /// Bytes that came with it and are not kept, but for its end.
+    /// Bytes that came with the line and are not kept, its end not counted.
     pub besides: u16,
 }
 
 /// The lines.
 pub struct Entries {
-    /// Where the oldest is.
+    /// The slot of the oldest line.
     first: u8,
     count: u8,
     slots: [Entry; SIZE],
@@ -36,19 +37,19 @@ impl Entries {
         self.count.into()
     }
 
-    /// Whether there is none.
+    /// Whether there are no lines.
     pub fn is_empty(&self) -> bool {
         self.count == 0
     }
 
-    /// The slot of a line.
+    /// Returns the slot of a line, counted from the oldest.
     #[inline(always)]
     fn slot(&self, index: u8) -> usize {
         let slot = usize::from(self.first) + usize::from(index);
         if slot < SIZE { slot } else { slot - SIZE }
     }
 
-    /// A line, counted from the oldest.
+    /// Returns a line, counted from the oldest.
     pub fn get(&self, index: usize) -> Option<&Entry> {
         let is_there = index < self.len();
         self.slots.get(self.slot(index as u8)).filter(|_| is_there)
@@ -60,17 +61,17 @@ impl Entries {
         self.slots.get_mut(slot).filter(|_| is_there)
     }
 
-    /// The oldest line.
+    /// Returns the oldest line.
     pub fn first(&self) -> Option<&Entry> {
         self.get(0)
     }
 
-    /// The newest line.
+    /// Returns the newest line.
     pub fn last(&self) -> Option<&Entry> {
         self.get(self.len().wrapping_sub(1))
     }
 
-    /// All lines, the oldest first.
+    /// Returns all lines, the oldest first.
     pub fn iter(&self) -> impl Iterator<Item = &Entry> {
         (0..self.len()).filter_map(|index| self.get(index))
     }
@@ -87,7 +88,7 @@ impl Entries {
         has_room
     }
 
-    /// Takes the oldest line out.
+    /// Removes the oldest line and returns it.
     pub fn pop_first(&mut self) -> Option<Entry> {
         let entry = self.first().copied()?;
         self.first = self.slot(1) as u8;
@@ -95,7 +96,7 @@ impl Entries {
         Some(entry)
     }
 
-    /// Takes a line out; those behind it move up.
+    /// Removes a line. The lines behind it move up.
     pub fn remove(&mut self, index: usize) {
         for to in index..self.len() {
             if let Some(next) = self.get(to + 1).copied()

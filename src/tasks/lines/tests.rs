@@ -62,7 +62,7 @@ fn a_line_longer_than_the_pool_is_one_fault() {
     let mut pool = LinePool::new(Box::leak(Box::new([0; 20])), 0);
     for line in ["g1 x2 (0123456789)  \r\n", "(0123456789abcdefghi)\n"] {
         feed(&mut pool, line.as_bytes());
-        // What is given back of it leaves room for a control line.
+        // What is kept of the line leaves room for a control line.
         feed(&mut pool, b"?\n");
         assert_eq!(take(&mut pool, true), Some((b"?".to_vec(), Class::Control)));
         let fault = take(&mut pool, true);
@@ -119,7 +119,7 @@ fn lines_taken_whole_are_those_taken_byte_by_byte() {
             let mut rest = line.as_bytes();
             let mut at_once = 0u8;
             while !rest.is_empty() {
-                // What has come so far.
+                // The bytes that have come so far.
                 let come = &rest[..rest.len().min(round % 40 + 1)];
                 let (count, ends) = whole.put_text(come);
                 at_once += u8::from(ends);
@@ -161,14 +161,14 @@ fn dropped_lines_keep_their_place_and_control_lines_are_none_of_them() {
         assert_eq!(take(&mut pool, true), Some((text.into(), class)));
     }
     assert!(!pool.has_data());
-    // In order what had come of it is kept.
+    // Where lines keep their order, the beginning of a dropped line is kept.
     pool.keep_order(true);
     feed(&mut pool, b"g1x");
     pool.terminate_partial(Status::Terminated);
     feed(&mut pool, b"3\n");
     assert_eq!(take(&mut pool, true), Some((b"g1x".to_vec(), dropped)));
     pool.keep_order(false);
-    // Between two lines there is none to drop.
+    // Between two lines there is nothing to drop.
     pool.terminate_partial(Status::Terminated);
     feed(&mut pool, b"\n");
     assert_eq!(pool.free(), 8);
@@ -225,7 +225,7 @@ fn every_byte_is_counted_with_some_line() {
             pool.remove(id);
         }
     }
-    // The last line is empty: it is counted with the next.
+    // The last line is empty: its byte counts with the next line.
     assert_eq!((sent - counted, pool.besides), (1, 1));
     feed(&mut pool, b"g1\r\ng2\n");
     assert_eq!([pool.length(LineId(0)), pool.length(LineId(1))], [4, 4]);
@@ -269,7 +269,7 @@ fn a_question_mark_needs_no_end() {
 #[test]
 fn lines_in_order_leave_the_reserve() {
     let mut pool = LinePool::new(Box::leak(Box::new([0; 100])), 20);
-    // Each begins where a short control line would fit whole.
+    // Both lines begin where a short control line would fit whole.
     feed(&mut pool, b"0123456789012345678901234567890123456789\n");
     assert!(pool.ready());
     feed(&mut pool, b"{a:n}\n0123456789012345");
@@ -301,7 +301,7 @@ fn a_control_line_overtakes_what_is_coming_in() {
     }
 }
 
-/// A line of JSON that holds G-code is data from the start, or it would overtake, and outlive a kill.
+/// A line of JSON that holds G-code is data from the start. As a control line it would overtake, and outlive a kill.
 #[test]
 fn json_that_holds_g_code_is_data() {
     for line in [
@@ -331,7 +331,7 @@ fn json_that_holds_g_code_is_data() {
     }
 }
 
-/// A control line that were taken in part would wait, and those behind it would overtake it.
+/// A control line that was taken in part would wait, and control lines behind it would overtake it.
 #[test]
 fn a_control_line_comes_whole_or_stays_in_the_ring() {
     let mut pool = LinePool::new(Box::leak(Box::new([0; 40])), 16);

@@ -1,4 +1,4 @@
-//! The answer to a line, which goes on as far as there is room to transmit it, and gives way to others behind each step.
+//! The answer to a line. It goes on as far as there is room to transmit it, and gives way to others behind each step.
 
 use super::block::{is_free, run_block};
 use super::{Line, Session};
@@ -18,14 +18,15 @@ use crate::tasks::ports::{Port, REPORT};
 use crate::tasks::tx::Tx;
 use crate::tasks::view::View;
 
-/// Bytes of an echo that are put at once.
+/// Bytes of an echo that are put in one step.
 const ECHO: usize = 62;
-/// Most steps of a response before others have their turn: most answers take six. They have it as well behind each step while the
-/// ring of the second port is filling: to read a row of the tables may take 3 ms, and twice that while exec takes most of the CPU.
+/// The most steps of a response in one turn; most answers take six. While the ring of the second port is filling,
+/// others have their turn behind each step: to read a row of the tables may take 3 ms, and twice that while exec takes
+/// most of the CPU.
 const STEPS: u8 = 8;
-/// Most steps in a turn in which a millisecond has ended.
+/// The most steps in a turn in which a millisecond has ended.
 const STEPS_LATE: u8 = 5;
-/// No step is begun when a turn has taken so long, ms.
+/// When a turn has taken this long, no further step is begun, ms.
 const TURN_MS: u32 = 4;
 
 /// A response under way.
@@ -38,13 +39,13 @@ pub(super) struct Answer {
     pub has_stepped: bool,
     /// The line is to be sent back.
     pub echoes: bool,
-    /// Tables have to be waited for.
+    /// The answer waits for the tables.
     pub waits: bool,
-    /// From the first byte on: nobody else talks on this port.
+    /// The transmitter, from the first byte of the answer on: nobody else talks on this port.
     pub tx: Option<Line>,
 }
 
-/// How far it has come.
+/// How far an answer has come.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Progress {
     /// The answer is at its end.
@@ -53,7 +54,8 @@ enum Progress {
     Waits,
 }
 
-/// Goes on with what is under way on a port, step by step while another is `awaited`. Whether it has come to its end.
+/// Goes on with what is under way on a port, step by step while another answer is `awaited`. Returns whether the
+/// session has come to its end.
 #[inline(never)]
 pub(super) fn go_on(
     links: &'static Links,
@@ -84,7 +86,7 @@ pub(super) fn go_on(
     true
 }
 
-/// What is in the ring has to leave before anything else is said.
+/// Has a session wait until what is in the transmit ring has left, before anything else is said.
 #[inline(never)]
 #[small]
 pub(super) fn leave(tx: Option<Line>, session: &mut Session) {
@@ -93,7 +95,8 @@ pub(super) fn leave(tx: Option<Line>, session: &mut Session) {
     }
 }
 
-/// Does what a response has been waited for if that has left: 1 to 4 ms after its last byte. Whether it has.
+/// Resets the machine or changes the rate, when the response has left: 1 to 4 ms after its last byte. Returns whether
+/// it has left.
 #[inline(never)]
 #[small]
 fn has_left(links: &Links, tx: &mut Tx, since: &mut Option<u16>) -> bool {
@@ -119,8 +122,8 @@ fn has_left(links: &Links, tx: &mut Tx, since: &mut Option<u16>) -> bool {
 }
 
 impl Answer {
-    /// Whether there is room for the next part of it, of a list only little ahead of what has left: a `?` is answered behind that. `None` if
-    /// it does not wait for room.
+    /// Returns whether there is room for the next part of the answer; `None` if the answer does not wait for room. A
+    /// list goes on only while little waits to leave, because a `?` is answered behind what waits.
     #[inline(never)]
     #[small]
     pub(super) fn may_go_on(&self, port: &Port) -> Option<bool> {
@@ -135,7 +138,7 @@ impl Answer {
     /// Goes on as far as there is room.
     #[inline(never)]
     fn step(&mut self, links: &'static Links, port: &'static Port, awaited: bool) -> Progress {
-        // A `?` is answered first.
+        // The answer to a `?` never counts as one that has had a turn, so that it comes first.
         self.has_stepped = self.id != LineId::NONE;
         if self.waits && links.storage.is_awaited() && !port.asks_report() {
             return Progress::Waits;
@@ -152,8 +155,8 @@ impl Answer {
         progress
     }
 
-    /// Carries the response on while there is room, a bounded number of steps. Says how far it has come, and whether the
-    /// transmitter is still needed.
+    /// Carries the response on while there is room, for a bounded number of steps. Returns how far it has come, and
+    /// whether the transmitter is still needed.
     #[inline(never)]
     #[small]
     fn steps(
@@ -165,14 +168,14 @@ impl Answer {
         awaited: bool,
     ) -> (Progress, bool) {
         if port.drops_unanswered() && !begun && self.id != LineId::NONE {
-            // Nobody waits for it.
+            // Nobody waits for the answer.
             return (Progress::Done, false);
         }
         let (mut begun, since) = (begun, millis());
-        // A `?` is answered in one turn, if that is short enough.
+        // A `?` is answered in one turn, if its answer is short enough.
         let asks = self.id == LineId::NONE;
         for done in 0..if asks { 2 * STEPS } else { STEPS } {
-            // A list takes 50 ms and more.
+            // A list takes 50 ms and more, so a report may be put into it.
             if port.asks_report() && self.request.interject() {
                 port.take_asked(REPORT);
             }
@@ -189,7 +192,7 @@ impl Answer {
             }
             match step(links, port, self.id, &mut self.request, tx) {
                 Next::More => begun = true,
-                // Of a response that has begun the rest is due.
+                // Keeps the transmitter if the response has begun: its rest is due.
                 Next::Wait => {
                     self.waits = true;
                     return (Progress::Waits, self.request.has_begun());
@@ -208,7 +211,7 @@ impl Answer {
     }
 }
 
-/// Whether others have their turn before a response goes on that has come so many steps on in this turn, which began then.
+/// Whether others have their turn before a response goes on. The turn has made `done` steps and began at `since`, ms.
 #[inline(never)]
 #[small]
 fn gives_way(done: u8, since: u32) -> bool {
@@ -216,15 +219,16 @@ fn gives_way(done: u8, since: u32) -> bool {
     uart::presses() || is_unheard() || late() || millis().wrapping_sub(since) >= TURN_MS
 }
 
-/// Whether there is room for the first part of an answer; `None` while somebody else talks on the port, whose end wakes the parser.
+/// Whether there is room for the first part of an answer. `None` while somebody else talks on the port; the parser is
+/// woken when they have finished.
 #[inline(never)]
 #[small]
 pub(super) fn has_room(port: &Port) -> Option<bool> {
     port.tx.try_lock().ok().map(|tx| tx.has_room())
 }
 
-/// Sends a part of the line back, from `at` on. Whether there is more. It is done by the line, not by the byte, so
-/// that it never stands in the midst of a response or a report, and never loses anything.
+/// Sends a part of the line back, from `at` on. Returns whether there is more. Lines are echoed whole, not byte by
+/// byte, so that an echo never stands in the middle of a response or a report, and never loses anything.
 #[inline(never)]
 #[small]
 fn echo(links: &Links, port: &Port, id: LineId, at: &mut u8, tx: &mut Tx) -> bool {
@@ -241,7 +245,7 @@ fn echo(links: &Links, port: &Port, id: LineId, at: &mut u8, tx: &mut Tx) -> boo
     more
 }
 
-/// Carries out the block of a request, if that can be done now; or drops it in a queue flush.
+/// Carries out the block of a request, or drops it in a queue flush. Returns false if the block has to wait.
 #[inline(never)]
 fn ran(links: &Links, port: &Port, id: LineId, block: Span, request: &mut Request) -> bool {
     if machine::is_flushing() {
@@ -250,7 +254,7 @@ fn ran(links: &Links, port: &Port, id: LineId, block: Span, request: &mut Reques
     }
     let lines = port.lines.borrow();
     if let Class::Fault(status) = lines.class(id) {
-        // It has been dropped since it was begun.
+        // The line has been dropped since its answer was begun.
         request.ran(status, false);
         return true;
     }
@@ -265,7 +269,7 @@ fn ran(links: &Links, port: &Port, id: LineId, block: Span, request: &mut Reques
     true
 }
 
-/// The line's slot is free again.
+/// Frees the slot of a line that has been answered.
 #[inline(never)]
 pub(super) fn finish(links: &Links, port: &Port, id: LineId) {
     port.lines.borrow_mut().remove(id);

@@ -1,4 +1,4 @@
-//! Blocks of G-code, from ports and built-in jobs: interpreted, and handed to the planner.
+//! Blocks of G-code, from ports and from built-in jobs: they are interpreted and handed to the planner.
 
 use heapless::Vec;
 
@@ -18,14 +18,14 @@ use crate::tasks::ports::Port;
 use crate::tasks::reporter::tell_startup;
 use crate::tasks::view::View;
 
-/// Whether a block can be carried out now, or refused: neither has the planner to be waited for, nor the
-/// tables, and nothing is being dropped.
+/// Whether a block can be carried out or refused now. It cannot while the planner or the tables are waited for, or
+/// while anything is being dropped.
 pub fn is_free(links: &Links) -> bool {
     let waits = links.commands_taken.get() || links.storage.is_awaited();
     !waits && !machine::is_flushing()
 }
 
-/// Whether what becomes of the job's next line can be told, if it is told.
+/// Whether there is room to tell what becomes of the job's next line, if that is to be told.
 #[inline(never)]
 #[small]
 pub(super) fn has_room_for_startup(links: &Links) -> bool {
@@ -33,8 +33,8 @@ pub(super) fn has_room_for_startup(links: &Links) -> bool {
     !tells || has_room(links.told()) == Some(true)
 }
 
-/// Carries out the next line of a built-in job. A line that is refused is told by an exception report. The end is told by
-/// the reporter, when everything is done.
+/// Carries out the next line of a built-in job. A line that is refused is told by an exception report. The end of the
+/// job is told by the reporter, when everything has been carried out.
 #[inline(never)]
 #[small]
 pub(super) fn job_line(links: &Links) {
@@ -63,7 +63,8 @@ pub(super) fn job_line(links: &Links) {
     links.reporter_wake.signal();
 }
 
-/// Interprets a block of a port's, if that feeds the machine.
+/// Interprets a block that has come on a port, or refuses it if that port does not feed the machine. Returns also
+/// whether the block may have a comment.
 #[inline(never)]
 pub fn run_block(links: &Links, port: &Port, block: &[u8], declined: bool) -> (Status, bool) {
     match links.may_feed(port) {
@@ -98,8 +99,9 @@ fn interpret_rewritten(links: &Links, port: &Port, block: &[u8]) -> (Status, boo
     done
 }
 
-/// Of a printer the extruder goes on and on: before it gets too far from the origin the place where it is gets a nearer one's name. [`Status::Again`]: the line is
-/// carried out then.
+/// Gives the place where the machine is another position, at which the extruder is nearer to the origin. A printer's
+/// extruder only moves on and on, and this happens before it gets too far away. Returns [`Status::Again`]: the line is
+/// carried out afterwards.
 #[cfg(feature = "dialect-reprap")]
 #[inline(never)]
 #[small]
@@ -111,23 +113,23 @@ fn move_back(links: &Links) -> Status {
     Status::Again
 }
 
-/// Ends the program, as M2 does, for one that has been killed, or reset. The planner is free.
+/// Ends a program that has been killed or reset, as M2 does. The planner is free.
 pub fn end_program(links: &Links, resets: bool) {
-    // It is never refused, not in an alarm either, and changes no table.
+    // M2 is never refused, not even in an alarm, and changes no table.
     let _ = carry_out(links, b"M2", false);
     if resets {
         links.model.borrow_mut().reset();
     }
 }
 
-/// Refuses a block in an alarm, unless it ends that, and else carries it out.
+/// Carries out a block. In an alarm, refuses it unless it ends the alarm.
 fn interpret(links: &Links, block: &[u8], declined: bool) -> (Status, bool) {
     let alarm = machine::alarm();
     if alarm != Alarm::None {
         if !(alarm.ends_with_program() && is_program_end(block)) {
             return (alarm.status(), true);
         }
-        // The queue has been dropped, so that nothing is waited for.
+        // The queue has been dropped already, so that the alarm can end at once.
         let _ = alarm::clear(links, &links.settings.borrow());
     }
     let done = carry_out(links, block, declined);
@@ -145,25 +147,25 @@ pub(super) fn is_working(links: &Links) -> bool {
     View::of(links, links.feeder()).has_work()
 }
 
-/// A jog of G-code begins, or G-code comes behind one.
+/// Begins a jog of G-code, or ends it because other G-code follows.
 #[cold]
 #[inline(never)]
 fn enter(jogs: bool) {
     machine::carry_out(if jogs { machine::Event::Jog } else { machine::Event::Done });
 }
 
-/// Interprets a block and hands its commands to the planner, but in check mode. Returns also whether it may have a
-/// comment. [`Status::Again`] while a jog is under way, unless it is another one.
+/// Interprets a block and hands its commands to the planner, except in check mode. Returns also whether the block may
+/// have a comment. Returns [`Status::Again`] while a jog is under way, unless the block is another jog.
 #[inline(never)]
 fn carry_out(links: &Links, block: &[u8], declined: bool) -> (Status, bool) {
     let words = jog(block);
     let jogs = machine::cycle() == Cycle::Jog;
     if words.is_some() && (machine::is_held() || (!jogs && is_working(links))) {
-        // It waits for nothing but other jogs.
+        // A jog waits for nothing but other jogs.
         return (Status::NotAccepted, true);
     }
     if jogs && words.is_none() && !block.is_empty() && is_working(links) {
-        // The end of a jog drops what is queued: nothing that has been answered is to be behind it.
+        // The end of a jog drops what is queued. So nothing that has been answered may be queued behind a jog.
         return (Status::Again, true);
     }
     let mut commands = links.commands.borrow_mut();
@@ -171,7 +173,7 @@ fn carry_out(links: &Links, block: &[u8], declined: bool) -> (Status, bool) {
     let mut model = links.model.borrow_mut();
     let done = match (words, declined) {
         (Some(words), _) => model.jog(words, &*settings, &mut commands),
-        // No need to look twice.
+        // The fast path has declined the line already.
         (None, true) => model.slow_path(block, &*settings, &mut commands),
         _ => model.interpret(block, &*settings, &mut commands),
     };

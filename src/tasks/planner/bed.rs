@@ -1,8 +1,9 @@
 //! The bed of a printer: moves follow its plane ([`Bed`](crate::config::bed::Bed)).
 //!
-//! The planner's position is in machine coordinates, where the bed is flat. The line builder, which knows of motors, gets places that are lifted; what is
-//! counted from steps is lowered. So limits hold for what motors do, and a straight move is one block as before. When the plane begins or ceases to be
-//! followed no motor moves: the place where the machine is gets another Z.
+//! The planner's position is in machine coordinates, in which the bed is flat. The line builder, which knows of
+//! motors, gets places that are lifted by the plane, and what is counted from steps is lowered. So limits hold for
+//! what motors do, and a straight move is one block as before. When the plane begins or ceases to be followed, no
+//! motor moves: the place of the machine gets another Z.
 
 use kerf_macros::small;
 
@@ -15,7 +16,8 @@ use crate::units::{Length, PerAxis};
 const Z: usize = 2;
 
 impl Planner {
-    /// Moves follow the plane from here on, if it is known, or do not. The machine rests, for reports go by the plane, too.
+    /// Has moves follow the plane from here on, if the plane is known, or not any more. The machine rests, because
+    /// reports go by the plane, too.
     #[inline(never)]
     #[small]
     pub(super) fn follow_bed(&mut self, follows: bool) {
@@ -35,7 +37,7 @@ impl Planner {
         self.links.set_position(&self.position);
     }
 
-    /// G28.3 gives the place where the machine is another name: the bed is where it was.
+    /// Takes over other coordinates that G28.3 gives to the place of the machine. The bed stays where it is.
     #[inline(never)]
     #[small]
     pub(super) fn rename_bed(&self, position: &PerAxis<Length>) {
@@ -44,7 +46,7 @@ impl Planner {
         }
     }
 
-    /// Where Z is in machine coordinates, X and Y being located.
+    /// Finds Z in machine coordinates; X and Y have been located.
     #[inline(never)]
     #[small]
     pub(super) fn lower(
@@ -62,7 +64,7 @@ impl Planner {
     }
 }
 
-/// Whether a brief way of the motors is one in machine coordinates, too: a chain keeps it in 16 bits.
+/// Whether a brief move of the motors is brief in machine coordinates, too: a chain keeps it in 16 bits.
 #[small]
 pub(super) fn is_near(from: &PerAxis<Length>, to: &PerAxis<Length>) -> bool {
     let ([_, _, from, ..], [_, _, to, ..]) = (from, to);

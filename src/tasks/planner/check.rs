@@ -1,10 +1,11 @@
-//! Check mode, `{chk:1}`: lines are interpreted, and refused as they would be; what they ask for is not carried out.
+//! Check mode, `{chk:1}`: lines are interpreted, and refused if they are wrong. What they ask for is not carried out.
 //!
-//! The parser drops the commands of a line, and the tables take no change. The planner has what lines may change of the G-code model, where
-//! it has arcs and chains otherwise: it was at rest when check mode began, has nothing to do meanwhile, and is where it was when that ends.
+//! The parser drops the commands of each line, and the tables take no change. The planner keeps what lines may change
+//! of the G-code model, in the memory where it has arcs and chains otherwise. It was at rest when check mode began,
+//! has nothing to do meanwhile, and is where it was when check mode ends.
 //!
-//! Nothing but `{chk:0}` and a reset ends it: who streams a file to be checked is not to have the rest of it carried out because of an
-//! alarm or a `^d` on the way. Those drop the lines that have come, and check mode goes on.
+//! Only `{chk:0}` and a reset end check mode. Otherwise an alarm or a `^d` in the middle of a file would have the rest
+//! of the file carried out. An alarm and `^d` only drop the lines that have come, and check mode goes on.
 
 use kerf_macros::small;
 
@@ -13,7 +14,7 @@ use super::{Begun, Planner};
 use crate::machine;
 
 impl Planner {
-    /// Whether the model's state of before is kept here.
+    /// Whether the state of the model from before check mode is kept here.
     pub(super) fn checks(&self) -> bool {
         matches!(self.begun, Begun::Check(_))
     }
@@ -24,7 +25,7 @@ impl Planner {
         self.check();
     }
 
-    /// Keeps the model's state when check mode begins, and gives it back when that has ended.
+    /// Keeps the state of the model when check mode begins, and gives it back when check mode has ended.
     #[inline(never)]
     #[small]
     pub(super) fn check(&mut self) {

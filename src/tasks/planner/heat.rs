@@ -1,7 +1,9 @@
-//! Heaters and the fan: switched where they stand in the program, by blocks that the machine goes on over; and waits for them.
+//! Heaters and the fan, and waits for them. Blocks switch heaters and fan where they stand in the program; the machine
+//! goes on over these blocks.
 //!
-//! A wait begins when all moves before it have been made. It keeps the lines behind it back, and nothing else: a stop, a flush and questions
-//! have their effect at once, and [`Heaters::end_wait`](crate::tasks::heat::Heaters::end_wait) ends it.
+//! A wait begins when all moves before it have been made. It keeps back the lines behind it, and nothing else: a stop,
+//! a flush and questions have their effect at once, and [`Heaters::end_wait`](crate::tasks::heat::Heaters::end_wait)
+//! ends it.
 
 use kerf_macros::small;
 
@@ -19,15 +21,16 @@ use crate::motion::queue;
 use crate::motion::short::Short;
 use crate::units::{Length, PerAxis};
 
-/// No lead is slower, steps/s^2 and steps/s, whatever the limits of the axis: it would take minutes to come back. None is faster than [`MOST`].
+/// The slowest acceleration of a lead, steps/s^2, whatever the limits of the axis: a slower lead would take minutes to
+/// come back.
 const ACCEL_LEAST: f32 = 1_000.0;
-/// See [`ACCEL_LEAST`].
+/// The slowest velocity of a lead, steps/s: see [`ACCEL_LEAST`].
 const VELOCITY_LEAST: f32 = 100.0;
-/// See [`ACCEL_LEAST`].
+/// The fastest acceleration and velocity of a lead.
 const MOST: f32 = 1e9;
 
 impl Planner {
-    /// Queues what a line asks for. Whether motion is to wait for it.
+    /// Queues what a line asks for. Returns whether motion is to wait.
     #[inline(never)]
     #[small]
     pub(super) fn heat(&mut self, heat: &Heat) -> bool {
@@ -39,7 +42,7 @@ impl Planner {
         heat.wait != Wait::Nothing
     }
 
-    /// What the extruder's lead is to be, which is that of the first motor of the axis.
+    /// Returns the lead that the extruder is to have: that of the first motor of its axis.
     #[inline(never)]
     #[small]
     pub(super) fn wanted_lead(&self) -> Lead {
@@ -67,7 +70,7 @@ impl Planner {
         lead
     }
 
-    /// Tells exec of the extruder's lead, if that has changed.
+    /// Tells exec the extruder's lead, if it has changed.
     #[inline(never)]
     #[small]
     pub(super) fn set_lead(&mut self) {
@@ -79,7 +82,7 @@ impl Planner {
         }
     }
 
-    /// Waits until the heaters that the line names are as hot as it asks for, or somebody ends that.
+    /// Waits until the heaters that the line names are as hot as the line asks for, or until somebody ends the wait.
     pub(super) async fn await_heat(&self) {
         let links = self.links;
         wait(links.thread, Event::BlockDone, || {
@@ -97,7 +100,7 @@ impl Planner {
     }
 }
 
-/// A line from here to there says how much filament it pushes, as exactly as the lead needs it.
+/// Has a line from `from` to `to` say how much filament it pushes, as exactly as the lead needs it.
 #[inline(always)]
 pub(super) fn refine_by(
     lead: &Lead,

@@ -5,21 +5,25 @@
 //! | `Clear` | only if the switch is closed: `lb` away | at its end |
 //! | `Search` | towards the switch, the travel and `lb` at most | where it closes |
 //! | `Latch` | slowly to `lb` off where it closed | where it opens |
-//! | `Zero` | to `zb` off where it opened | at its end: this is the place ([`homing`]) |
+//! | `Zero` | to `zb` off where it opened | at its end, which is the axis's place ([`homing`]) |
 //!
-//! Between two stages everything stands still for [`SETTLE_MS`]: a switch that was just believed is not asked again for
-//! a while. Contacts are exact to the step ([`seek`](super::seek)), and so is the place, however fast the
-//! axis passed the switch. Without `lb` the place is counted from where the switch closed.
+//! Between two stages everything stands still for [`SETTLE_MS`], because a switch that has just been believed is not
+//! read again for a while. Contacts are exact to the step ([`seek`](super::seek)). So is the place, however fast the
+//! axis passed the switch. Without `lb`, the place is counted from where the switch closed.
 //!
-//! An axis that homes by a stall (`drs1`) has no switch: its motor's driver raises DIAG while the motor is held up and its speed is about that of the search.
-//! So it only searches, and the place is counted from where the axis has come to rest: until then its motor has slipped at the stop by whole electrical
-//! periods of four full steps, and stands two full steps from the stop at most. DIAG that is high at standstill is a driver's fault, or a wire that is off.
+//! An axis that homes by a stall (`drs1`) has no switch. The driver of its motor raises DIAG while the motor is held
+//! up and its speed is about that of the search. Such an axis only searches, and its place is counted from where the
+//! axis has come to rest. Until then its motor has slipped at the stop by whole electrical periods of four full steps,
+//! and it stands two full steps from the stop at most. If DIAG is high at standstill, the driver has a fault or a wire
+//! is off.
 //!
-//! The limits of the axis are none meanwhile; those of others are. All settings are looked at before anything moves.
-//! What fails ends the cycle: exception with the axis and the reason, the axis not homed, the position where
-//! it is. A feedhold holds; a flush ends it as a failure. What waits behind the line is carried out after it.
+//! While an axis is homed its ends are no limits; limits of other axes hold. The settings of all axes are checked
+//! before anything moves. A failure ends the cycle: an exception tells the axis and the reason, the axis is not homed,
+//! and the position is where the axis is. A feedhold holds the cycle; a flush ends it as a failure. Lines that wait
+//! behind the homing line are carried out after it.
 //!
-//! Several motors of an axis move together; one that has a switch of its own squares it ([`square`](super::square)).
+//! Several motors of an axis move together. A second motor that has a switch of its own squares the axis
+//! ([`square`](super::square)).
 
 use kerf_macros::small;
 
@@ -36,58 +40,60 @@ use crate::tasks::homing::{self, Homing};
 use crate::tasks::overrides;
 use crate::units::Length;
 
-/// Longer than a switch is not asked again ([`LOCK_MS`](crate::switches::LOCK_MS)).
+/// How long the machine stands still between two stages: longer than a switch is not read again
+/// ([`LOCK_MS`](crate::switches::LOCK_MS)).
 const SETTLE_MS: u32 = 20;
 
-/// The axes in their order, four bits each, the first one lowest.
+/// The order of the axes: four bits each, the first axis lowest.
 const ORDER: u16 = 0x3102;
 
-/// What comes next.
+/// The stage that comes next.
 #[derive(Clone, Copy, Default, PartialEq)]
 enum Stage {
-    /// Also: with the next axis.
+    /// This is also where the next axis begins.
     #[default]
     Clear,
     Search,
-    /// Here and in the next two some motors move alone.
+    /// In this stage and the next three, some motors of a squared axis move alone.
     Square,
     Latch,
     LatchSecond,
     Level,
     Zero,
-    /// The axis is there.
+    /// The axis is at its place.
     Place,
 }
 
 /// How far homing has come.
 #[derive(Default)]
 struct Progress {
-    /// The place in the order of the axis after this one.
+    /// The index, in the order, of the axis after this one.
     next: u8,
     axis: u8,
     stage: Stage,
-    /// Where the switch was.
+    /// Where the switch was, by the position of the axis.
     contact: Length,
-    /// The motor that squares the axis.
+    /// The second motor, if the axis is squared.
     second: Option<Second>,
-    /// How far the axis has gone beyond that.
+    /// How far the axis has gone beyond the contact.
     beyond: Length,
-    /// How far the first motor is off its switch; how far the second has to go.
+    /// How far the first motor is off its switch; then, how far the second motor has to go.
     off: Length,
 }
 
 impl Stage {
-    /// Whether it is done at the speed of latching; if the axis is squared, by motors alone.
+    /// Whether the stage is done at the speed of latching. If the axis is squared, some motors move alone then.
     fn is_slow(self) -> bool {
         matches!(self, Stage::Square | Stage::Latch | Stage::LatchSecond | Stage::Level)
     }
 }
 
 impl Progress {
-    /// Passes over what is not to be done, as the switches are: those that are `closed`, which may be `all`.
+    /// Skips stages that are not needed as the switches stand. `closed` are those that are closed; `all`: all of the
+    /// axis are.
     fn pass(&mut self, homing: &Homing, closed: u16, all: bool) -> Result<(), Status> {
         if self.stage == Stage::Clear {
-            // Nobody knows which of the two it is.
+            // Nobody knows which of two switches on one pin is closed.
             let doubtful = closed & homing.switch() != 0 && homing.shared;
             return match closed {
                 _ if doubtful => Err(Status::HomingClosed),
@@ -113,7 +119,7 @@ impl Progress {
         }
     }
 
-    /// As `pass`, where no switch is looked for.
+    /// Skips stages as `pass` does, for an axis that homes by a stall and has no switch.
     #[inline(always)]
     fn pass_stall(&mut self, closed: u16) -> Result<(), Status> {
         if self.stage == Stage::Clear {
@@ -125,7 +131,7 @@ impl Progress {
 }
 
 impl Planner {
-    /// Carries out the line's homing.
+    /// Carries out the homing that the line asks for.
     pub(super) async fn home(&mut self) {
         self.enter(Event::Homing);
         let mut at = Progress::default();
@@ -144,19 +150,19 @@ impl Planner {
             done = self.end_stage(&mut at, &sought);
         }
         if self.is_flushed() {
-            // It may still move towards the switch.
+            // The axis may still move towards the switch.
             drop_blocks(self.links.thread).await;
         }
         self.end_homing(&at, done.err());
     }
 
-    /// Whether an axis homes by the load of its motor.
+    /// Whether an axis homes by the load of its motor, without a switch.
     #[inline(always)]
     pub(super) fn homes_by_stall(&self, axis: u8) -> bool {
         Capability::Drivers.is_built_in() && self.links.settings.borrow().homes_by_stall(axis)
     }
 
-    /// What the line asks for: the axes, and whether their positions are set.
+    /// Returns what the line asks for: the axes as bits, and whether their positions are set.
     fn homed_by_line(&self) -> (u8, bool) {
         match self.links.commands.borrow().motion {
             Motion::Home { axes, set } => (axes, set),
@@ -164,7 +170,7 @@ impl Planner {
         }
     }
 
-    /// Looks at the settings of all axes, which may have changed since the line was taken.
+    /// Checks the settings of all axes of the line, which may have changed since the line was taken.
     #[inline(never)]
     #[small]
     fn check_homing(&mut self, at: &mut Progress) -> Result<bool, Status> {
@@ -177,7 +183,7 @@ impl Planner {
         Ok(true)
     }
 
-    /// Begins the next move. False if there is none: all axes are homed.
+    /// Begins the next move. Returns false if there is none, because all axes are homed.
     #[inline(never)]
     #[small]
     fn begin_stage(&mut self, at: &mut Progress) -> Result<bool, Status> {
@@ -201,9 +207,9 @@ impl Planner {
         } else {
             at.pass(&homing, closed, closed == own | second)?;
         }
-        // From where, how far away from the switch, and which switches end it.
+        // From where the axis moves, how far away from the switch, and which switches end the move.
         let here = self.at(at.axis);
-        // A motor may have gone as far beyond its own switch.
+        // A motor may have gone beyond its own switch as far as the axis has.
         let back = homing.backoff.saturating_add(at.beyond);
         let (from, way, armed) = match at.stage {
             Stage::Clear => (here, homing.backoff, 0),
@@ -224,7 +230,7 @@ impl Planner {
         Ok(true)
     }
 
-    /// What has come of the move, and what comes next.
+    /// Takes the result of the move, and sets the stage that comes next.
     #[inline(never)]
     #[small]
     fn end_stage(&mut self, at: &mut Progress, sought: &Sought) -> Result<bool, Status> {
@@ -258,7 +264,7 @@ impl Planner {
         Ok(true)
     }
 
-    /// A search for a stall has the speed that its driver has been told of, whatever the feed override is.
+    /// Fixes the speed of a search for a stall, whatever the feed override is: the driver has been told that speed.
     #[inline(always)]
     fn fix_search(&mut self, axis: u8) {
         if Capability::Drivers.is_built_in() {
@@ -267,7 +273,7 @@ impl Planner {
         }
     }
 
-    /// What has come of a search that a stall ends.
+    /// Takes the result of a search that a stall is to end.
     #[inline(always)]
     fn end_stall(&self, at: &mut Progress, sought: &Sought) -> Result<bool, Status> {
         if !matches!(sought, Sought::Contact(_)) {
@@ -278,7 +284,8 @@ impl Planner {
         Ok(true)
     }
 
-    /// The motors of the axis move together again, and how far each is off its switch is known.
+    /// After a move of some motors alone, has the motors move together again, and notes how far each is off its
+    /// switch.
     fn end_alone(&mut self, at: &mut Progress, sought: &Sought) {
         let Some(second) = at.second.filter(|_| at.stage.is_slow()) else { return };
         let contact = match sought {
@@ -294,7 +301,7 @@ impl Planner {
         }
     }
 
-    /// Takes the next axis of the line. False if there is none.
+    /// Takes the next axis of the line. Returns false if there is none.
     fn next_axis(&self, at: &mut Progress) -> bool {
         let (axes, _) = self.homed_by_line();
         while at.next < homing::AXES {
@@ -307,7 +314,7 @@ impl Planner {
         false
     }
 
-    /// Begins with an axis: it is not homed any more, unless its position is to stay.
+    /// Begins with an axis. The axis is not homed any more, unless its position is to stay.
     fn begin_axis(&mut self, at: &Progress, homing: &Homing) {
         inputs::spare(homing.ends() | at.second.map_or(0, Second::ends));
         if self.homed_by_line().1 {
@@ -316,18 +323,18 @@ impl Planner {
             self.links.model.borrow_mut().set_homed(at.axis, false);
         }
         self.brake_hard();
-        // A search is no feed: only the traverse velocity limits it.
+        // A search is no feed: only the traverse velocity of the axis limits it.
         if let Some(axis) = self.dynamics.axes.get_mut(usize::from(at.axis)) {
             axis.feed = axis.velocity;
         }
     }
 
-    /// Where an axis is.
+    /// Returns the position of an axis.
     fn at(&self, axis: u8) -> Length {
         self.position.get(usize::from(axis)).copied().unwrap_or_default()
     }
 
-    /// Moves an axis until one of the switches `armed` is as in `awaited`.
+    /// Moves an axis until one of the switches `armed` becomes as in `awaited`.
     #[inline(never)]
     #[small]
     fn look(&mut self, axis: u8, to: Length, speed: f32, armed: u16, awaited: u16) {
@@ -338,7 +345,7 @@ impl Planner {
         self.seek(&target, Feed::PerMinute(speed), armed, awaited);
     }
 
-    /// The axis is at its place.
+    /// Gives the axis its place, where it stands now, unless its position is to stay.
     #[inline(never)]
     #[small]
     fn place_axis(&mut self, at: &Progress) -> Result<(), Status> {
@@ -354,7 +361,7 @@ impl Planner {
         Ok(())
     }
 
-    /// Everything is again as it was before.
+    /// Ends the cycle, and tells why if it has failed.
     #[inline(never)]
     #[small]
     fn end_homing(&mut self, at: &Progress, failure: Option<Status>) {
@@ -362,19 +369,19 @@ impl Planner {
         overrides::fix_feed(links.thread, false);
         inputs::spare(0);
         let mut model = links.model.borrow_mut();
-        // In a flush it is not here yet.
+        // In a flush, the position is not known yet.
         if !self.is_flushed() {
             model.set_position(&self.position);
         }
         if let Some(status) = failure {
             model.blame(at.axis);
-            // An alarm has said already what ended it.
+            // An alarm has already told what ended the cycle.
             if !machine::is_alarmed() {
                 links.except(status);
             }
         }
         drop(model);
-        // In a flush it ends with that, when the position is known.
+        // In a flush, the cycle ends with the flush, when the position is known.
         self.enter(Event::Done);
     }
 }

@@ -1,8 +1,8 @@
-//! Jogging, `{jogx:..}`: an axis by hand, as fast as its traverse limit lets it, under its jerk limit.
+//! Jogging, `{jogx:..}`: moves one axis by hand, as fast as its traverse limit lets it, under its jerk limit.
 //!
-//! It has begun at rest ([`View`](crate::tasks::view)). At its end, reached or not, the reporter says `{"jog":0}`. A
-//! sender ends it when a button is let go ([`jog`](crate::tasks::jog)). An exclamation mark holds it, and with `%` behind
-//! that it is over.
+//! A jog has begun at rest ([`View`](crate::tasks::view)). At its end, whether the target is reached or not, the
+//! reporter says `{"jog":0}`. A sender ends a jog when a button is let go ([`jog`](crate::tasks::jog)). An exclamation
+//! mark holds the jog, and a `%` behind the exclamation mark ends it.
 
 use kerf_macros::small;
 
@@ -32,7 +32,7 @@ impl Planner {
 
     #[small]
     fn end_jog(&mut self) {
-        // In a flush it ends with that, when the position is known.
+        // In a flush, the jog ends with the flush, when the position is known.
         if !self.is_flushed() {
             self.links.set_position(&self.position);
             self.links.notices.jogged.set(true);

@@ -1,17 +1,19 @@
-//! Lines that wait for the next one: a chain of short ones that lie on a line (`motion::chain`), and those that are less than half a
-//! step, and over before exec could prepare them.
+//! Lines that wait for the next one: a chain of short lines that lie on one straight line (`motion::chain`), and lines
+//! of less than half a step.
 //!
-//! CAM files are full of such lines. A block costs the planner and exec as much whether it is long or short; and a block of
-//! less than half a step in 0.75 ms would slow the path down.
-//! A line waits only where others run. The planner stays where the chain began, and knows where it ends. The next
-//! line goes on with it, or the chain becomes a block and the line begins another one. What is less than half a step becomes no
-//! block then: the next line begins where it did.
+//! CAM files are full of short lines. A block costs the planner and exec as much whether it is long or short. A block
+//! of less than half a step that takes less than 0.75 ms would slow the path down: it is over before exec could
+//! prepare it. A line waits only while other lines run. The planner's position stays where the chain began, and the
+//! chain knows where it ends. Either the next line goes on with the chain, or the chain becomes a block and the line
+//! begins another chain. A chain of less than half a step becomes no block then: the next line begins where the chain
+//! did.
 //!
-//! **Nothing waits long.** A chain becomes a block when the last block runs, and before anything that is not a line; and, [`STALE_MS`]
-//! after its last line, at the next block or when the power task looks. So positions at stops are exact, and what is sent last is run as if
-//! it had not waited: exec is some milliseconds ahead of the motors.
+//! **Nothing waits long.** A chain becomes a block when the last block runs, and before anything that is not a line.
+//! [`STALE_MS`] after its last line it also becomes a block at the next block or when the power task looks. So
+//! positions at stops are exact, and the last line of a program runs as if it had not waited: exec is some
+//! milliseconds ahead of the motors.
 //!
-//! **N words.** A block has that of its last line: it is finished when that is.
+//! **N words.** A block has the N word of its last line: it is finished when that line is.
 
 use super::{Announcement, Begun, Parts, Planner, Shared, Turn};
 use crate::gcode::command::{Commands, Feed};
@@ -23,15 +25,16 @@ use crate::motion::queue;
 use crate::tasks::links::Links;
 use crate::units::{Length, PerAxis};
 
-/// How long after its last line a chain is closed, ms.
+/// How long after its last line a chain becomes a block, ms.
 const STALE_MS: u16 = 8;
 
-/// A chain, where the machine is and what drivers ask for.
+/// Blocks that may be needed at once: for a chain, for the position, and for what drivers demand.
 const BLOCKS: usize = 3;
 
-/// After so many chains in a row that nothing went on with, only each line of so many begins one. A power of two.
+/// After this many lines in a row that have not gone on with a chain, only one line of this many begins a chain. A
+/// power of two.
 const ALONE: u8 = 8;
-/// After so many lines in a row that did not become a chain, only one of [`SELDOM`] lines begins one. A multiple of that.
+/// After this many such lines in a row, only one line of [`SELDOM`] begins a chain. A multiple of that.
 const LONG: u8 = 64;
 /// See [`LONG`]. A power of two.
 const SELDOM: u8 = 32;
@@ -48,8 +51,8 @@ impl Planner {
         !matches!(self.begun, Begun::Nothing)
     }
 
-    /// Whether a line is to begin a chain: it costs 1,500 cycles, so that on a curve on which nothing goes on with any only
-    /// every eighth line does, and on a long one every 32nd.
+    /// Whether a line is to begin a chain, which costs 1,500 cycles. On a curve, where no line goes on with a chain,
+    /// only every eighth line begins one, and on a long curve every 32nd.
     #[inline(always)]
     pub(super) fn is_worth_a_chain(&mut self) -> bool {
         self.alone = self.alone.checked_add(1).unwrap_or(LONG);
@@ -57,7 +60,7 @@ impl Planner {
         self.alone <= ALONE || self.alone & (each - 1) == 0
     }
 
-    /// Begins a chain with a line, if it may be merged with those that follow.
+    /// Begins a chain with a line. Returns false if the line cannot be merged with lines that follow.
     #[inline(always)]
     pub(super) fn begin_chain(
         &mut self,
@@ -78,7 +81,7 @@ impl Planner {
         false
     }
 
-    /// The line with this N word waits for the next one.
+    /// Notes that the line with this N word waits for the next one.
     #[inline(always)]
     pub(super) fn wait_for_more(&mut self, line: u32) {
         self.line = line;
@@ -86,13 +89,15 @@ impl Planner {
         self.links.chain_waits.set(true);
     }
 
-    /// Makes a block of the chain. If it is less than half a step, only closes it. There is room. False if it is to be made in parts.
+    /// Makes a block of the chain, for which there is room. Only closes the chain if it is less than half a step.
+    /// Returns false if the chain is to be made in parts.
     #[inline(never)]
     pub(super) fn close_chain(&mut self) -> bool {
         self.build_chain(true)
     }
 
-    /// Queues the chain, for which there is room.
+    /// Queues the chain, for which there is room, or only closes it if it `may_merge`. Returns false if it is to be
+    /// made in parts.
     #[inline(never)]
     fn build_chain(&mut self, may_merge: bool) -> bool {
         let Begun::Chain(chain) = &self.begun else { return true };
@@ -119,7 +124,8 @@ impl Planner {
         true
     }
 
-    /// The line that comes behind a chain, for which there is room: goes on with it, or has it queued first.
+    /// Carries out the line behind a chain, for which there is room: the line goes on with the chain, or the chain is
+    /// queued first.
     #[inline(never)]
     pub(super) fn end_chain(&mut self, commands: &Commands) -> Turn {
         if commands.is_straight() && self.carry_out_at_once() {
@@ -143,7 +149,7 @@ impl Planner {
         self.links.chain_waits.set(self.has_chain());
     }
 
-    /// Whether a chain is not to wait any longer, and there is room for it and for what settings that have changed come to.
+    /// Whether the chain is not to wait any longer, and there is room for it and for what changed settings need.
     fn is_due(&self) -> bool {
         let Begun::Chain(chain) = &self.begun else { return false };
         let is_stale =

@@ -30,7 +30,7 @@ impl Planner {
         };
         let which = outputs::SPINDLE | outputs::COUNTERCLOCKWISE;
         if Capability::Lathe.is_built_in() {
-            // The model is where the line leads to, and no further.
+            // The G-code model has interpreted this line and none behind it.
             let surface = self.links.model.borrow().surface();
             if surface.is_some() || self.has_surface {
                 return self.turn_at_surface(which, turn, speed, surface);
@@ -39,7 +39,7 @@ impl Planner {
         self.switch(which, turn, speed);
     }
 
-    /// Begins with a surface speed (G96), goes on with another, or ends it.
+    /// Begins a surface speed (G96), changes it, or ends it.
     #[inline(never)]
     #[small]
     fn turn_at_surface(&mut self, which: u8, on: u8, speed: f32, surface: Option<Surface>) {
@@ -53,7 +53,7 @@ impl Planner {
         self.pause(QueuedAction::Surface(self.outputs, surface.unwrap_or(Surface::NONE)));
     }
 
-    /// Switches those of `which` on that are in `on`, the others of `which` off; the spindle is to have this speed.
+    /// Switches outputs of `which`: on if they are in `on`, off otherwise. The spindle is to have this speed.
     #[inline(never)]
     #[small]
     pub(super) fn switch(&mut self, which: u8, on: u8, speed: f32) {
@@ -65,7 +65,7 @@ impl Planner {
     }
 }
 
-/// How the spindle turns, by the outputs.
+/// Returns how the spindle turns, by the outputs that are on.
 pub(super) fn turn(on: u8) -> modal::Turn {
     match on & (outputs::SPINDLE | outputs::COUNTERCLOCKWISE) {
         0 => modal::Turn::Off,

@@ -11,7 +11,7 @@ use crate::motion::curve::Curve;
 use crate::units::FIRST_ROTARY;
 use crate::units::{Length, PerAxis};
 
-/// What lasts longer than a turn: one at a time, and one place in memory.
+/// What lasts longer than a turn. There is one at a time, so that one place in memory is enough.
 pub(super) enum Ongoing {
     /// Nothing is going on.
     None,
@@ -20,7 +20,7 @@ pub(super) enum Ongoing {
     /// A pass in step with the spindle, from here.
     #[cfg(feature = "lathe")]
     Pass([Length; FIRST_ROTARY]),
-    /// Lines are checked: these are the offsets of before.
+    /// Check mode: these are the offsets from before it.
     Check(Offsets),
 }
 
@@ -48,18 +48,19 @@ impl Parts {
         parts
     }
 
-    /// Makes so many of each part that is left. Interpreters refuse moves of which the shortest part is too long still.
+    /// Divides each part that is left into `of` parts. Interpreters refuse moves whose shortest part would still be
+    /// too long.
     #[inline(never)]
     #[small]
     pub fn divide(&mut self, of: u16) {
-        // Inverse time is that of the whole.
+        // The time of an inverse-time feed is that of the whole move.
         if let Some(Feed::Minutes(minutes)) = &mut self.feed {
             *minutes /= f32::from(of);
         }
         self.left = self.left.wrapping_mul(of.into());
     }
 
-    /// The end of the next part, the machine being at `position`.
+    /// Returns the end of the next part, with the machine at `position`.
     #[inline(never)]
     #[small]
     pub fn end(&self, position: &PerAxis<Length>) -> PerAxis<Length> {

@@ -1,11 +1,12 @@
-//! Probing, G38.2 to G38.5: straight towards the work until the probe touches it, or away until it lets go.
+//! Probing, G38.2 to G38.5: straight towards the work until the probe touches it, or away until the probe lets go.
 //!
-//! The result is the contact ([`seek`](super::seek)), in machine coordinates: `prbe` 1 and `prbx`... The machine comes to
-//! rest behind it and goes back there, at the feed of the line, so that what G10 L20 and G92 of the next line take for the
-//! position is the contact; then the reporter tells the result. With `pbo` 0 it stays where it is. Without contact `prbe` is 0 and the
-//! place is where the move ended; G38.2 and G38.4 take that for a failure, and so is a probe that is as it is to
-//! become before anything moves, in which case nothing does. A failure is an alarm: what comes next in a program would
-//! go by a place that nobody knows.
+//! The result is the contact ([`seek`](super::seek)), in machine coordinates: `prbe` 1 and `prbx`... The machine comes
+//! to rest behind the contact and goes back to it, at the feed of the line. So G10 L20 and G92 in the next line take
+//! the contact for the position. Then the reporter tells the result. With `pbo` 0 the machine stays where it came to
+//! rest. Without contact, `prbe` is 0 and the place is where the move ended.
+//!
+//! For G38.2 and G38.4, a move without contact is a failure. So is a probe that is already as it is to become: nothing
+//! moves then. A failure is an alarm, because the next lines of a program would go by a place that nobody knows.
 
 use kerf_macros::small;
 
@@ -21,11 +22,11 @@ use crate::machine::{self, Alarm, ProbeState};
 use crate::status::Status;
 use crate::tasks::alarm;
 
-/// The probe, of the inputs.
+/// The bit of the probe among the inputs.
 const SWITCH: u16 = 1 << PROBE;
 
 impl Planner {
-    /// Carries out the line's probing.
+    /// Carries out the probing that the line asks for.
     pub(super) async fn probe(&mut self) {
         self.enter(machine::Event::Probe);
         if self.standstill().await && self.begin_probe() {
@@ -50,13 +51,13 @@ impl Planner {
             }
         }
         self.enter(machine::Event::Done);
-        // The result comes before the response to the next line. In an alarm that line, whose response may be half
-        // written, may itself wait for this task.
+        // The result comes before the response to the next line. In an alarm, that line may wait for this task while
+        // its response is half written, so that the result is not waited for.
         let told = || !self.links.probe.is_news() || self.is_flushed();
         wait(self.links.thread, Event::BlockDone, || told().then_some(())).await;
     }
 
-    /// Begins the move. False if the probe is there already.
+    /// Begins the move. Returns false if the probe is already as it is to become.
     #[inline(never)]
     #[small]
     fn begin_probe(&mut self) -> bool {
@@ -70,7 +71,7 @@ impl Planner {
         };
         if inputs::worked() & SWITCH == awaited {
             drop(commands);
-            // The line says that the machine is at its end.
+            // The model is at the end of the line, but the machine is not.
             links.set_position(&self.position);
             self.probe_failed();
             return false;
@@ -80,7 +81,7 @@ impl Planner {
         true
     }
 
-    /// Goes back to the contact. False if it is to stay.
+    /// Goes back to the contact. Returns false if the machine is to stay.
     #[inline(never)]
     #[small]
     fn back_off(&mut self, contact: &[i32; MOTORS]) -> bool {
@@ -97,10 +98,10 @@ impl Planner {
         true
     }
 
-    /// There was a contact, whatever has become of the way back.
+    /// Tells that there was a contact, whatever has become of the way back.
     #[small]
     fn probe_touched(&self) {
-        // In a flush it is not here yet.
+        // In a flush, the position is not known yet.
         if !self.is_flushed() {
             self.links.set_position(&self.position);
         }

@@ -1,11 +1,11 @@
 //! Moves that end at a switch: what homing and probing are made of.
 //!
-//! The machine stands still. [`Planner::seek`] arms switches and queues the move, [`Planner::sought`] waits for what
-//! comes of it: the end of the move, or a switch. At the switch exec comes to rest within the limits, as in a
-//! feedhold; the rest of the move is dropped, the planner goes on from where the motors are, and the contact is
-//! known to the step ([`contact`]). A feedhold on the way holds the move; a queue flush ends it.
+//! A seek begins at a standstill. [`Planner::seek`] arms switches and queues the move. [`Planner::sought`] waits for
+//! the end of the move, or for a switch. At the switch exec comes to rest within the limits, as in a feedhold. The
+//! rest of the move is dropped, and the planner goes on from where the motors are. The contact is known to the step
+//! ([`contact`]). A feedhold on the way holds the move; a queue flush ends it.
 //!
-//! One line at a time: what comes behind it waits in the pool, and none is lost.
+//! Only one line is carried out at a time: lines behind it wait in the pool, and none is lost.
 
 use embassy_futures::yield_now;
 use kerf_macros::small;
@@ -28,27 +28,28 @@ use crate::tasks::links::Changes;
 use crate::tasks::setup::counted;
 use crate::units::{FIRST_ROTARY, Length, PerAxis};
 
-/// What has come of a move that is to end at a switch.
+/// How a move that is to end at a switch has ended.
 pub(super) enum Sought {
-    /// The motors were there when the switch said so. They have come to rest further on.
+    /// A switch has ended the move. The motors were at these steps then; they have come to rest further on.
     Contact([i32; MOTORS]),
-    /// The move is at its end, and no switch has said so.
+    /// The move has come to its end without a switch.
     End,
     /// What is queued is to be dropped.
     Flushed,
 }
 
-/// Has exec drop its blocks, as soon as it is at rest.
+/// Has exec drop its blocks as soon as it is at rest, and waits for that.
 pub(super) fn drop_blocks(thread: Thread) -> impl Future<Output = ()> {
     machine::drop_blocks();
     wait(thread, Event::BlockDone, || machine::has_dropped_blocks().then_some(()))
 }
 
 impl Planner {
-    /// Waits until everything queued is done and the steppers stand still. False if that is to be dropped.
+    /// Waits until everything queued is done and the steppers stand still. Returns false if what is queued is to be
+    /// dropped.
     pub(super) async fn standstill(&mut self) -> bool {
         self.room().await;
-        // Exec does not release it before.
+        // Exec releases this block only at a standstill.
         self.pause(QueuedAction::Outputs(self.outputs));
         wait(self.links.thread, Event::BlockDone, || {
             (queue::used() == 0 || self.is_flushed()).then_some(())
@@ -57,19 +58,19 @@ impl Planner {
         !self.is_flushed()
     }
 
-    /// Begins a move that ends at the first of the inputs `armed` (bits) that comes to be as in `awaited`. Nothing
-    /// is queued. [`Planner::sought`] is next.
+    /// Begins a move that ends at the first of the inputs `armed` (bits) that becomes as in `awaited`. Nothing may be
+    /// queued yet. [`Planner::sought`] is to be called next.
     pub(super) fn seek(&mut self, target: &PerAxis<Length>, feed: Feed, armed: u16, awaited: u16) {
         contact::clear();
         inputs::arm(armed, awaited);
         self.straight(target, Some(feed));
     }
 
-    /// Waits for what comes of it. The switches are not armed any more.
+    /// Waits for the end of the move that [`Planner::seek`] has begun, and disarms the switches.
     pub(super) async fn sought(&mut self) -> Sought {
         while self.has_begun() && !self.is_over() {
             self.seek_room().await;
-            // Others have their turn: a long way is many blocks, and there may be room for all of them.
+            // Other tasks have their turn: a long move is many blocks, and there may be room for all of them.
             yield_now().await;
             if !self.is_over() {
                 let _: Turn = self.turn();
@@ -107,11 +108,12 @@ impl Planner {
         })
     }
 
-    /// Exec has dropped its blocks: the planner starts from where the motors are.
+    /// Starts from where the motors are, when exec has dropped its blocks.
     #[inline(never)]
     #[small]
     pub(super) fn relocate(&mut self, motion: &Snapshot) {
-        // Until steps have been counted anew they mean what they meant before; nothing has moved since.
+        // Until steps have been counted anew, they do not fit the settings. The position stays: nothing has moved
+        // since.
         if !self.links.changes.has(Changes::STEPS) {
             self.position = self.located(&motion.target);
         }
@@ -122,7 +124,8 @@ impl Planner {
         self.links.set_position(&self.position);
     }
 
-    /// The position of every axis that a motor moves, unless the step is that at which it was to end.
+    /// Returns the position by the steps of the motors. An axis that no motor moves stays where it is. An axis stays
+    /// as well if its motor is at the very step at which it was to end.
     #[small]
     pub(super) fn located(&self, steps: &[i32; MOTORS]) -> PerAxis<Length> {
         let settings = self.links.settings.borrow();
@@ -135,7 +138,7 @@ impl Planner {
         located
     }
 
-    /// Takes the jerk of homing and probing for the axes that have both, until the line is done.
+    /// Takes the jerk limit of homing and probing, until the line is done, for the axes that have both jerk limits.
     #[small]
     pub(super) fn brake_hard(&mut self) {
         let settings = self.links.settings.borrow();

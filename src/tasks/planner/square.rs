@@ -1,22 +1,23 @@
-//! Squaring: an axis whose two motors have a homing switch each is homed so that each motor ends off its own.
+//! Squaring: homing an axis with two motors that have a homing switch each, so that each motor ends off its own
+//! switch.
 //!
-//! The second motor is that of the highest number that shares its axis with one before it. `sqsw` says where its switch
-//! is; the first one has that of the axis. [`home`](super::home) adds these stages:
+//! The second motor is the one with the highest number that shares its axis with a motor before it. `sqsw` says where
+//! its switch is; the first motor has the switch of the axis. [`home`](super::home) adds these stages:
 //!
 //! | stage | move | ends |
 //! |---|---|---|
 //! | `Search` | both motors | where the first of the switches closes |
-//! | `Square` | the motor whose switch is open, slowly, `lb` at most | where it closes |
+//! | `Square` | the motor whose switch is open, slowly, `lb` at most | where its switch closes |
 //! | `Latch` | the first motor off its switch | where it opens |
 //! | `LatchSecond` | the second motor off its own | where it opens |
-//! | `Level` | the second motor | as far off its switch as the first one, and `sqof` |
-//! | `Zero` | both motors | as ever |
+//! | `Level` | the second motor | as far off its switch as the first one from its own, and `sqof` farther |
+//! | `Zero` | both motors | as in homing without squaring |
 //!
-//! So an axis stands askew by no more than it did before, and what its switches take to open. A motor that moves
-//! alone is one that the others have left ([`Dynamics::drives`](crate::motion::dynamics::Dynamics)). After
-//! each such move the steps of all motors are counted anew, from the position of the first one
-//! ([`Planner::level`]): without that the next move would take the second motor along at once. Who ends the cycle in
-//! between has them counted anew as well.
+//! So while it is homed an axis never stands more askew than before, but for what its switches take to open. A motor
+//! moves alone when the other motors are taken off the axis ([`Dynamics::drives`](crate::motion::dynamics::Dynamics)).
+//! After each such move the steps of all motors are counted anew, from the position of the first motor
+//! ([`Planner::level`]). Without that, the next move would take the second motor along at once. Whoever ends the cycle
+//! in between has the steps counted anew as well.
 
 use kerf_macros::small;
 
@@ -41,24 +42,25 @@ pub(super) struct Second {
 }
 
 impl Second {
-    /// The steps of this motor among those of all motors.
+    /// Returns the steps of this motor from those of all motors.
     pub fn of(self, steps: &[i32; MOTORS]) -> i32 {
         steps.get(usize::from(self.motor)).copied().unwrap_or_default()
     }
 
-    /// The bit of its switch.
+    /// Returns the bit of the motor's switch.
     pub fn switch(self) -> u16 {
         1 << self.input
     }
 
-    /// The ends of axes that are spared for its sake: both of a pair, which may be on one pin.
+    /// The ends of axes that are no limits while this motor is homed, as bits. Both ends of an axis, which may share
+    /// one pin.
     pub fn ends(self) -> u8 {
         if usize::from(self.input) < inputs::ENDS { 3 << (self.input & !1) } else { 0 }
     }
 }
 
 impl Planner {
-    /// The second motor of the axis, if it is squared; or why it cannot be.
+    /// Returns the second motor of the axis, if the axis is squared, or why it cannot be squared.
     #[inline(never)]
     #[small]
     pub(super) fn second(&self, axis: u8, homing: &Homing) -> Result<Option<Second>, Status> {
@@ -75,7 +77,7 @@ impl Planner {
             return Ok(None);
         };
         let wired = switches::WIRED >> input & 1 != 0;
-        // A motor that is pushed at a stop pushes the other one.
+        // A motor that is pushed against a stop would push the other motor, too.
         let stalls = self.homes_by_stall(axis);
         if stalls || !wired || homing.has_pin(input) || homing.backoff == Length::ZERO {
             return Err(Status::HomingSwitches);
@@ -83,12 +85,12 @@ impl Planner {
         Ok(Some(Second { motor: motor as u8, input }))
     }
 
-    /// A setting of the group `sq`.
+    /// Returns a setting of the group `sq`.
     fn squaring(&self, row: u8) -> i32 {
         Setting::of(Owner::Squaring, row).map_or(0, |setting| self.links.storage.cold(setting))
     }
 
-    /// Leaves the axis to the second motor, or to the others.
+    /// Has either the second motor or all other motors of the axis drive it alone. `moves`: the second motor does.
     #[inline(never)]
     #[small]
     pub(super) fn alone(&mut self, axis: u8, second: Second, moves: bool) {
@@ -99,8 +101,8 @@ impl Planner {
         }
     }
 
-    /// After a move of some motors of the axis: all drive it again, and their steps are counted from where the first
-    /// one is. Returns how far the second one is off its step `from`.
+    /// Ends a move of some motors of the axis: all motors drive it again, and their steps are counted from where the
+    /// first motor is. Returns how far the second motor is from its step `from`.
     #[inline(never)]
     #[small]
     pub(super) fn level(&mut self, second: Second, from: i32) -> Length {
@@ -118,7 +120,7 @@ impl Planner {
         ratio.length(second.of(&motion.target).wrapping_sub(from)).unwrap_or_default()
     }
 
-    /// How much farther than the first motor the second one is to stand off its switch.
+    /// Returns how much farther off its switch the second motor is to stand than the first one.
     pub(super) fn squaring_offset(&self) -> Length {
         Length(self.squaring(squaring::OF))
     }

@@ -1,12 +1,14 @@
-//! G33.1, rigid tapping: into the hole in step with the spindle, and back in step when it has turned round.
+//! G33.1, rigid tapping: into the hole in step with the spindle, and back in step when the spindle has turned round.
 //!
-//! It begins as a pass does ([`thread`](super::thread)). The line leads beyond the bottom of the hole by what the spindle turns in
-//! [`OVERRUN_S`]; at the bottom exec tells it to turn round and follows until it stands, which is somewhere in that way. There the axes rest until the first
-//! pulse of the way back. What is left of the line is dropped, and a line back is queued, which leads as far beyond the start: exec goes on with the
-//! phase that it has, tells the spindle to turn as before at the start, and follows until it has. A move without the spindle
-//! leads to the start. A spindle that has not turned round by the end of a line is an alarm, as is one that gives no pulse for 6 s.
+//! G33.1 begins as a pass does ([`thread`](super::thread)). The line leads beyond the bottom of the hole by as much as
+//! the spindle turns in [`OVERRUN_S`]. At the bottom, exec tells the spindle to turn round, and follows it until it
+//! stands, which is somewhere on that overrun. There the axes rest until the first pulse of the way back. What is left
+//! of the line is dropped, and a line back is queued, which leads beyond the start by the same overrun. Exec keeps its
+//! phase on the way back. At the start it tells the spindle to turn as before, and follows until the spindle does. A
+//! move without the spindle then leads to the start. There is an alarm if the spindle has not turned round by the end
+//! of a line, or if no pulse comes for 6 s.
 //!
-//! A feedhold waits for the end of all that.
+//! A feedhold waits for the end of all this.
 
 use kerf_macros::small;
 
@@ -17,10 +19,10 @@ use crate::gcode::command::{Feed, Motion};
 use crate::motion::block::{Block, QueuedAction};
 use crate::units::{FIRST_ROTARY, Length};
 
-/// The spindle has to turn round within the way that it has in so many seconds at its speed.
+/// The time within which the spindle has to turn round, s: the overrun is as long as the spindle's turns in this time.
 const OVERRUN_S: f32 = 1.0;
 
-/// Faster than any axis, mm/min.
+/// A feed that is faster than any axis, mm/min.
 const ANY_FEED: f32 = 1e6;
 
 impl Planner {
@@ -30,13 +32,14 @@ impl Planner {
         matches!(self.links.commands.borrow().motion, Motion::Thread { returns: true, .. })
     }
 
-    /// How far the spindle has the axes go beyond an end, with so many counts a turn and such a lead along the path, mm.
+    /// Returns how far the axes may follow the spindle beyond an end, mm, with `turn` counts a turn and `lead` along
+    /// the path.
     #[small]
     pub(super) fn overrun(turn: u32, lead: f32) -> f32 {
         lead * COUNTS_PER_S as f32 * OVERRUN_S / turn as f32
     }
 
-    /// Has exec go on with its phase, back.
+    /// Has exec keep its phase on the way back.
     #[small]
     pub(super) fn queue_return(&mut self) {
         if !self.is_flushed() {
@@ -44,7 +47,7 @@ impl Planner {
         }
     }
 
-    /// Queues the way there, or back, and what is beyond. True if it leads anywhere.
+    /// Queues the way into the hole, or `back`, with its overrun. Returns false if it leads nowhere.
     #[inline(never)]
     #[small]
     pub(super) fn queue_leg(&mut self, turn: u32, back: bool) -> bool {

@@ -1,14 +1,18 @@
-//! G33, and each pass of G76: in step with the spindle ([`crate::motion::thread`]).
+//! G33, and each pass of G76: a pass in step with the spindle ([`crate::motion::thread`]).
 //!
-//! The machine stands still. [`Planner::thread`] waits until the encoder tells how fast the spindle turns, sees that no axis would have to go faster
-//! than it may, and queues the pass: what exec is to follow, its lines, and its end. A pass of G76 has a line for each taper; exec is told the lead of each. Nothing has moved before, and when something is not
-//! as it should be, nothing does: an alarm says what it is. In the pass the planner waits. If exec loses the spindle, the axes come to rest, and an alarm
-//! says so; the position is known to the step. A feedhold waits for the end of the pass, an alarm does not.
+//! A pass begins at a standstill. [`Planner::thread`] waits until the encoder tells how fast the spindle turns, and
+//! checks that no axis would have to go faster than it may. Then it queues the pass: what exec is to follow, the lines
+//! of the pass, and its end. A pass of G76 has a line for each taper, and exec is told the lead of each line. Nothing
+//! has moved by then. If something is wrong, nothing moves at all, and an alarm says what is wrong. During the pass
+//! the planner waits. If exec loses the spindle, the axes come to rest and an alarm says so; the position is known to
+//! the step. A feedhold has X leave the cut if the settings say how far, and otherwise waits for the end of the pass.
+//! An alarm does not wait.
 //!
-//! **Limits.** The pass has the axes' acceleration limits and no jerk limit, for it has to follow. An axis with a jerk limit J has
-//! at most the acceleration `sqrt(J v) / 2`, with v its speed in the thread: that of a ramp under the limit, in the mean.
+//! **Limits.** A pass has the acceleration limits of the axes and no jerk limit, because the axes have to follow the
+//! spindle. An axis with a jerk limit J has at most the acceleration `sqrt(J v) / 2`, where v is its speed in the
+//! thread: this is the mean acceleration of a ramp under the jerk limit.
 //!
-//! One line at a time: what comes behind it waits in the pool.
+//! Only one line is carried out at a time: lines behind it wait in the pool.
 
 use embassy_futures::yield_now;
 use kerf_macros::small;
@@ -38,32 +42,33 @@ use crate::tasks::setup::moved_by;
 use crate::tasks::{alarm, common};
 use crate::units::{FIRST_ROTARY, Length, PerAxis};
 
-/// How long a pulse may take to come, ms.
+/// How long an index pulse may take to come, ms.
 const PATIENCE_MS: u32 = 6_000;
 
-/// Index pulses that tell how fast the spindle turns.
+/// Index pulses after which the speed of the spindle is known.
 const ENOUGH: u8 = 3;
 
-/// Faster than any axis, mm/min.
+/// A feed that is faster than any axis, mm/min.
 const ANY_FEED: f32 = 1e6;
 
-/// Corners as sharp as any are taken at speed, mm/s^2.
+/// A junction acceleration at which corners of any angle are taken at speed, mm/s^2.
 const ANY_CORNER: f32 = 1e7;
 
-/// The most steps that X leaves the cut by.
+/// The most steps by which X leaves the cut.
 const WAY_MAX: i32 = i16::MAX as i32;
 
 /// A line of a pass.
 pub(super) struct Piece {
     pub target: PerAxis<Length>,
-    /// The ways of the axes and along the path, mm.
+    /// The distances of the axes; in `length`, the distance along the path, mm.
     ways: [f32; FIRST_ROTARY],
     pub length: f32,
-    /// mm a turn along the path.
+    /// The lead along the path, mm a turn.
     pub lead: f32,
 }
 
-/// The way back to the start of a pass that has been left has so many parts; that of G33.1 those from there to here.
+/// Parts of the way back to the start of a pass: `0..BACK_IN` after a feedhold has left the cut, `BACK_IN..BACK_OUT`
+/// in G33.1.
 const BACK_IN: u8 = 3;
 const BACK_OUT: u8 = 5;
 
@@ -78,10 +83,11 @@ enum End {
     Turned,
 }
 
-/// X among the axes.
+/// The number of the X axis.
 const X: u8 = 0;
 
-/// The acceleration limit of an axis without its jerk limit: at most that of a ramp to `speed` under it, in the mean.
+/// Returns the acceleration limit of an axis that has no jerk limit in a pass. It is at most the mean acceleration of
+/// a ramp to `speed` under the usual jerk limit.
 #[inline(never)]
 #[small]
 fn mean_accel(accel: f32, jerk: f32, speed: f32) -> f32 {
@@ -93,8 +99,9 @@ fn mean_accel(accel: f32, jerk: f32, speed: f32) -> f32 {
 }
 
 impl Planner {
-    /// Waits until the encoder says how fast the spindle turns, and then, if it `cuts`, makes the pass of the line; or says why not. A pass that a
-    /// feedhold has left is made once more, from its beginning, when the hold is over.
+    /// Waits until the encoder says how fast the spindle turns. Then makes the pass of the line if it `cuts`, or
+    /// begins an alarm that says why it cannot be made. A pass that a feedhold has left is made once more from its
+    /// beginning when the hold is over.
     pub(super) async fn thread(&mut self, cuts: bool) {
         loop {
             self.walk = Ongoing::None;
@@ -160,12 +167,12 @@ impl Planner {
                 break;
             }
         }
-        // G76 goes on with its usual limits.
+        // The other moves of G76 have their usual limits.
         self.walk = Ongoing::None;
         self.take_up_changes();
     }
 
-    /// What has become of the lines that were queued. An alarm is begun here.
+    /// Returns what has become of the lines that were queued. Begins an alarm if the pass has failed.
     #[inline(never)]
     #[small]
     fn end(&mut self) -> End {
@@ -185,7 +192,7 @@ impl Planner {
         End::Done
     }
 
-    /// Queues the end of a pass. There is room.
+    /// Queues the end of a pass, unless it returns or is cut short. There is room.
     #[small]
     fn queue_end(&mut self) {
         if !self.returns() && !self.is_cut_short() {
@@ -193,7 +200,7 @@ impl Planner {
         }
     }
 
-    /// Queues the rest of a long line.
+    /// Queues the rest of a line that takes several blocks.
     pub(super) async fn finish_parts(&mut self) {
         while self.has_begun() && !self.is_flushed() {
             self.pass_room().await;
@@ -204,7 +211,7 @@ impl Planner {
         }
     }
 
-    /// How the pass stands.
+    /// Returns how the pass stands.
     #[small]
     pub(super) fn pass(&self) -> Status {
         common::with(self.links.thread, |common| common.encoder.pass)
@@ -222,7 +229,8 @@ impl Planner {
         })
     }
 
-    /// Exec has dropped its blocks within a pass, of which the line and its start are what they were.
+    /// Starts from where the motors are, when exec has dropped its blocks within a pass. The end of the line and the
+    /// start of the pass stay as they are.
     #[inline(never)]
     #[small]
     pub(super) fn relocate_within(&mut self) {
@@ -234,7 +242,8 @@ impl Planner {
         self.links.set_position(&end);
     }
 
-    /// Queues a part of the way back to the start of a pass: X out of the cut, along it, and X back; or, of G33.1, the end of it and all at once.
+    /// Queues a part of the way back to the start of a pass. After a feedhold: X out of the cut, along the cut, and X
+    /// back. In G33.1: the end of the pass, and then one move to the start.
     #[inline(never)]
     #[small]
     fn go_back(&mut self, part: u8) {
@@ -264,19 +273,19 @@ impl Planner {
         self.straight(&target, None);
     }
 
-    /// How far X leaves the cut before the end of a pass, by the setting.
+    /// Returns by how much X leaves the cut before the end of a pass, from the settings.
     #[small]
     fn retract_length(&self) -> Length {
         let length = self.spindle_setting(spindle::R);
         match &self.links.commands.borrow().motion {
-            // To the drive line.
+            // X leaves towards the drive line.
             Motion::ThreadCycle(cycle) if cycle.peak.0 < 0 => Length(length.abs()),
             Motion::ThreadCycle(_) => Length(-length.abs()),
             _ => Length(length),
         }
     }
 
-    /// How X leaves the cut, with the limits of the axis as they are now.
+    /// Returns how X leaves the cut, with the limits of the axis as they are now.
     #[inline(never)]
     #[small]
     fn retract(&self) -> Retract {
@@ -287,7 +296,7 @@ impl Planner {
         if let Some((low, high)) = Setup::travel(&*settings, X) {
             end = end.max(low.0).min(high.0);
         }
-        // Beyond its travel X does not leave the cut through the work.
+        // X stays if it is beyond its travel: it would leave the cut through the work.
         if (end < x.0) != (length.0 < 0) {
             return Retract::NONE;
         }
@@ -296,7 +305,7 @@ impl Planner {
         for motor in (0..MOTORS).filter(|motor| moved_by(&settings, *motor) == X) {
             let ratio = settings.step_ratio(motor);
             let way = ratio.steps(Length(end)).wrapping_sub(ratio.steps(x));
-            // Motors of an axis go alike, or the axis stays.
+            // Either all motors of the axis make the same steps, or the axis stays.
             if way == 0 || retract.is_some() && whole != way {
                 return Retract::NONE;
             }
@@ -317,10 +326,11 @@ impl Planner {
         retract
     }
 
-    /// Waits until the encoder tells how long a turn takes, in counts. `None` if what is queued is to be dropped.
+    /// Waits until the encoder tells how long a turn takes, in counts. Returns `None` if what is queued is to be
+    /// dropped, and an error if the spindle gives no pulse for too long.
     async fn spindle_turns(&self) -> Result<Option<u32>, Status> {
         let (mut since, mut last) = (millis(), 0);
-        // The power task looks at the encoder, and says so.
+        // The power task looks at the encoder, and then raises this event.
         wait(self.links.thread, Event::BlockDone, || {
             if self.is_flushed() {
                 return Some(Ok(None));
@@ -344,7 +354,8 @@ impl Planner {
         .await
     }
 
-    /// Whether the passes of G76 can be made, with so many counts a turn: before X goes to the first. How fast X is in a taper is looked at there.
+    /// Checks whether the passes of G76 can be made, with `turn` counts a turn, before X goes to the first one. The
+    /// speed of X in a taper is checked when its pass begins.
     #[inline(never)]
     #[small]
     fn check_cycle(&self, turn: u32) -> Result<(), Status> {
@@ -359,7 +370,8 @@ impl Planner {
         if is_fast { Err(Status::VelocityExceeded) } else { Ok(()) }
     }
 
-    /// Tells exec of the pass, with so many counts a turn, and puts its limits into force. False if it goes nowhere.
+    /// Tells exec of the pass, with `turn` counts a turn, and puts the limits of the pass into force. Returns false if
+    /// the pass goes nowhere.
     #[inline(never)]
     #[small]
     fn begin_pass(&mut self, turn: u32) -> Result<bool, Status> {
@@ -391,9 +403,9 @@ impl Planner {
             let accel = mean_accel(accel, jerk, speed);
             axis.limit_change(accel, 0.0);
         }
-        // The corner of a taper is no limit: a slower axis would not be in step.
+        // The corner at a taper must not slow the path down: an axis that gets slower would not be in step.
         self.dynamics.junction = ANY_CORNER;
-        // They are the settings' again for the next line.
+        // The limits of the settings are in force again for the next line.
         links.changes.note(Changes::SETTINGS);
         self.set_pass(Status::Ok);
         let [x, y, z, ..] = self.position;
@@ -407,7 +419,7 @@ impl Planner {
         Ok(true)
     }
 
-    /// Whether the spindle turns as M3 or M4 has it, as far as that is told.
+    /// Whether the spindle turns as M3 or M4 says, as far as the encoder tells.
     #[inline(never)]
     #[small]
     fn turns_as_told(&self) -> bool {
@@ -418,7 +430,7 @@ impl Planner {
         })
     }
 
-    /// How far the axes may be off, mm.
+    /// Returns how far the axes may be off, mm.
     #[small]
     fn error_limit(&self) -> Short {
         Short::new(self.spindle_setting(spindle::L) as f32 * 1e-3)
@@ -430,7 +442,8 @@ impl Planner {
         Setting::of(Owner::Spindle, row).map_or(0, |row| self.links.storage.cold(row))
     }
 
-    /// A line of the pass, counted from 0, from a place; `None` if there is none, or it goes nowhere.
+    /// Returns a line of the pass, counted from 0, that begins at `from`. `None` if there is no such line or it goes
+    /// nowhere.
     #[inline(never)]
     #[small]
     pub(super) fn piece(&self, line: u8, from: &PerAxis<Length>) -> Option<Piece> {
@@ -452,7 +465,7 @@ impl Planner {
         })
     }
 
-    /// Queues a line of the pass, or begins with its parts. False if there is none.
+    /// Queues a line of the pass, or begins with its parts. Returns false if there is no such line.
     #[inline(never)]
     #[small]
     fn queue_line(&mut self, line: u8, turn: u32, back: bool) -> bool {
@@ -467,7 +480,7 @@ impl Planner {
         true
     }
 
-    /// Tells exec the lead of a line further on, if there is one.
+    /// Tells exec the lead of a further line of the pass. Returns whether there is such a line.
     #[inline(never)]
     #[small]
     fn queue_lead(&mut self, line: u8) -> bool {
@@ -480,17 +493,17 @@ impl Planner {
         true
     }
 
-    /// How the pass stands.
+    /// Sets how the pass stands.
     #[small]
     pub(super) fn set_pass(&self, status: Status) {
         common::with(self.links.thread, |common| common.encoder.pass = status);
     }
 
-    /// Nothing has moved, and nothing will.
+    /// Begins an alarm with `status`. Nothing has moved, and nothing will.
     #[inline(never)]
     #[small]
     fn refuse(&mut self, status: Status) {
-        // The line says that the machine is at its end.
+        // The model is at the end of the line, but the machine is not.
         self.links.set_position(&self.position);
         self.set_pass(status);
         alarm::raise_for(self.links, Alarm::Alarm, status);

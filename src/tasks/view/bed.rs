@@ -1,4 +1,4 @@
-//! The plane of the bed: what probes it, and what follows it.
+//! The plane of the bed: moves that probe it, and whether moves follow it.
 
 use kerf_macros::small;
 
@@ -15,7 +15,7 @@ use crate::units::Length;
 /// The axis that follows the bed.
 const Z: usize = 2;
 
-/// Where an axis is in machine coordinates, its motor being there: Z may follow the bed.
+/// Returns where an axis is in machine coordinates, from the place of its motor: Z may follow the bed.
 #[small]
 #[inline(never)]
 pub(super) fn lowered(view: &View<'_>, axis: usize, at: Length) -> Length {
@@ -25,7 +25,7 @@ pub(super) fn lowered(view: &View<'_>, axis: usize, at: Length) -> Length {
     bed.lowered_z(x, y, at)
 }
 
-/// A step of probing, or the plane switched on or off.
+/// Begins a step of probing the bed, or switches the plane on or off.
 #[small]
 #[inline(always)]
 pub(super) fn level(view: &mut View<'_>, what: Level) -> Status {

@@ -69,11 +69,11 @@ pub(super) fn check(view: &mut View<'_>, on: bool) -> Status {
     if alarm != Alarm::None {
         return alarm.status();
     }
-    // Check mode is no work; a hold in it is.
+    // Check mode itself is no work, but a hold in check mode is.
     let links = view.links;
     let waits = view.has_others() || links.chain_waits.get();
     let works = machine::is_held() || view.has_work() || waits;
-    // What an alarm or a `^d` switches off is off.
+    // What an alarm or a `^d` switches off would be off in check mode, too: it must be off before.
     let runs = values::modal(view, Value::SpindleOn)
         + values::modal(view, Value::Mist)
         + values::modal(view, Value::Flood);

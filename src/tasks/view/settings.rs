@@ -1,4 +1,4 @@
-//! What a setting that changes has to tell, and the defaults.
+//! Changes of settings: who has to be told of them; and the defaults.
 
 use kerf_macros::small;
 
@@ -16,7 +16,7 @@ use crate::tasks::links::Changes;
 use crate::tasks::spindle;
 use crate::tasks::turning;
 
-/// Changes a setting, and tells all that go by it.
+/// Changes a setting, and tells all parts that go by it. Returns a warning if the change has side effects.
 #[small]
 #[inline(always)]
 pub(super) fn set(view: &mut View<'_>, setting: Setting, value: i32) -> Result<Warning, Status> {
@@ -36,7 +36,7 @@ pub(super) fn set(view: &mut View<'_>, setting: Setting, value: i32) -> Result<W
         }
         if Capability::Printer.is_built_in() {
             heat::set(&view.links.heat, &mut view.settings, setting, value);
-            // The planner asks for the extruder's lead.
+            // The planner finds out then whether the extruder's lead has changed.
             view.links.changes.note(Changes::SETTINGS);
         }
         if is_encoder {

@@ -1,4 +1,4 @@
-//! What a value is now: the numbers that reports and questions are about.
+//! Values as they are now: the numbers that reports and questions are about.
 
 use kerf_macros::small;
 
@@ -13,14 +13,14 @@ use crate::tasks::health;
 use crate::tasks::overrides;
 use crate::tasks::turning;
 
-/// A value as it is now, or at the moment of the report.
+/// Returns a value as it is now, or as it was at the moment of the report.
 #[small]
 #[inline(always)]
 pub(super) fn value(view: &mut View<'_>, value: Value) -> i32 {
     match value {
         Value::Working => view.has_work().into(),
         Value::Running => view.motion().running.into(),
-        // Lines that move nothing are finished when all before them are.
+        // Lines that move nothing are finished when all lines before them are.
         Value::FinishedLine if !view.is_busy() => modal(view, Value::BlockLine),
         Value::Flow => view.links.model.borrow().flow().into(),
         Value::FinishedLine => view.motion().finished as i32,
@@ -55,12 +55,12 @@ pub(super) fn value(view: &mut View<'_>, value: Value) -> i32 {
         Value::SelectedTool => view.links.model.borrow().selected_tool().into(),
         Value::Input(input) => view.input(input),
         Value::ProbeState => view.links.probe.state() as i32,
-        // Only answers of a dialect in order wait for that.
+        // Only answers of a dialect in order wait for the report of a probing.
         Value::ProbeUntold => {
             let is_told = || view.port.number == view.links.told().number;
             i32::from(Speech::HAS_QUESTION && view.links.probe.is_untold() && is_told())
         }
-        // An axis that turns stands still in a probing move.
+        // A rotary axis stands still in a probing move.
         Value::Probed(axis) => {
             let at = view.links.probe.at(axis);
             at.unwrap_or_else(|| view.position(usize::from(axis))).0
@@ -93,7 +93,7 @@ pub(super) fn value(view: &mut View<'_>, value: Value) -> i32 {
     }
 }
 
-/// Values of the G-code model.
+/// Returns a value of the G-code model.
 #[small]
 pub(super) fn modal(view: &View<'_>, value: Value) -> i32 {
     let model = view.links.model.borrow();
