@@ -1,12 +1,12 @@
 //! The step generator: what happens at one tick of the step timer, without any register.
 //!
-//! Owned by the step interrupt (level 0). Each motor has a phase below [`STEP`], which is one step. A
-//! tick adds the segment's increment; when that fills bit 15, the bit is taken off and a step is due.
-//! So a motor steps at most once a tick, `increment = STEP` is a step on every tick, and a motor whose
-//! increment is `STEP / 2^k` steps on every `2^k`th tick exactly.
+//! Owned by the step interrupt (level 0). Each motor has a phase below [`STEP`], which is one step. A tick adds the
+//! segment's increment to the phase. When the sum fills bit 15, the bit is taken off and a step is due. So a motor
+//! steps at most once a tick, `increment = STEP` is a step on every tick, and a motor whose increment is `STEP / 2^k`
+//! steps on every `2^k`th tick exactly.
 //!
-//! On AVR the whole of [`Dda::tick`] has a twin in assembly (`hal/avr/step_isr.rs`), which works on the
-//! same [`Dda`] and [`Segment`], field by field. The host runs this one.
+//! On AVR the whole of [`Dda::tick`] has a twin in assembly (`hal/avr/step_isr.rs`), which works on the same [`Dda`]
+//! and [`Segment`], field by field. The host runs the Rust version.
 //!
 //! ```text
 //!   tick   n-1          n           n+1
@@ -18,13 +18,13 @@
 //!          +-fall       +-fall       +-fall    step pins fall
 //! ```
 //!
-//! Pins rise first, so a pulse's time does not depend on the computation, and fall last, so that a
-//! pulse is as wide as the computation. Directions change after the last pulse of the old
-//! segment and a whole tick before the first of the new one.
+//! Pins rise first, so that the time of a pulse does not depend on the computation. They fall last, so that a pulse
+//! is as wide as the computation takes. Directions change after the last pulse of the old segment and a whole tick
+//! before the first pulse of the new one.
 //!
-//! The interrupt may start late, behind another one. A segment that has the time for it names the
-//! cycle of the tick at which its pulses rise, so late that no other interrupt can delay them: those
-//! pulses are exact to the cycle.
+//! The interrupt may start late, behind another one. A segment with enough time for it names the cycle of the tick at
+//! which its pulses rise (`settle`). That cycle is so late that no other interrupt can delay the pulses: they are
+//! exact to the cycle.
 //!
 //! In *lockstep* all motors that move step on every tick: phases stay as they are, and the interrupt
 //! has nothing to add. That is how the highest rates are reached.
@@ -44,21 +44,20 @@ pub mod step_replay;
 
 /// A step, in phase units.
 pub const STEP: u16 = 1 << STEP_LOG2;
-/// The exponent of it.
+/// The exponent of [`STEP`].
 pub const STEP_LOG2: u8 = 15;
 
-/// Where phases start: a little past half a step, so that a position is rounded to the nearest step
-/// and a rest of up to [`PHASE_MARGIN`] left by the segments before never moves a step of a motor that
-/// runs on exact ticks.
+/// Where phases start: a little past half a step, so that a position is rounded to the nearest step. A remainder of
+/// up to [`PHASE_MARGIN`], left by earlier segments, never moves a step of a motor that runs on exact ticks.
 pub const PHASE_START: u16 = STEP / 2 + PHASE_MARGIN;
 
-/// See [`PHASE_START`].
+/// How far [`PHASE_START`] is past half a step, in phase units.
 pub const PHASE_MARGIN: u16 = if STEPS_BY_UNIT { 2200 } else { 1024 };
 
-/// Most ticks of a segment: keeps the rounding rest below [`PHASE_MARGIN`].
+/// Most ticks of a segment: keeps the rounding remainder below [`PHASE_MARGIN`].
 pub const TICKS_MAX: u16 = if STEPS_BY_UNIT { 4200 } else { 2000 };
 
-/// The phase of a motor that is at a whole step, in the direction in which it counts.
+/// The phase of a motor at a whole step, as counted in the motor's direction.
 pub const fn start(backwards: bool) -> u16 {
     if backwards { STEP - 1 - PHASE_START } else { PHASE_START }
 }
@@ -72,32 +71,31 @@ pub const SEGMENTS: usize = 8;
 pub struct Segment {
     /// Phase added per tick, 0 to [`STEP`].
     pub increment: [u16; MOTORS],
-    /// Ticks it lasts, at least 1.
+    /// Number of ticks, at least 1.
     pub ticks: u16,
     /// CPU cycles from tick to tick.
     pub period: u16,
     /// Bit m set: motor m runs backwards.
     pub backwards: u8,
-    /// Cycles from a tick to its pulses; 0 for pulses as soon as may be.
+    /// CPU cycles from a tick to its pulses; 0 for pulses as soon as possible.
     pub settle: u8,
-    /// What the interrupt may leave out: [`NARROW`], [`WIDE`], or [`LOCKSTEP`] and the motors that step on
-    /// every tick. Set by [`Segment::seal`].
+    /// What the interrupt may leave out: [`NARROW`], [`WIDE`], or [`LOCKSTEP`] with the bits of the motors that step
+    /// on every tick. Set by [`Segment::seal`].
     pub mode: u8,
-    /// Motors of its block that move, as bits, none in a pause: for their power. The interrupt does not
-    /// read it. It makes the segment 16 bytes long.
+    /// Motors that move in the segment's block, as bits; none in a pause. Used to power the drivers; the interrupt
+    /// does not read it. It makes the segment 16 bytes long.
     pub moving: u8,
 }
 
 /// Only the first two motors move.
 pub const NARROW: u8 = 0;
-/// Others do.
+/// Motors beyond the first two move.
 pub const WIDE: u8 = 1;
 /// All motors that move step on every tick.
 pub const LOCKSTEP: u8 = 0x80;
 
 impl Segment {
-    /// Completes it: the motors `full` (bits) travel `step` a tick, the rest of those that move less.
-    /// Cost: 20.
+    /// Sets `mode`: the motors `full` (bits) travel `step` a tick, the other motors that move travel less. Cost: 20.
     #[inline]
     pub fn seal(&mut self, full: u8, step: u16) {
         self.mode = if step == STEP && self.moving == full {
@@ -107,13 +105,13 @@ impl Segment {
         };
     }
 
-    /// The mode of a segment in which these motors (bits) move at rates of their own.
+    /// Returns the mode of a segment in which the motors `moving` (bits) move at rates of their own.
     #[inline(always)]
     pub fn mode_of(moving: u8) -> u8 {
         if moving & !0b11 != 0 { WIDE } else { NARROW }
     }
 
-    /// Adds the way that it takes each motor, in phase units.
+    /// Adds the distance that the segment moves each motor, in phase units, to `ways`.
     fn add_way(&self, ways: &mut [i32; MOTORS]) {
         for (m, way) in ways.iter_mut().enumerate() {
             let far = (u32::from(self.increment[m]) * u32::from(self.ticks)) as i32;
@@ -122,30 +120,30 @@ impl Segment {
     }
 }
 
-/// How close ticks may come on a chip with usual pulses ([`Drivers::USUAL`]), for some number of motors that move. All are periods of
-/// [`Segment::period`].
+/// How close ticks may come on a chip with usual pulses ([`Drivers::USUAL`]), for a given number of motors that move.
+/// All fields are periods, as in [`Segment::period`].
 #[derive(Clone, Copy, Debug)]
 pub struct Ticks {
-    /// At the highest step rate: of lockstep.
+    /// Period at the highest step rate, which is that of lockstep.
     pub step: u16,
-    /// The shortest: the step interrupt, a short interrupt before it, and some time for everything else.
+    /// Shortest period: the step interrupt, a short interrupt before it, and some time for everything else.
     pub shortest: u16,
-    /// The ticks of steady motion: as fine as leaves exec and the planner a third of the CPU.
+    /// Period in steady motion: as fine as leaves exec and the planner a third of the CPU.
     pub fine: u16,
-    /// The ticks of short blocks, which leave exec and the planner more of the CPU.
+    /// Period in short blocks, which leave exec and the planner more of the CPU.
     pub coarse: u16,
-    /// The ticks of blocks so short that they are a single segment.
+    /// Period in blocks so short that they are a single segment.
     pub coarsest: u16,
-    /// From this period on pulses wait for the interrupt's worst latency ([`Segment::settle`]).
+    /// From this period on, pulses wait for the interrupt's worst latency ([`Segment::settle`]).
     pub settles: u16,
 }
 
-/// What the drivers of the motors ask of their pins.
+/// What the motor drivers require of the signals at their pins.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Drivers {
     /// How long a step pulse lasts, us.
     pub pulse_us: u8,
-    /// How long a direction stands before the first step, us.
+    /// How long a direction must be stable before the first step, us.
     pub setup_us: u8,
 }
 
@@ -157,11 +155,11 @@ pub trait Pins {
     fn fall(&mut self, motors: u8);
     /// Sets all direction pins (bit m set: motor m runs backwards).
     fn direction(&mut self, backwards: u8);
-    /// Ticks come this many CPU cycles apart from now on.
+    /// Sets the distance between ticks from now on, in CPU cycles.
     fn period(&mut self, cycles: u16);
-    /// A segment slot is free.
+    /// Tells exec that a segment slot is free.
     fn slot_free(&mut self);
-    /// No segment: no more ticks.
+    /// Ends ticks: there is no segment.
     fn stop(&mut self);
 }
 
@@ -169,22 +167,22 @@ pub trait Pins {
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub struct Dda {
-    /// Below [`STEP`].
+    /// The position of each motor between two steps, below [`STEP`].
     pub(crate) phase: [u16; MOTORS],
     pub(crate) increment: [u16; MOTORS],
-    /// Ticks left of the segment.
+    /// Ticks left of the running segment.
     pub(crate) ticks: u16,
     /// Steps due at the next tick, bit m for motor m.
     pub(crate) due: u8,
     pub(crate) backwards: u8,
-    /// The settling time, as in the segment.
+    /// [`Segment::settle`] of the running segment.
     pub(crate) settle: u8,
-    /// The mode, as in the segment.
+    /// [`Segment::mode`] of the running segment.
     pub(crate) mode: u8,
 }
 
 impl Dda {
-    /// At rest.
+    /// A generator at rest.
     pub const fn new() -> Self {
         Self {
             phase: [PHASE_START; MOTORS],
@@ -197,9 +195,10 @@ impl Dda {
         }
     }
 
-    /// Every motor is where its last pulse has put it, and no fraction of a step is on the way. The steps that
-    /// the rest of the segment and those that `queued` gives would have made are taken off `position`. For
-    /// exec, while no ticks come; exact wherever they were stopped. Cost: 1,200, and 600 a segment.
+    /// Puts every motor where its last pulse has put it, with no fraction of a step on the way. Takes off `position`
+    /// the steps that the rest of the running segment, and the segments that `queued` returns, would have made. Exec
+    /// calls this while no ticks come; the result is exact wherever the ticks were stopped. Cost: 1,200, and 600 a
+    /// segment.
     #[inline(never)]
     #[small]
     pub fn settle(
@@ -207,7 +206,7 @@ impl Dda {
         mut queued: impl FnMut() -> Option<Segment>,
         position: &mut [i32; MOTORS],
     ) {
-        // Phases as they count forwards, and the way to where the last segment ends.
+        // Phases as they count forwards; then the distance to where the last segment ends is added.
         let mut ends = [0i32; MOTORS];
         for (m, end) in ends.iter_mut().enumerate() {
             let (phase, backwards) = (self.phase[m], self.backwards & 1 << m != 0);
@@ -229,11 +228,11 @@ impl Dda {
         (self.ticks, self.due, self.mode) = (0, 0, NARROW);
     }
 
-    /// What is left of the segment.
+    /// Returns what is left of the running segment.
     fn rest(&self) -> Segment {
         let Self { mut increment, ticks, backwards, mode, .. } = *self;
         if mode & LOCKSTEP != 0 {
-            // On AVR increments are those of a segment before.
+            // In lockstep on AVR, `increment` is still that of an earlier segment.
             for (m, increment) in increment.iter_mut().enumerate() {
                 *increment = if mode & 1 << m != 0 { STEP } else { 0 };
             }
@@ -267,7 +266,7 @@ impl Dda {
         pins.fall(due);
     }
 
-    /// Takes the next segment. False when there is none.
+    /// Takes the next segment. Returns false when there is none.
     #[inline(always)]
     pub fn load(
         &mut self,
@@ -277,7 +276,7 @@ impl Dda {
         let Some(segment) = segments.pop() else {
             return false;
         };
-        // First: the counter is running towards the old top.
+        // First of all: the counter is already running towards the old top.
         pins.period(segment.period);
         let turned = segment.backwards ^ self.backwards;
         if turned != 0 {

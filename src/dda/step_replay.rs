@@ -1,11 +1,11 @@
 //! How many steps the generator makes from a given moment on.
 //!
-//! Owned by exec, for a move that ends at a switch. The switch's interrupt takes down where the generator is
-//! ([`Dda`], between two ticks); from there this does what the generator does, a whole segment at a time, in the
-//! same integers. When the steppers have come to rest, their position less these steps is the one at that moment:
-//! exact, whatever the way to the standstill.
+//! Owned by exec, for a move that ends at a switch. The switch's interrupt records the state of the generator
+//! ([`Dda`]) between two ticks. From that state on, [`StepReplay`] makes the steps that the generator makes, a whole
+//! segment at a time, in the integers of the generator. When the steppers have come to rest, their position less these steps is
+//! the position at the recorded moment. It is exact, whatever the path to the standstill.
 //!
-//! Cost on AVR: 500 cycles a segment, nothing while there is no such moment.
+//! Cost on AVR: 500 cycles a segment, nothing while no moment is recorded.
 
 use super::{Dda, STEP, STEP_LOG2, Segment};
 use crate::boards::MOTORS;
@@ -19,29 +19,29 @@ pub struct StepReplay {
 }
 
 impl StepReplay {
-    /// At no moment.
+    /// A replay without a recorded moment.
     pub const fn new() -> Self {
         Self { phase: [0; MOTORS], backwards: 0, steps: [0; MOTORS] }
     }
 
-    /// From the moment at which the generator is `dda`.
+    /// Starts the replay at the moment at which the generator's state is `dda`.
     pub fn begin(&mut self, dda: &Dda) {
         (self.phase, self.backwards) = (dda.phase, dda.backwards);
         for (m, steps) in self.steps.iter_mut().enumerate() {
-            // What is due has been counted in the phase, but the pulse comes with the next tick.
+            // A step that is due has left the phase already, but its pulse comes with the next tick.
             *steps = signed(i32::from(dda.due >> m & 1), dda.backwards, m);
         }
         self.advance(&dda.increment, dda.ticks);
     }
 
-    /// The generator had made so many steps more than the motors.
+    /// Adds steps by which the generator was ahead of the motors.
     pub fn add(&mut self, steps: &[i32; MOTORS]) {
         for (steps, more) in self.steps.iter_mut().zip(steps) {
             *steps = steps.wrapping_add(*more);
         }
     }
 
-    /// The generator runs a segment.
+    /// Replays a segment that the generator runs.
     pub fn run(&mut self, segment: &Segment) {
         let turned = segment.backwards ^ self.backwards;
         self.backwards = segment.backwards;
@@ -56,14 +56,15 @@ impl StepReplay {
     fn advance(&mut self, increment: &[u16; MOTORS], ticks: u16) {
         let motors = self.phase.iter_mut().zip(self.steps.iter_mut()).zip(increment).enumerate();
         for (m, ((phase, steps), increment)) in motors {
-            // Below 2^31: an increment is a step at most.
+            // Below 2^31: an increment is at most a step.
             let way = u32::from(*phase) + u32::from(*increment) * u32::from(ticks);
             *phase = way as u16 & !STEP;
             *steps = steps.wrapping_add(signed((way >> STEP_LOG2) as i32, self.backwards, m));
         }
     }
 
-    /// Where the motors were at that moment, that are `at` when all of it has been run.
+    /// Returns where the motors were at the recorded moment, given that they are `at` when every segment has been
+    /// run.
     pub fn before(&self, at: &[i32; MOTORS]) -> [i32; MOTORS] {
         let mut before = *at;
         for (at, steps) in before.iter_mut().zip(&self.steps) {
@@ -122,7 +123,7 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever runs, and whenever the moment is.
+        /// For any segments, and at any tick.
         #[test]
         fn the_steps_behind_a_moment_are_known(
             segments in prop::collection::vec(

@@ -1,13 +1,14 @@
 //! Pressure advance: the extruder is ahead of its line by K times the velocity that is planned for it, so that what leaves the nozzle follows
 //! the velocity along the path.
 //!
-//! Owned by [`Prep`](super::prep::Prep), at the exec level. Lines that both push filament and travel have it; retractions, moves of the extruder
-//! alone and travels do not. Behind such a line the motor gives its lead back in the segments of the lines that follow, and at
-//! a standstill in segments of its own. The lead is counted in whole phase units apart from the line, so that nothing of it is left at rest.
+//! Owned by [`Prep`](super::prep::Prep), at the exec level. Lines that both push filament and travel have a lead;
+//! retractions, moves of the extruder alone, and travels have none. After a line with a lead, the motor gives the
+//! lead back in the segments of the lines that follow, and at a standstill in segments of its own. The lead is
+//! counted in whole phase units, apart from the line, so that nothing of it is left at rest.
 //!
-//! Exec says for each stretch how fast the machine is at its end ([`Advance::aim`]); each segment takes the motor towards that
-//! ([`Advance::travel`]), within the velocity and the acceleration of the axis. Where a lead jumps, as at the end of a line that pushes, the
-//! motor so comes later than the model says.
+//! For each stretch, exec tells how fast the machine is at its end ([`Advance::aim`]). Each segment takes the motor
+//! towards the lead for this velocity ([`Advance::travel`]), within the velocity and the acceleration of the axis.
+//! Where the lead jumps, as at the end of a line that pushes, the motor is therefore later than the model demands.
 //!
 //! Units: phase units, s. Cost on AVR: 1,100 cycles a line, 3,000 a segment; with K 0 and no lead left 10.
 
@@ -28,51 +29,52 @@ use crate::units::Length;
 /// How many extruders there are.
 pub const EXTRUDERS: usize = Capability::Printer.is_built_in() as usize;
 
-/// What a unit of K is, s.
+/// The unit of K, s.
 const UNIT_S: f32 = 1e-4;
-/// No stretch counts as shorter, s.
+/// A shorter stretch counts as this long, s.
 const SHORTEST: f32 = 1e-4;
-/// No lead is longer: 30,000 steps.
+/// The longest lead, phase units: 30,000 steps.
 const MOST: f32 = 1e9;
-/// A lead that may stay while others move: 1/32 step.
+/// A lead that may stay while other motors move, phase units: 1/32 step.
 const LITTLE: u32 = 1 << 10;
 
-/// Parts of what a way is counted in to which [`refine`] knows it: the logarithm of their number.
+/// [`refine`] knows a way to 1/32 of the unit in which it is counted. This is the exponent of 32.
 const MORE_LOG2: u8 = 5;
-/// What rounding to 1/512 step takes off two ways, or adds.
+/// What rounding to 1/512 step takes off two ways, or adds to them, phase units.
 const ROUNDING: f32 = STEP as f32 / 256.0;
-/// How much filament a mean counts at most, in slacks: the logarithm of their number, 0.1 mm.
+/// How much filament a mean covers at most: 2 to this power slacks, 0.1 mm.
 const ENOUGH_LOG2: i8 = 6;
 
-/// What the extruder's lead is to be like.
+/// The parameters of the extruder's lead.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Lead {
     /// The motor of the extruder.
     pub motor: u8,
     /// K, 0.1 ms; 0 for no lead.
     pub time: u16,
-    /// How fast the lead may change its velocity, steps/s^2, not 0.
+    /// Acceleration limit of the lead, steps/s^2, not 0.
     pub accel: Short,
-    /// How fast the motor may be with it, steps/s, not 0.
+    /// Velocity limit of the motor with its lead, steps/s, not 0.
     pub velocity: Short,
-    /// By how much ways of lines that push alike differ, phase units: see [`Lead::slack`].
+    /// By how much the ways of lines that push alike may differ, phase units: see [`Lead::slack`].
     pub slack: Short,
 }
 
 impl Lead {
-    /// None.
+    /// No lead.
     pub const NONE: Self =
         Self { motor: 0, time: 0, accel: Short::ZERO, velocity: Short::ZERO, slack: Short::ZERO };
 
-    /// The slack of a motor with so many steps/mm: 0.0012 mm of filament, as files may have three decimals, and what parts of a step are rounded by.
+    /// Returns the slack of a motor with so many steps/mm: 0.0012 mm of filament, since files may have three
+    /// decimals, and the rounding to parts of a step.
     pub fn slack(steps: f32) -> Short {
         Short::new(steps * (12.0 * STEP as f32 / Length::PER_MM as f32) + ROUNDING)
     }
 }
 
-/// Has a line that pushes filament say how far its extruder goes to 1/512 step, or 1/32 step where ways are in whole steps: 1/16 step, to which
-/// ends of lines are known, may be a tenth of a short line, and the lead would be off by as much. `travel` is that of its axis, in units of
-/// [`Length`].
+/// Notes in a line that pushes filament how far its extruder goes: to 1/512 step, or to 1/32 step where ways are in
+/// whole steps. The ends of lines are known to 1/16 step only. That may be a tenth of a short line, and the lead
+/// would be off by as much. `travel` is that of the extruder's axis, in units of [`Length`].
 ///
 /// Called by the planner while there is a K. Cost: 1,400.
 #[inline(never)]
@@ -90,34 +92,34 @@ pub fn refine(line: &mut Line, motor: usize, ratio: StepRatio, travel: i32) {
 /// An extruder with its lead.
 #[derive(Clone, Copy, Debug)]
 pub struct Advance {
-    /// There is a K, or a lead.
+    /// Whether there is a K, or a lead.
     pub(super) on: bool,
-    /// The block that runs has a lead, or takes one back.
+    /// Whether the running block has a lead, or takes one back.
     pub(super) leads: bool,
     pub(super) motor: u8,
-    /// The motor goes backwards in the last segment with a lead.
+    /// Whether the motor goes backwards in the last segment with a lead.
     pub(super) backwards: bool,
     /// K, s.
     time: f32,
-    /// steps/s^2.
+    /// Acceleration limit of the lead, steps/s^2.
     accel: Short,
-    /// By how much ways of lines that push alike differ, phase units.
+    /// By how much the ways of lines that push alike may differ, phase units.
     slack: Short,
-    /// Its velocity limit, phase units in 256 CPU cycles.
+    /// The motor's velocity limit, phase units in 256 CPU cycles.
     rate: u16,
-    /// How far the motor has gone in lines that push alike, and how far they were, mm.
+    /// How far the motor has gone in lines that push alike, phase units, and how long these lines were, mm.
     pushed: (f32, f32),
-    /// The lead in the block that runs, for each mm/s.
+    /// The lead in the running block for each mm/s of its velocity, phase units.
     factor: f32,
-    /// The block pushes otherwise than the one before: the lead jumps.
+    /// Whether the block pushes at another rate than the one before: the lead jumps.
     jumps: bool,
-    /// How fast the lead changes.
+    /// How fast the lead changes, phase units/s.
     speed: f32,
-    /// How far the motor is ahead of its line, in what has been prepared.
+    /// How far the motor is ahead of its line in the segments that have been prepared, phase units.
     made: i32,
-    /// How far it is to be at the end of the stretch.
+    /// How far the motor is to be ahead of its line at the end of the stretch, phase units.
     goal: i32,
-    /// How fast that changes, phase units/s; 0 if it jumps.
+    /// How fast `goal` changes, phase units/s; 0 if it jumps.
     pace: f32,
 }
 
@@ -142,12 +144,12 @@ impl Advance {
         pace: 0.0,
     };
 
-    /// From the next block on.
+    /// Sets the parameters, from the next block on.
     #[inline(never)]
     pub fn set(&mut self, lead: &Lead) {
         const PER_256: f32 = STEP as f32 * 256.0 / TIMER_HZ as f32;
         self.time = f32::from(lead.time) * UNIT_S;
-        // What is left of a lead is taken back as it was made.
+        // With a K of 0 the other parameters stay: what is left of the lead is taken back within them.
         if lead.time != 0 {
             self.motor = lead.motor;
             self.accel = lead.accel;
@@ -157,8 +159,8 @@ impl Advance {
         self.on = lead.time != 0 || self.made != 0;
     }
 
-    /// A block begins in which the motor goes `way` phase units forwards ([`pushed`]), 0 if it has no lead, of `length` mm. Whether there is a lead
-    /// to be made or taken back.
+    /// Begins a block of `length` mm in which the motor goes `way` phase units forwards ([`pushed`]); 0 if it has no
+    /// lead. Returns whether there is a lead to be made or taken back.
     #[inline(never)]
     pub fn begin(&mut self, way: u32, length: f32) -> bool {
         if way == 0 {
@@ -169,8 +171,9 @@ impl Advance {
         some(self.factor) || !self.is_over()
     }
 
-    /// Phase units for each mm. Files round the ends of lines, by 2 % of a short line's filament with four decimals: so it is the mean of the lines
-    /// before that differ by no more than [`Lead::slack`].
+    /// Returns phase units of the motor for each mm of the path. Files round the ends of lines: with four decimals by
+    /// 2 % of a short line's filament. So this is the mean over the lines before that differ by no more than
+    /// [`Lead::slack`].
     fn ratio(&mut self, way: f32, length: f32) -> f32 {
         let (mut ways, mut lengths) = self.pushed;
         let slack = self.slack.get();
@@ -187,17 +190,18 @@ impl Advance {
         mean
     }
 
-    /// Whether no lead is left, but for so little that it may stay until the machine rests.
+    /// Whether no lead is left, except for so little that it may stay until the machine rests.
     fn is_over(&self) -> bool {
         self.made.unsigned_abs() < LITTLE && !some(self.speed)
     }
 
-    /// The block needs no lead, and the motor is where its line is, but for so little that it may stay until the machine rests.
+    /// Whether the block needs no lead, and the motor is where its line is, except for so little that it may stay
+    /// until the machine rests.
     pub fn is_done(&self) -> bool {
         !some(self.factor) && self.goal == 0 && self.is_over()
     }
 
-    /// Begins segments with a lead, if the one before had none; the motor's direction is that of its line then.
+    /// Begins segments with a lead, if the segment before had none. The motor then has the direction of its line.
     #[inline(always)]
     pub fn take_up(&mut self, backwards: bool) {
         if !self.leads {
@@ -205,24 +209,25 @@ impl Advance {
         }
     }
 
-    /// How far the motor is ahead.
+    /// How far the motor is ahead of its line, phase units.
     pub fn made(&self) -> i32 {
         self.made
     }
 
-    /// The line ends, or nothing of it moves: there is no lead from here on.
+    /// Ends the lead, because the line ends or nothing of it moves: the goal is 0 from here on.
     pub fn end(&mut self) {
         (self.factor, self.goal, self.pace) = (0.0, 0, 0.0);
     }
 
-    /// The motor rests where it is, which is where its line is from now on.
+    /// Makes the present position of the motor, which rests, that of its line.
     pub fn cut(&mut self) {
         self.end();
         (self.made, self.speed, self.leads) = (0, 0.0, false);
         self.on = some(self.time);
     }
 
-    /// The machine is that fast, mm/s, at the end of the slice of which a stretch of so many `seconds` is handed out and `pending` are left.
+    /// Sets the goal for the end of a stretch of `seconds`. The machine is at `velocity`, mm/s, at the end of a
+    /// slice, of which `pending` seconds are left after the stretch.
     #[inline(never)]
     pub fn aim(&mut self, velocity: f32, seconds: f32, pending: f32) {
         let end = whole(least(self.factor * velocity, MOST) + 0.5) as i32;
@@ -232,7 +237,7 @@ impl Advance {
         self.pace = if core::mem::take(&mut self.jumps) { 0.0 } else { pace };
     }
 
-    /// How far the lead goes in each of so many ticks, towards what it is to be, signed; no more than a step.
+    /// Returns how far the lead goes in each of `ticks`, towards its goal, signed; no more than a step.
     #[inline(never)]
     pub fn travel(&mut self, ticks: u16, period: u16) -> i32 {
         let want = self.goal - self.made;
@@ -240,12 +245,13 @@ impl Advance {
             return 0;
         }
         if ticks == 1 && want.unsigned_abs() < LITTLE {
-            // Exactly: a tick is no shorter than what is so little takes.
+            // Exactly: a single tick is long enough for so little.
             self.speed = 0.0;
             return want;
         }
         let time = seconds(ticks, period);
-        // How late it is, and how fast, as seen from a lead that is where it is to be: one that changes steadily is caught up with.
+        // How late the lead is, and how fast it catches up, both relative to a goal that moves at `pace`. So a goal
+        // that moves steadily is caught up with.
         let late = want as f32 - self.pace * time;
         let far = size(late);
         let speed = turned(self.speed - self.pace, late);
@@ -253,7 +259,7 @@ impl Advance {
         let gain = accel * time;
         let (slow, fast) = (speed - gain, speed + gain);
         let next = if less(fast * time, far) {
-            // From there it loses a gain at most in each segment behind this one.
+            // From this speed the lead has to lose at most `gain` in each segment behind this one.
             lesser(sqrt(gain * gain + 2.0 * accel * far) - gain, fast)
         } else {
             ratio(far, time)
@@ -262,7 +268,8 @@ impl Advance {
         per_tick(rounded(self.speed * time), ticks)
     }
 
-    /// The machine rests: the lead is to be none. Whether so little is left of it that a tick takes it back.
+    /// Sets the goal to 0, because the machine rests. Returns whether so little lead is left that a single tick takes
+    /// it back.
     pub fn rest(&mut self) -> bool {
         (self.goal, self.pace) = (0, 0.0);
         let little = self.made.unsigned_abs() < LITTLE;
@@ -272,13 +279,13 @@ impl Advance {
         little
     }
 
-    /// The most that the motor may go in a tick, phase units.
+    /// Returns the most that the motor may go in a tick, phase units.
     pub fn most(&self, period: u16) -> i32 {
         let most = product(self.rate, period) >> 8;
         most.clamp(1, STEP.into()) as i32
     }
 
-    /// The motor has gone so much farther in each of so many ticks than its line, of `wanted`.
+    /// Counts a segment in which the motor goes `more` farther than its line in each tick, where `wanted` was asked for.
     #[inline(never)]
     pub fn note(&mut self, more: i32, wanted: i32, (ticks, period): (u16, u16)) {
         let far = more * i32::from(ticks);
@@ -290,7 +297,7 @@ impl Advance {
     }
 }
 
-/// How far the extruder goes in a line that says so ([`refine`]), phase units; 0 if it goes back or stands.
+/// Returns how far the extruder goes in a line, as [`refine`] has noted, phase units; 0 if it goes back or stands.
 #[inline(always)]
 pub(super) fn pushed(way: i16, line: &Line) -> u32 {
     const LOG2: u8 = STEP_LOG2 - MORE_LOG2;
@@ -301,17 +308,17 @@ pub(super) fn pushed(way: i16, line: &Line) -> u32 {
     (far as u32) << if line.extent.has_whole_steps() { LOG2 } else { LOG2 - PARTS_LOG2 }
 }
 
-/// A way in the parts that [`refine`] knows.
+/// Returns a way in the parts that [`refine`] knows.
 fn in_parts(way: i16) -> i32 {
     i32::from(way) << MORE_LOG2
 }
 
-/// How long so many ticks take.
+/// Returns how long `ticks` take, s.
 fn seconds(ticks: u16, period: u16) -> f32 {
     product(ticks, period) as f32 * (1.0 / TIMER_HZ as f32)
 }
 
-/// A number, or its negative if `sign` is negative.
+/// Returns `x`, or its negative if `sign` is negative.
 fn turned(x: f32, sign: f32) -> f32 {
     f32::from_bits(x.to_bits() ^ (sign.to_bits() & (1 << 31)))
 }
@@ -324,7 +331,7 @@ fn rounded(x: f32) -> i32 {
     if x.is_sign_negative() { -size } else { size }
 }
 
-/// A way in equal parts, rounded; each no more than a step.
+/// Returns a way divided by `ticks`, rounded, and no more than a step.
 #[inline(never)]
 #[small]
 fn per_tick(way: i32, ticks: u16) -> i32 {
@@ -352,7 +359,7 @@ mod tests {
         advance
     }
 
-    /// Goes on for so many segments: the lead after each, steps.
+    /// Runs so many segments, and returns the lead after each, steps.
     fn run(advance: &mut Advance, segments: usize) -> std::vec::Vec<f64> {
         (0..segments)
             .map(|_| {
@@ -377,7 +384,7 @@ mod tests {
         }
         advance.end();
         let leads = run(&mut advance, 40);
-        // It changes its velocity by 89,000 steps/s^2 at most: 0.36 of a step in a segment more than in the one before.
+        // The lead changes its velocity by 89,000 steps/s^2 at most: 0.36 step from one segment to the next.
         let mut before = (9.3, 0.0);
         for lead in leads {
             let way = lead - before.0;

@@ -1,9 +1,9 @@
 //! A block: one straight move, dwell or synchronised command, as the planner leaves it for exec.
 //!
-//! Units: mm (degrees for a rotary-only move), seconds, motor steps. The size of a block decides how
-//! far Kerf looks ahead, and each byte of it is there 62 times. So limits take two bytes each, the line
-//! number three, the sign of a length tells what distances are counted in ([`Extent`]), and a line, which knows no [`Reserve`] of 0, has no tag:
-//! 30 bytes on AVR.
+//! Units: mm (degrees for a rotary-only move), seconds, motor steps. The size of a block decides how far Kerf looks
+//! ahead, and each byte of it is there 62 times. So limits take two bytes each, and the line number three. The sign
+//! of a length tells in which unit distances are counted ([`Extent`]). A line needs no tag, because no line has a
+//! [`Reserve`] of 0. A block has 30 bytes on AVR.
 
 use super::advance::Lead;
 use super::factors::{Factors, Reserve};
@@ -16,23 +16,23 @@ use crate::gcode::command::Surface;
 use crate::gcode::heating::Heat;
 use crate::gcode::overrides::Change;
 
-/// Parts of a step to which blocks know where they end: the logarithm of their number.
+/// Blocks know their ends to 1/16 step. This is the logarithm of the number of parts of a step.
 pub const PARTS_LOG2: u8 = 4;
 
-/// The least and the greatest fraction at a block's end, in 1/16 step from the whole step next to it. Nearly half a step: what
-/// rounding leaves must not tell which one is next.
+/// The least and the greatest fraction at a block's end, in 1/16 step from the whole step next to it. Both are less
+/// than half a step, so that rounding errors cannot make another whole step the next one.
 pub const FRACTIONS: (i8, i8) = (-7, 6);
 
 /// A block of the queue.
 #[derive(Clone, Copy, Debug)]
 pub struct Block {
-    /// What it does.
+    /// What the block does.
     pub body: Body,
     line: [u8; 3],
 }
 
 impl Block {
-    /// Whether the machine goes on over it, and it is no line.
+    /// Whether the block is not a line, but the machine goes on over it.
     #[small]
     pub fn is_aside(&self) -> bool {
         matches!(
@@ -53,7 +53,7 @@ impl Block {
         Self { body, line: number(line) }
     }
 
-    /// It is of the line with this N word.
+    /// Makes it a block of the line with this N word.
     #[inline(always)]
     pub fn set_line(&mut self, line: u32) {
         self.line = number(line);
@@ -79,7 +79,7 @@ fn number(line: u32) -> [u8; 3] {
     [a, b, c]
 }
 
-/// What a block does. Not one enum with [`QueuedAction`]: there is one value that a line cannot have.
+/// What a block does. Not one enum with [`QueuedAction`]: a line leaves one value free for a tag, no more.
 #[derive(Clone, Copy, Debug)]
 pub enum Body {
     /// Moves the motors.
@@ -88,34 +88,36 @@ pub enum Body {
     QueuedAction(QueuedAction),
 }
 
-/// What a block does that moves nothing.
+/// What a block does if it moves nothing.
 #[derive(Clone, Copy, Debug)]
 pub enum QueuedAction {
-    /// Stands still for so many milliseconds.
+    /// Stands still for this many milliseconds.
     Dwell(u32),
-    /// G28.3: from here on the motor positions are these.
+    /// G28.3: sets the motor positions.
     SetPosition([i32; MOTORS]),
-    /// The drivers ask for something else from here on.
+    /// Changes what the drivers ask for, from here on.
     Drivers(Drivers),
-    /// M3 to M9, S: the outputs and the speed of the spindle are so from here on.
+    /// M3 to M9, S: sets the outputs and the speed of the spindle.
     Outputs(Outputs),
-    /// M3 to M9, S, under G96: the outputs are so from here on, and the speed of the spindle follows X by this surface speed. [`Surface::NONE`] ends that.
+    /// M3 to M9, S, under G96: sets the outputs. From here on the speed of the spindle follows X by this surface
+    /// speed; [`Surface::NONE`] ends that.
     Surface(Outputs, Surface),
-    /// G33: from here on, at rest, lines follow the spindle.
+    /// G33: from here on lines follow the spindle. Done at rest.
     Thread(Pass),
     /// From here on lines do not follow the spindle any more.
     EndThread,
-    /// G33.1, at rest: the spindle has turned round, and lines follow it back. It is to turn again as far before the end of the line.
+    /// G33.1, at rest: the spindle has turned round, and lines follow it back. It is to turn round again at the same
+    /// distance before the end of the line ([`Pass::turn_at`]).
     Return,
-    /// In the midst of a pass of G33 or G76: the lines from here on have this lead, mm a turn. The machine goes on.
+    /// In the midst of a pass of G33 or G76: sets the lead of the lines from here on, mm a turn. The machine goes on.
     Lead(f32),
-    /// G95, or its end: from here on feeds go by the measured speed of the spindle, or not. The machine goes on.
+    /// G95, or its end: sets whether feeds go by the measured speed of the spindle from here on. The machine goes on.
     PerTurn(bool),
     /// M48 to M51. The machine goes on.
     Override(Change),
-    /// M104 to M190: heaters and the fan are to be so. The machine goes on.
+    /// M104 to M190: sets heaters and the fan. The machine goes on.
     Heat(Heat),
-    /// M900: from here on this is the extruder's lead. The machine goes on.
+    /// M900: sets the extruder's lead. The machine goes on.
     Advance(Lead),
     /// M0, M1, M60.
     ProgramStop,
@@ -126,13 +128,13 @@ pub enum QueuedAction {
 /// A pass in step with the spindle.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Pass {
-    /// How far its first line goes in a turn, along its path, mm.
+    /// How far the first line of the pass goes in a turn, along its path, mm.
     pub lead: f32,
     /// How far the axes may be off, once they have been in step, mm; 0 for no limit.
     pub limit: Short,
-    /// How it is left before its end.
+    /// How the pass is left before its end.
     pub retract: Retract,
-    /// G33.1: the spindle is to turn round so many mm before the end of the line; 0 for a pass that does not return.
+    /// G33.1: how many mm before the end of the line the spindle is to turn round; 0 for a pass that does not return.
     pub turn_at: f32,
 }
 
@@ -145,8 +147,8 @@ pub struct Outputs {
     pub speed: f32,
 }
 
-/// How long a line is, and what its way is counted in. The last 8 bits of a float's 24 are room for what its way does not say of an extruder
-/// ([`Extent::refine`]): they make the length as good as 16 bits are, 0.002 %.
+/// The length of a line, and the unit of its way. The last 8 of the float's 24 bits hold what the way does not say of
+/// an extruder ([`Extent::refine`]). So the length is as good as 16 bits are, 0.002 %.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Extent(f32);
 
@@ -157,25 +159,25 @@ impl Extent {
         Self(if whole_steps { -length } else { length })
     }
 
-    /// mm.
+    /// The length, mm.
     #[inline(always)]
     pub fn length(self) -> f32 {
         size(self.0)
     }
 
-    /// Keeps how much farther an extruder goes than its way says, in 1/32 of what that is counted in.
+    /// Keeps how much farther an extruder goes than its way says, in 1/32 of the unit of the way.
     #[inline(always)]
     pub fn refine(&mut self, more: i8) {
         self.0 = f32::from_bits(self.0.to_bits() & !0xFF | u32::from(more as u8));
     }
 
-    /// See [`Extent::refine`]; any number if nothing has been kept.
+    /// Returns what [`Extent::refine`] has kept; any number if nothing has been kept.
     #[inline(always)]
     pub fn more(self) -> i8 {
         self.0.to_bits() as i8
     }
 
-    /// Whether the way is in steps, not in 1/16 step.
+    /// Whether the way is in whole steps, not in 1/16 step.
     #[inline(always)]
     pub fn has_whole_steps(self) -> bool {
         self.0.is_sign_negative()
@@ -185,17 +187,19 @@ impl Extent {
 /// A straight move.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Line {
-    /// Signed way of each motor, from the end of the block before; in 1/16 step or, if that is too far, in steps.
+    /// Signed way of each motor, from the end of the block before: in 1/16 step, or in steps if it is too far for
+    /// that.
     pub way: [i16; MOTORS],
-    /// Path length, and which it is.
+    /// Path length, and the unit of `way`.
     pub extent: Extent,
-    /// How much faster than `cruise` it may be run.
+    /// How much faster than `cruise` the line may be run.
     pub reserve: Reserve,
     /// Velocity limit on the path, mm/s, at 100 %: the feed, or what the slowest axis or motor allows.
     pub cruise: f32,
-    /// Brake potential where it starts; see `speed_constraints`.
+    /// Brake potential at the start of the line; see `speed_constraints`.
     pub start: f32,
-    /// Highest velocity at which it may be entered, mm/s: the corner with the line before, whatever feeds are.
+    /// Highest velocity at which the line may be entered, mm/s: that of the corner with the line before, whatever the
+    /// feeds are.
     pub entry: Short,
     /// Acceleration limit on the path, mm/s^2.
     pub accel: Short,

@@ -1,20 +1,22 @@
-//! Short moves that lie on a line, as one: what a program says in many lines, one block does.
+//! Merges short moves that lie on a line: what a program says in many lines, one block does.
 //!
-//! Owned by the planner, which keeps one [`Chain`]: the lines since the last block. A line goes on with the chain if all
-//! the ends that the program has named so far are within the tolerance of the straight way from the chain's start to the new end.
-//! Then the path driven is within the tolerance of every point of the path programmed, and the other way round: between two ends
-//! both are straight.
+//! Owned by the planner, which keeps one [`Chain`]: the lines since the last block. A line joins the chain if all
+//! ends that the program has named in it so far are within the tolerance of the straight way from the chain's start
+//! to the new end. Then the driven path is within the tolerance of every point of the programmed path, and the other
+//! way round, because both are straight between two ends.
 //!
-//! **What it keeps.** No end but the last. The axis that goes farthest is the dominant one, and no line of a chain goes back along it. Each
-//! of the others ([`Minor`]) has the steepest and the least steep way that passes within the tolerance of all ends before the last. A
-//! new end is on such a way or it is not; if it is, it makes the two steeper and less steep in turn. All is in integers and exact: what is
-//! on one line to the unit of [`Length`] is merged whatever the tolerance.
+//! **What it keeps.** No end but the last. The axis that goes farthest is the dominant one, and no line of a chain
+//! goes back along it. For each of the other axes ([`Minor`]) the chain keeps the steepest and the least steep way
+//! that pass within the tolerance of all ends before the last. A new end must lie between the two; then it narrows
+//! them in turn. All is in integers and exact: lines that lie on one line to the unit of [`Length`] are merged
+//! whatever the tolerance.
 //!
-//! **The tolerance.** The two ways are compared where the dominant axis is as far. That is never nearer than they are, so for
-//! one other axis the tolerance holds as it is. For two each gets 0.7 of it.
+//! **The tolerance.** The driven and the programmed path are compared where the dominant axis is as far. The distance
+//! there is never less than the true distance, so that for one other axis the tolerance holds as it is. With two other
+//! axes, each gets 0.7 of it.
 //!
-//! **How long it gets.** What takes [`TIME_MS`] at its feed along any axis, or 3.2 mm. What reports tell of a line is that much
-//! ahead of it, no more. Lines of which each takes longer are not merged.
+//! **How long it gets.** At most what takes [`TIME_MS`] at its feed along any axis, or 3.2 mm. Reports name a line
+//! that much too early at most. Lines that each take longer are not merged.
 //!
 //! Only linear axes, and only lines at the same feed. Cost on AVR: 900 cycles for a line that goes on, 600 for one that begins.
 
@@ -25,20 +27,20 @@ use crate::gcode::command::Feed;
 use crate::hal::arithmetic::product;
 use crate::units::{AXES, FIRST_ROTARY, Length, PerAxis};
 
-/// What a chain takes at most, at its feed.
+/// The longest time that a chain takes at its feed.
 pub const TIME_MS: u16 = 12;
 
-/// In that time a feed of 1 mm/min goes so far in units of [`Length`], as a power of two.
+/// How far a feed of 1 mm/min goes in that time, in units of [`Length`], as a power of two.
 const FEED_LOG2: i8 = 1;
 const _: () = assert!(Length::PER_MM as u32 * TIME_MS as u32 == 60_000 << FEED_LOG2);
 
-/// The farthest that any axis goes: with the tolerance it fits 16 bits.
+/// The farthest that any axis goes in a chain: with the tolerance it fits 16 bits.
 const MOST: u16 = 0x7E00;
 
 /// The axes other than the dominant one.
 const MINORS: usize = FIRST_ROTARY - 1;
 
-/// How much an axis goes for how much of the dominant one.
+/// A slope: how far an axis goes (`way`) while the dominant axis goes `over`.
 #[derive(Clone, Copy, Debug, Default)]
 struct Slope {
     way: i16,
@@ -46,14 +48,14 @@ struct Slope {
 }
 
 impl Slope {
-    /// The one that goes so much more.
+    /// Returns the slope that goes `way` farther.
     #[inline(always)]
     fn beside(&self, way: i16) -> Self {
         Self { way: self.way + way, over: self.over }
     }
 }
 
-/// Between which slopes the way of an axis has to stay.
+/// The slopes between which the way of an axis has to stay.
 #[derive(Clone, Copy, Debug, Default)]
 struct Minor {
     low: Slope,
@@ -61,13 +63,13 @@ struct Minor {
 }
 
 impl Minor {
-    /// For an end that has to be passed.
+    /// Returns the slopes that pass an end within the tolerance.
     #[inline(never)]
     fn past(end: &Slope, tolerance: i16) -> Self {
         Self { low: end.beside(-tolerance), high: end.beside(tolerance) }
     }
 
-    /// Whether a way to this end stays between them. If so, it has to be passed from now on.
+    /// Whether the way to this end stays between the slopes. If so, the end has to be passed from now on.
     ///
     /// Two slopes are compared by what each goes over the product of both lengths, below 2^30; the slopes beside the end differ from its own by
     /// the tolerance times the other length.
@@ -92,28 +94,29 @@ impl Minor {
     }
 }
 
-/// Lines that one block will do.
+/// Lines that become one block.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Chain {
-    /// From its start to its end.
+    /// The way from the start of the chain to its end.
     way: PerAxis<i16>,
     /// mm/min.
     feed: f32,
-    /// How far the dominant axis goes at most.
+    /// How far the dominant axis may go at most.
     most: u16,
-    /// What was asked for, see [`Commands::blend`](crate::gcode::command::Commands::blend); 0 if nothing goes on with it.
+    /// What was asked for, see [`Commands::blend`](crate::gcode::command::Commands::blend); 0 if no line may join the
+    /// chain.
     blend: u8,
     /// The tolerance of each axis.
     tolerance: i16,
     dominant: u8,
     /// Which minors have moved, a bit each.
     moved: u8,
-    /// The axes behind the dominant one, in a ring.
+    /// The axes after the dominant one, in cyclic order.
     minors: [Minor; MINORS],
 }
 
 impl Chain {
-    /// Becomes a chain of one line. False if that is too long, or none that may be merged.
+    /// Makes this a chain of one line. Returns false if the line is too long, or must not be merged.
     #[inline(never)]
     pub fn begin(
         &mut self,
@@ -140,7 +143,7 @@ impl Chain {
         }
         (self.feed, self.blend) = (feed, blend);
         let tolerance = u16::from(blend - 1);
-        // Both may be off by as much.
+        // With two other axes, both may be off by this much.
         let both = ends.iter().all(|way| *way != 0);
         self.tolerance = if both { product(tolerance, 181) >> 8 } else { tolerance.into() } as i16;
         self.moved = 0;
@@ -155,7 +158,7 @@ impl Chain {
         true
     }
 
-    /// A way that nothing goes on with. No axis goes farther than 16 bits hold.
+    /// Returns a way that no line joins. No axis may go farther than 16 bits hold.
     #[inline(never)]
     #[small]
     pub fn closed(from: &PerAxis<Length>, to: &PerAxis<Length>) -> Self {
@@ -166,17 +169,17 @@ impl Chain {
         chain
     }
 
-    /// Whether nothing goes on with it.
+    /// Whether no line may join the chain.
     pub fn is_closed(&self) -> bool {
         self.blend == 0
     }
 
-    /// Closes the chain: no line goes on with it any more.
+    /// Closes the chain: no line joins it any more.
     pub fn close(&mut self) {
         self.blend = 0;
     }
 
-    /// Where it ends, if it begins at `from`.
+    /// Returns where the chain ends, if it begins at `from`.
     #[inline(always)]
     pub fn end(&self, from: &PerAxis<Length>) -> PerAxis<Length> {
         let mut end = *from;
@@ -193,8 +196,8 @@ impl Chain {
         (!self.is_closed()).then_some(Feed::PerMinute(self.feed))
     }
 
-    /// Goes on to `to`, if all its ends are near enough to the straight way there. It begins at `from`. After a line that did not
-    /// go on none will.
+    /// Goes on to `to`, if all ends of the chain, which begins at `from`, are near enough to the straight way there.
+    /// Returns whether it does. After a line that did not join, no other line may.
     #[inline(never)]
     pub fn go_on(
         &mut self,
@@ -218,16 +221,16 @@ impl Chain {
         }
         let mut bit = 1;
         for (minor, &way) in self.minors.iter_mut().zip(&ends) {
-            // Behind a line of next to nothing another axis may go farther.
+            // After a line of next to nothing, another axis may go farther than the dominant one.
             if way.unsigned_abs() > self.most {
                 return false;
             }
             if self.moved & bit == 0 && way != 0 {
-                // Two that move have less of the tolerance each.
+                // Two axes that move have less of the tolerance each, so a second one does not join.
                 if self.moved != 0 {
                     return false;
                 }
-                // Of all ends at which it has not moved the last says most.
+                // Of all ends at which the axis has not moved, the last one limits it most.
                 *minor = Minor::past(&Slope { way: 0, over: passed }, self.tolerance);
                 self.moved = bit;
             }
@@ -240,7 +243,7 @@ impl Chain {
         true
     }
 
-    /// Sets the way of the chain; rotary axes have none.
+    /// Sets the way of the chain; rotary axes do not move.
     #[inline(always)]
     fn take(&mut self, way: [i16; FIRST_ROTARY]) {
         for (place, way) in self.way.iter_mut().zip(way) {
@@ -249,7 +252,7 @@ impl Chain {
     }
 }
 
-/// The ways of the dominant axis and of those behind it.
+/// Returns the way of the dominant axis, and the ways of the axes after it in cyclic order.
 #[inline(always)]
 fn turned([x, y, z]: [i16; FIRST_ROTARY], dominant: u8) -> (i16, [i16; MINORS]) {
     match dominant {
@@ -259,7 +262,7 @@ fn turned([x, y, z]: [i16; FIRST_ROTARY], dominant: u8) -> (i16, [i16; MINORS]) 
     }
 }
 
-/// The way from here to there. False if an axis goes far, or one turns.
+/// Sets the way from `from` to `to`. Returns false if an axis goes too far, or a rotary axis moves.
 #[inline(never)]
 fn go(from: &PerAxis<Length>, to: &PerAxis<Length>, ways: &mut [i16; FIRST_ROTARY]) -> bool {
     let mut axes = from.iter().zip(to);
@@ -274,7 +277,7 @@ fn go(from: &PerAxis<Length>, to: &PerAxis<Length>, ways: &mut [i16; FIRST_ROTAR
     axes.all(|(from, to)| from == to)
 }
 
-/// A product with a number below 2^15.
+/// Returns a product with a number below 2^15.
 #[inline(always)]
 fn times(a: i16, b: u16) -> i32 {
     let size = product(a.unsigned_abs(), b) as i32;

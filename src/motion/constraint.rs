@@ -1,11 +1,11 @@
-//! What it takes to slow down under a jerk limit, and which constraint ahead is the first to ask for it.
+//! What it takes to slow down under a jerk limit, and which constraint ahead is the first to require it.
 //!
 //! Called by the [`Governor`] at exec level, once for a stretch (`rise`).
 //!
 //! # Units
 //!
 //! Velocities are mm/s. Distances are brake potential, (mm/s)^2: 2 A for each mm (`speed_constraints`). With
-//! k = A^2 / 2J the distance that a change of velocity takes depends on neither A nor J.
+//! k = A^2 / 2J the distance for a change of velocity depends on neither A nor J themselves.
 //!
 //! # The distance to slow down
 //!
@@ -18,16 +18,18 @@
 //!
 //! # Clear
 //!
-//! A scan answers one question: how far on may the machine still be at the steady velocity u, and which constraint does it
-//! have to slow down for then? The answer, [`Clear`], holds for every lower velocity as well: less distance is needed
-//! from there ([`Clear::narrow`]). It stays true when blocks are added, which never make the distance to a standstill shorter.
+//! A scan answers one question: how far on may the machine still be at the steady velocity u, and for which
+//! constraint does it have to slow down then? The answer, [`Clear`], holds for every lower velocity as well, because
+//! less distance is needed from there ([`Clear::narrow`]). It stays true when blocks are added: they never make the
+//! distance to a standstill shorter.
 //!
 //! # Work
 //!
-//! A scan looks at no more than [`EXACT`] constraints exactly, each slower than all before it: whoever is down to one of them may
-//! keep that velocity past all that are no slower. One more answers for all that follow, by its key: keys rise, and `(u + k)^2 <= key`
-//! is enough for any of them. So the work has a bound, whatever is queued. It is done in integers (`need`): 2,000 cycles on AVR for each
-//! of these, 25 for each constraint that is passed over, and 1,500 for the rest.
+//! A scan looks at no more than [`EXACT`] constraints exactly, each slower than all before it: a machine that has
+//! slowed down to one of them may keep that velocity past all that are no slower. One more constraint answers for all
+//! that follow, by its key: keys rise, and `(u + k)^2 <= key` is enough for any of them. So the work has a bound,
+//! whatever is queued. It is done in integers (`need`). Cost on AVR: 2,000 cycles for each of these constraints, 25
+//! for each constraint that is passed over, and 1,500 for the rest.
 
 use super::float::{below, greater, least, scaled};
 use super::governor::{Governor, Limits};
@@ -39,46 +41,47 @@ use crate::math::sqrt;
 
 /// What is ahead of the block that runs.
 pub trait Ahead {
-    /// The square of the velocity at the block's end without a jerk limit.
+    /// The square of the velocity that is allowed at the end of the block without a jerk limit.
     fn headroom(&self) -> f32;
-    /// The first constraint from the `n`th on that is slower than `velocity`, or firm: nothing beyond that counts. With its
-    /// number.
+    /// Returns the first constraint from the `n`th on that is slower than `velocity`, or firm, with its number.
+    /// Nothing beyond a firm one counts.
     fn slower(&self, n: Index, velocity: Short) -> (Index, Constraint);
-    /// Brake potential from the end of the block to that of the queue.
+    /// Brake potential from the end of the block to the end of the queue.
     fn end(&self) -> f32;
 }
 
-/// Constraints that a scan looks at exactly.
+/// How many constraints a scan looks at exactly.
 pub const EXACT: u8 = 2;
 
-/// Constraints behind the machine that a scan passes over.
+/// How many constraints behind the machine a scan passes over at most.
 const PASSED: u8 = 4;
 
-/// How far on a velocity may be kept.
+/// The answer of a scan: how far on a velocity may be kept.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Clear {
-    /// The velocity `top`, or any below it,
+    /// The velocity that the answer is for; it holds for any lower one too.
     pub top: f32,
-    /// may be steady until so much further on.
+    /// How far on the velocity may be steady, brake potential.
     pub distance: f32,
-    /// Then it has to slow down to this velocity,
+    /// The velocity to which the machine has to slow down then.
     pub target: f32,
-    /// which is kept from here on, as seen from where `distance` was `from`.
+    /// The distance from which on the target is kept, as it was when `distance` was `from`.
     place: f32,
     from: f32,
-    /// From the target on nothing else is too near.
+    /// Whether no constraint beyond the target is too near for it.
     pub closed: bool,
-    /// The velocity is bounded by the target.
+    /// Whether it is the target that bounds the velocity.
     binds: bool,
-    /// Slices since: what has been driven is subtracted in floats, so it gets less exact.
+    /// Slices since the scan. What has been driven since is subtracted in floats, so that the answer gets less exact.
     pub age: u8,
 }
 
-/// Slices after which what is known is too old.
+/// Slices after which an answer is too old.
 const AGE_MOST: u8 = 64;
 
 impl Clear {
-    /// Before the first block, whose limits have it [forgotten](Self::forget). All zeros: anything else would be copied, from RAM.
+    /// The state before the first block, whose limits have it [forgotten](Self::forget). All zeros: anything else
+    /// would be copied from RAM.
     pub const START: Self = Self {
         top: 0.0,
         distance: 0.0,
@@ -90,7 +93,7 @@ impl Clear {
         age: 0,
     };
 
-    /// Forgets what is known. Field by field: a constant would be copied, from RAM.
+    /// Forgets the answer. Field by field: a constant would be copied from RAM.
     #[inline(never)]
     pub fn forget(&mut self) {
         let Self { top, distance, target, place, from, closed, binds, age } = self;
@@ -99,12 +102,13 @@ impl Clear {
         (*closed, *binds, *age) = (false, false, 0);
     }
 
-    /// How far on the target is kept from.
+    /// Returns the distance from which on the target is kept.
     pub fn place(&self) -> f32 {
         self.place - (self.from - self.distance)
     }
 
-    /// What is known of a faster velocity holds for `top` too, which may be kept to the target's place if it is no faster.
+    /// Makes the answer for a higher velocity one for `top`. If `top` is no faster than the target, it may be kept to
+    /// the place of the target.
     pub fn narrow(&mut self, top: f32) {
         if self.closed && !below(self.target, top) {
             self.distance = self.place();
@@ -112,9 +116,9 @@ impl Clear {
         }
     }
 
-    /// How long the top is kept before a ramp begins down to the target, if the top is reached `at`.
+    /// Returns how long the top is kept before a ramp down to the target begins, if the top is reached `at`.
     pub fn slack(&self, at: f32, kappa: f32) -> f32 {
-        // A scan is a little off, and a ramp to a standstill has to end at its place.
+        // A scan is a little off, but a ramp to a standstill has to end at its place.
         let exact = self.binds && self.closed;
         let distance =
             if exact { self.place() - needed(self.top, self.target, kappa) } else { self.distance };
@@ -122,23 +126,24 @@ impl Clear {
     }
 }
 
-/// A velocity to try.
+/// The question for a scan: a velocity to try.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Ask {
-    /// The velocity, and where it would be reached.
+    /// The velocity; `at` is where it would be reached.
     pub top: f32,
     pub at: f32,
-    /// The fastest that it is until then.
+    /// The highest velocity until then.
     pub fastest: f32,
-    /// Constraints from this velocity on down must be behind where the top is reached.
+    /// Constraints at this velocity or below must be behind the machine where it reaches the top.
     pub level: f32,
-    /// Distance from the state to the end of the block.
+    /// Distance from the present state to the end of the block.
     pub here: f32,
-    /// The velocity is taken in any case, and the question is how long it may be kept.
+    /// Whether the velocity is taken in any case: the question is then how long it may be kept.
     pub taken: bool,
 }
 
-/// The distance it takes to come from `u` down to `w`, not above it. Cost: 700, 1,000 if the deceleration does not reach A.
+/// Returns the distance it takes to slow down from `u` to `w`, which is not above it. Cost: 700, 1,000 if the
+/// deceleration does not reach A.
 #[inline(never)]
 pub(super) fn needed(u: f32, w: f32, kappa: f32) -> f32 {
     let (drop, sum) = (u - w, u + w);
@@ -149,17 +154,17 @@ pub(super) fn needed(u: f32, w: f32, kappa: f32) -> f32 {
 /// What a scan has found so far, in the units of its scale.
 struct Scan {
     scale: Scale,
-    /// The top, and where it is reached.
+    /// The top, and (`at`) where it is reached.
     top: u16,
     at: i32,
     distance: i32,
     place: i32,
-    /// The target, and as a velocity of the scale.
+    /// The target; `low` is the target as a velocity of the scale.
     target: Short,
     low: u16,
-    /// What it takes at most to slow down from the top.
+    /// An upper bound of the distance to slow down from the top.
     most: i32,
-    /// From here on nothing makes a difference.
+    /// No constraint from here on makes a difference.
     reach: i32,
     closed: bool,
     binds: bool,
@@ -202,7 +207,7 @@ impl Scan {
             if place >= self.reach {
                 break;
             }
-            // A firm one may be faster than those before it.
+            // A firm constraint may be faster than those before it.
             low = constraint.velocity.min(low);
             if budget == 0 {
                 self.look_no_further(low, place, ahead.end() + ask.here);
@@ -217,14 +222,15 @@ impl Scan {
         self.distance >= self.at
     }
 
-    /// A constraint to `velocity`, slower than those before it, at `place`. A top that is `taken` is reached whatever is ahead.
+    /// Takes in a constraint to `velocity`, slower than those before it, at `place`. A top that is `taken` is reached
+    /// whatever is ahead.
     #[inline(never)]
     fn take_in(&mut self, velocity: Short, place: i32, taken: bool) {
         let scale = &self.scale;
         let (mut target, mut low) = (velocity, scale.velocity(velocity).min(self.top));
         let mut distance = place - scale.need(self.top, low);
         if taken && distance < self.at && low > 0 {
-            // To a standstill is a shorter way than to a low velocity.
+            // Slowing down to a standstill may take less distance than slowing down to a low velocity.
             let stop = place - scale.need(self.top, 0);
             if distance < stop {
                 (target, low, distance) = (Short::ZERO, 0, stop);
@@ -243,8 +249,8 @@ impl Scan {
         self.reach = beyond.max(self.distance.saturating_add(self.most));
     }
 
-    /// No less than it takes to slow down from `low`: what half the velocity takes is less than half as much. Cost: 50, where the exact
-    /// answer takes 450.
+    /// Returns an upper bound of the distance to slow down from `low`: from half the velocity it takes less than half
+    /// the distance. Cost: 50, where the exact answer takes 450.
     fn most_from(&self, low: u16) -> i32 {
         let (mut top, mut most) = (self.top, self.most);
         while low <= top / 2 && most > 8 {
@@ -253,14 +259,14 @@ impl Scan {
         most
     }
 
-    /// A constraint that stands for all that follow: what its key says of them, and that of the end of the queue.
+    /// Takes in a constraint that stands for all that follow: by its key, and by the key of the end of the queue.
     #[inline(never)]
     fn look_no_further(&mut self, velocity: Short, place: i32, end: f32) {
         let scale = &self.scale;
         let by_key =
             place.saturating_sub(scale.by_key(self.top, scale.velocity(velocity).min(self.top)));
         let end = scale.distance(end).saturating_sub(scale.by_key(self.top, 0));
-        // Whatever it is, it is not nearer.
+        // Slowing down never begins nearer than this, whatever follows.
         let distance = by_key.min(end).max(place - self.most);
         (self.closed, self.target, self.binds) = (false, Short::ZERO, false);
         self.distance = self.distance.min(distance);
@@ -277,12 +283,12 @@ impl Scan {
 }
 
 impl Governor {
-    /// Whether a velocity is safe. Fills in how long it may be kept, if it is or if it is taken in any case.
+    /// Whether a velocity is safe. Notes how long it may be kept, if it is safe or is taken in any case.
     #[inline(never)]
     pub(super) fn scan(&mut self, ask: &Ask, ahead: &impl Ahead) -> bool {
         self.scanned = true;
         let mut scan = Scan::new(ask, &self.limits);
-        // But for rounding: 0.1 um.
+        // Constraints up to 0.1 um ahead count as behind the machine, because of rounding.
         let safe = scan.run(ask, ahead, self.limits.accel * 2e-4);
         if safe || ask.taken {
             self.clear = scan.clear(ask.top);
@@ -290,14 +296,14 @@ impl Governor {
         safe
     }
 
-    /// Whether it is known that the steady velocity `top` is safe at a place `at` so far on. Cost: 50.
+    /// Whether the steady velocity `top` is known to be safe up to a place `at`. Cost: 50.
     #[inline(always)]
     pub(super) fn is_clear(&self, top: f32, at: f32) -> bool {
         let clear = &self.clear;
         clear.age < AGE_MOST && !below(clear.top, top) && !below(clear.distance, at)
     }
 
-    /// The distance in brake potential.
+    /// Returns a distance in brake potential.
     #[inline(always)]
     pub(super) fn potential(&self, distance: f32) -> f32 {
         distance * scaled(self.limits.accel, 1)

@@ -1,24 +1,24 @@
-//! Division and square root of 32 bits into 16: a third of the cycles of the library's division, which
-//! is by 32 bits, and of its float root. Their kernels are the chip's ([`arithmetic`]).
+//! Division and square root of 32 bits into 16. They take a third of the cycles of the library's division, which is
+//! by 32 bits, and of its float root. Their kernels are the chip's ([`arithmetic`]).
 //!
 //! Called by exec's preparation of segments and by the line builder, a few times each. No units.
 
 use crate::hal::arithmetic::{self, inverse_root, product};
 
-/// `a / b`, rounded down, if that fits 16 bits: `a >> 16 < b`. Else something, without a panic.
+/// Returns `a / b`, rounded down, if that fits 16 bits: `a >> 16 < b`. Otherwise returns any number, without a panic.
 /// Cost: 170, 100 if it fits eight bits; 200 and 120 if `b` has 16 bits.
 #[inline]
 pub fn quotient(a: u32, b: u16) -> u16 {
     quotient_remainder(a, b).0
 }
 
-/// `a / b` and `a % b`, as [`quotient`].
+/// Returns `a / b` and `a % b`, on the conditions of [`quotient`].
 #[inline(never)]
 pub fn quotient_remainder(a: u32, b: u16) -> (u16, u16) {
     arithmetic::divide(a, b)
 }
 
-/// The square root, rounded down. Cost: 320.
+/// Returns the square root, rounded down. Cost: 320.
 #[inline(never)]
 pub fn root(x: u32) -> u16 {
     arithmetic::root(x)
@@ -27,16 +27,17 @@ pub fn root(x: u32) -> u16 {
 /// The length of a vector, from its square.
 #[derive(Clone, Copy, Debug)]
 pub struct Size {
-    /// From 2^15 on: twice the length if `is_twice`.
+    /// From 2^15 on: the length, or twice the length if `is_twice`.
     pub length: u16,
-    /// See `length`.
+    /// Whether `length` is twice the length.
     pub is_twice: bool,
     /// 2^30 over the length.
     pub reciprocal: u16,
 }
 
 impl Size {
-    /// Of a vector whose longest part is at least 2^14, 0.01 % exact. Cost: 190, where a root and a division take 490.
+    /// Measures a vector whose longest part is at least 2^14, to 0.01 %. Cost: 190, where a root and a division take
+    /// 490.
     #[inline(always)]
     pub fn of_square(square: u32) -> Self {
         // In 16 bits: a shift of all 32 takes a loop.

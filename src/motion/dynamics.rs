@@ -1,7 +1,7 @@
 //! What the axes can do, in the units of motion.
 //!
-//! Owned by the planner task, made from the settings when they change: they keep integers in the units
-//! of the sender, whose conversion takes longer than planning a block.
+//! Owned by the planner task, made from the settings when they change. Settings are integers in the units of the
+//! sender, whose conversion takes longer than planning a block.
 
 use super::float::{greater, lesser};
 use super::governor::JERK_TIME_MIN;
@@ -13,11 +13,11 @@ use crate::config::StepRatio;
 use crate::math::sqrt;
 use crate::units::PerAxis;
 
-/// A jerk limit that takes the acceleration to its limit in so long has an effect, s.
+/// If the acceleration takes this long to reach its limit, s, a jerk limit has an effect.
 const JERKY_S: f32 = 1.0625 * JERK_TIME_MIN;
 
-/// Where the limits come from: the settings, in their units. Axes are 0 to 5 for X Y Z A B C; a limit that
-/// is not positive is none; mm are degrees for rotary axes.
+/// Where the limits come from: the settings, in their units. Axes are 0 to 5 for X Y Z A B C. A limit that is not
+/// positive is none. For rotary axes mm stands for degrees.
 pub trait MachineLimits {
     /// Traverse velocity of an axis, mm/min.
     fn velocity_max(&self, axis: usize) -> f32;
@@ -37,10 +37,10 @@ pub trait MachineLimits {
     }
 }
 
-/// An acceleration in mm/min^2, in mm/s^2.
+/// Converts an acceleration from mm/min^2 to mm/s^2.
 pub const PER_SECOND_SQUARED: f32 = 1.0 / 3_600.0;
 
-/// A jerk in mm/min^3, in mm/s^3.
+/// Converts a jerk from mm/min^3 to mm/s^3.
 pub const PER_SECOND_CUBED: f32 = 1.0 / 216_000.0;
 
 /// Limits of an axis; 0 for none.
@@ -59,17 +59,19 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// Whether it has all limits but those of velocity that another one has.
+    /// Whether all limits are those of another axis, except for the velocities.
     #[inline(always)]
     pub(super) fn is_like(&self, other: &Self) -> bool {
         (self.accel, self.jerk, self.deviation) == (other.accel, other.jerk, other.deviation)
     }
 
-    /// Takes acceleration and jerk over, mm/s^2 and mm/s^3; 0 or less for none. The velocities are known. Cost: 3,000.
+    /// Takes over acceleration and jerk, mm/s^2 and mm/s^3; 0 or less for none. The velocities must be known. Cost:
+    /// 3,000.
     ///
-    /// An acceleration far beyond what any ramp reaches under the jerk limit would make the potentials of `speed_constraints` coarse. Between 0
-    /// and v a ramp reaches `sqrt(J v)`, in a direction between three axes a third more: half more is kept. The least that is kept has
-    /// its jerk limit still ([`effective_jerk`](super::governor::effective_jerk)).
+    /// An acceleration far beyond what any ramp reaches under the jerk limit would make the potentials of
+    /// `speed_constraints` coarse. Between 0 and v a ramp reaches `sqrt(J v)`, in a direction between three axes a
+    /// third more: up to half more is kept. Even the least acceleration that is kept is such that the jerk limit has
+    /// an effect ([`effective_jerk`](super::governor::effective_jerk)).
     #[inline(never)]
     #[small]
     pub fn limit_change(&mut self, accel: f32, jerk: f32) {
@@ -83,19 +85,21 @@ impl Axis {
 /// Limits of the machine.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Dynamics {
-    /// Each axis'.
+    /// Limits of each axis.
     pub axes: PerAxis<Axis>,
     /// Junction acceleration, mm/s^2.
     pub junction: f32,
     /// What each motor drives: an axis, or X and Y together ([`kinematics`](crate::kinematics)).
     pub drives: [u8; MOTORS],
-    /// Highest step rate of each motor when so many move, less one; steps/s.
+    /// Highest step rate of each motor, steps/s, by the number of motors that move, less one.
     pub rates: [f32; MOTORS],
-    /// Lines may be merged: no motor has so fine steps that a [chain](super::chain) had more than a block holds, on CoreXY either.
+    /// Whether lines may be merged: no motor has steps so fine that a [chain](super::chain) could have more than a
+    /// block holds, not even on CoreXY.
     pub merges: bool,
 }
 
-/// With at most half a step a unit of length a way of 16 bits along two axes has less than 2^15 steps.
+/// Whether a motor has at most half a step in a unit of length. Then a way of 16 bits along two axes has less than
+/// 2^15 steps.
 #[inline(never)]
 #[small]
 fn is_coarse(ratio: StepRatio) -> bool {
@@ -103,14 +107,14 @@ fn is_coarse(ratio: StepRatio) -> bool {
 }
 
 impl Dynamics {
-    /// Cost: 5,000 an axis, 600 for each number of motors.
+    /// Returns the limits of `machine`. Cost: 5,000 an axis, 600 for each number of motors.
     pub fn new(machine: &(impl MachineLimits + Motors)) -> Self {
         let mut dynamics = Self::default();
         dynamics.set(machine);
         dynamics
     }
 
-    /// Takes the limits of `machine` over.
+    /// Takes over the limits of `machine`.
     #[inline(never)]
     #[small]
     pub fn set(&mut self, machine: &(impl MachineLimits + Motors)) {

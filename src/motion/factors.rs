@@ -1,9 +1,8 @@
-//! Overrides as motion sees them: by what velocities are multiplied, and how far a line may be sped up.
+//! Overrides as motion sees them: the factors of velocities, and how far a line may be sped up.
 //!
-//! Blocks are planned for twice their feed: corners, and what potentials need (`speed_constraints`). How much faster
-//! than asked a line may be run, [`Reserve`], takes a byte. So a
-//! factor can change at any time, for what is queued too; only the keys of the speed constraints depend on it
-//! (`replan`).
+//! Blocks are planned for twice their feed: their corners, and the potentials that these need (`speed_constraints`).
+//! How much faster than programmed a line may be run ([`Reserve`]) takes a byte. So a factor can change at any time,
+//! also for what is queued; only the keys of the speed constraints depend on it (`replan`).
 //!
 //! Cost on AVR: 40 cycles for a velocity at 100 %, else 250.
 
@@ -12,7 +11,7 @@ use core::num::NonZero;
 use super::divide::quotient;
 use super::float::{least, scaled};
 
-/// What feeds and traverses are multiplied by, both above 0, feeds at most 2, traverses 1.
+/// The factors of feeds and of traverses. Both are above 0; that of feeds is at most 2, that of traverses at most 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Factors {
     /// The factor of lines with a feed.
@@ -25,14 +24,14 @@ impl Factors {
     /// The factors of 1: everything as programmed.
     pub const ONE: Self = Self { feed: 1.0, traverse: 1.0 };
 
-    /// The lesser of each.
+    /// Returns the lesser of each factor.
     #[inline(always)]
     pub fn least(&self, other: &Self) -> Self {
         let feed = least(self.feed, other.feed);
         Self { feed, traverse: least(self.traverse, other.traverse) }
     }
 
-    /// Whether they are the same, bit for bit.
+    /// Whether both factors are equal, bit for bit.
     #[inline(always)]
     pub fn same(&self, other: &Self) -> bool {
         let bits = |factors: &Self| (factors.feed.to_bits(), factors.traverse.to_bits());
@@ -40,8 +39,8 @@ impl Factors {
     }
 }
 
-/// How many times its cruise velocity a line may be run at, less one, in 1/128; or that it is a traverse. Never
-/// stored as 0, which tells other blocks from lines (`block`).
+/// How much faster than its cruise velocity a line may be run, in 1/128 of it; or that the line is a traverse.
+/// Never stored as 0, which tells other blocks from lines (`block`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Reserve(NonZero<u8>);
 
@@ -55,8 +54,8 @@ impl Reserve {
     /// A line that may not be run faster than its cruise velocity.
     const NONE: Self = Self(NonZero::<u8>::MIN);
 
-    /// The reserve of a line at `cruise` that may be run at `top`, no less than that and at most twice as much.
-    /// Cost: 30; 300 between the two.
+    /// Returns the reserve of a line at `cruise` that may be run at `top`, which is no less than `cruise` and at most
+    /// twice as much. Cost: 30; 300 between the two.
     #[inline(always)]
     pub fn new(cruise: f32, top: f32) -> Self {
         if top.to_bits() == cruise.to_bits() {
@@ -68,34 +67,34 @@ impl Reserve {
         }
     }
 
-    /// In integers: the first 16 bits of one rounded up, of the other down.
+    /// Computes the reserve in integers, from the first 16 bits: those of `cruise` rounded up, those of `top` down.
     #[inline(never)]
     fn between(cruise: f32, top: f32) -> Self {
         let (low, high) = (cruise.to_bits(), top.to_bits());
         let mantissa = |bits: u32| (bits >> 8) as u16 | 0x8000;
         let mut more = mantissa(high).wrapping_sub(mantissa(low));
         if (low ^ high) >> 23 != 0 {
-            // One has a higher exponent, but is less than twice the other.
+            // `top` has a higher exponent, but is less than twice `cruise`.
             more = more.wrapping_add(mantissa(high));
         }
         let more = u32::from(more.saturating_sub(1)) * u32::from(TWICE);
         Self::parts(quotient(more, mantissa(low).saturating_add(1)) as u8)
     }
 
-    /// The reserve of a line that may be run `parts` 1/128 faster than its cruise velocity.
+    /// Returns the reserve of a line that may be run `parts` 1/128 faster than its cruise velocity.
     #[inline(always)]
     fn parts(parts: u8) -> Self {
         Self::NONE.0.checked_add(parts).map_or(Self::NONE, Self)
     }
 
-    /// What a line at `cruise` is to be run at.
+    /// Returns the velocity at which a line at `cruise` is to be run.
     #[inline(always)]
     pub fn velocity(self, cruise: f32, factors: &Factors) -> f32 {
         let factor = if self == Self::TRAVERSE { factors.traverse } else { factors.feed };
         self.velocity_by(cruise, factor)
     }
 
-    /// What a line at `cruise` is to be run at when this is its factor.
+    /// Returns the velocity at which a line at `cruise` is to be run when this is its factor.
     #[inline(always)]
     pub fn velocity_by(self, cruise: f32, factor: f32) -> f32 {
         if factor.to_bits() == 1.0f32.to_bits() {

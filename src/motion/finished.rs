@@ -1,15 +1,15 @@
 //! Which line has been finished, to its last step.
 //!
-//! Owned by the exec task, which is ahead of the motors by the segments that are queued: a line whose last
-//! segment has been queued is finished when the one behind that has been taken, or when the motors stand still. Two
-//! lines that wait for it are remembered, the oldest and the newest; those between them are passed over.
-//! Cost on AVR: 30 cycles a segment.
+//! Owned by the exec task, which is ahead of the motors by the segments that are queued. A line whose last segment
+//! has been queued is finished when the segment after that has been taken, or when the motors stand still. Two lines
+//! that wait for this are remembered, the oldest and the newest; the lines between them are passed over. Cost on AVR:
+//! 30 cycles a segment.
 
-/// A line that is all queued.
+/// A line that has been queued to its last segment.
 #[derive(Clone, Copy, Debug)]
 struct Queued {
     line: u32,
-    /// Segments that had been queued by then, modulo 256.
+    /// Segments that had been queued when the line ended, modulo 256.
     segments: u8,
 }
 
@@ -23,12 +23,12 @@ pub struct Finished {
 }
 
 impl Finished {
-    /// Before any line.
+    /// No line yet.
     pub const fn new() -> Self {
         Self { segments: 0, oldest: None, newest: None }
     }
 
-    /// All of `line` has been prepared.
+    /// Notes that all of `line` has been prepared.
     #[inline(never)]
     pub fn end(&mut self, line: u32) {
         let queued = Some(Queued { line, segments: self.segments });
@@ -36,13 +36,14 @@ impl Finished {
         *place = queued;
     }
 
-    /// A segment has been queued.
+    /// Notes that a segment has been queued.
     #[inline]
     pub fn queue(&mut self) {
         self.segments = self.segments.wrapping_add(1);
     }
 
-    /// The line that has been finished meanwhile, if any, when the motors have not taken `waiting` segments yet.
+    /// Returns the line that has been finished meanwhile, if any, when the motors have not taken `waiting` segments
+    /// yet.
     #[inline]
     pub fn take(&mut self, waiting: usize) -> Option<u32> {
         let oldest = self.oldest?;
@@ -54,7 +55,7 @@ impl Finished {
         Some(oldest.line)
     }
 
-    /// The motors stand still and nothing waits: all lines are finished.
+    /// Notes that the motors stand still and nothing waits: all lines are finished.
     pub fn rest(&mut self) {
         (self.oldest, self.newest) = (None, None);
     }
@@ -74,7 +75,7 @@ mod tests {
         let mut finished = Finished::new();
         queue(&mut finished, 10, 300);
         (0..3).for_each(|_| finished.queue());
-        // Its last segment runs until another one has been taken.
+        // The last segment of line 10 runs until another one has been taken.
         assert_eq!(finished.take(4), None);
         assert_eq!(finished.take(3), None);
         assert_eq!(finished.take(2), Some(10));

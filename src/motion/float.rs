@@ -1,4 +1,4 @@
-//! Comparisons of floats for dynamics. On AVR `f32::min` is a call that also sees to NaN.
+//! Comparisons of floats for dynamics. On AVR `f32::min` is a call that also handles NaN.
 
 use kerf_macros::small;
 
@@ -11,14 +11,14 @@ pub fn size(x: f32) -> f32 {
     f32::from_bits(x.to_bits() & 0x7FFF_FFFF)
 }
 
-/// Whether `a` is less than `b`, neither of them a NaN. Cost: 45, where a comparison of floats takes 90, or 180 where the compiler
-/// sees to NaN as well.
+/// Whether `a` is less than `b`; neither is a NaN. Cost: 45, where a comparison of floats takes 90, or 180 where the
+/// compiler handles NaN as well.
 #[inline(never)]
 pub fn less(a: f32, b: f32) -> bool {
     order(a) < order(b)
 }
 
-/// Integers in the order of the floats: those of negative numbers are turned round.
+/// Returns an integer that is in the order of the floats: the bits of negative numbers are turned round.
 #[inline(always)]
 fn order(x: f32) -> i32 {
     let bits = x.to_bits() as i32;
@@ -37,34 +37,34 @@ pub fn greater(a: f32, b: f32) -> f32 {
     if less(b, a) { a } else { b }
 }
 
-/// Whether `a` is less than `b`, one of them at least not negative: the bits of such floats, as signed integers, are in the order
-/// of the numbers. Cost: 15, where a comparison of floats takes 90.
+/// Whether `a` is less than `b`; at least one of them is not negative. The bits of such floats, as signed integers,
+/// are in the order of the numbers. Cost: 15, where a comparison of floats takes 90.
 #[inline(always)]
 pub fn below(a: f32, b: f32) -> bool {
     (a.to_bits() as i32) < b.to_bits() as i32
 }
 
-/// Whether a number is not 0 (or -0, or below 1e-40). Cost: 5: of all bits the compiler would make a
+/// Whether a number is not 0 (or -0, or below 1e-40). Cost: 5. From a test of all bits the compiler would make a
 /// comparison of floats.
 #[inline(always)]
 pub fn some(a: f32) -> bool {
     (a.to_bits() >> 16) as u16 & 0x7FFF != 0
 }
 
-/// The lesser of two numbers, one of them at least not negative. Cost: 25.
+/// Returns the lesser of two numbers; at least one of them is not negative. Cost: 25.
 #[inline(always)]
 pub fn least(a: f32, b: f32) -> f32 {
     if below(a, b) { a } else { b }
 }
 
-/// `x * 2^power`, for a number that is not 0, where that is neither tiny nor huge. Cost: 20.
+/// Returns `x * 2^power` for a number that is not 0, where the result is neither tiny nor huge. Cost: 20.
 #[inline(always)]
 pub fn scaled(x: f32, power: i8) -> f32 {
     f32::from_bits(x.to_bits().wrapping_add_signed(i32::from(power) << 23))
 }
 
-/// The product of two positive numbers, from the first 16 bits of each: up to 2^-14 less than it is. Neither is tiny or huge.
-/// Cost: 65, where a multiplication takes 115.
+/// Returns the product of two positive numbers, from the first 16 bits of each: up to 2^-14 too low. Neither number
+/// is tiny or huge. Cost: 65, where a multiplication takes 115.
 #[inline(never)]
 pub fn brief_product(a: f32, b: f32) -> f32 {
     let (a, b) = (a.to_bits(), b.to_bits());
@@ -76,21 +76,21 @@ pub fn brief_product(a: f32, b: f32) -> f32 {
     f32::from_bits(u32::from(power) << 23 | (product >> 8) & 0x7F_FFFF)
 }
 
-/// The logarithm of a positive number, or a little less: up to 0.09 [`OCTAVE`]s. Sums of these tell in 20
-/// cycles what products of floats would in 400, if the answer is plain.
+/// Returns the logarithm of a positive number, or up to 0.09 [`OCTAVE`]s less. Where the answer is plain, sums of
+/// logarithms decide in 20 cycles what products of floats would decide in 400.
 #[inline(always)]
 pub fn log(x: f32) -> i32 {
     x.to_bits() as i32 - (127 << 23)
 }
 
-/// A factor of two.
+/// A factor of two, as a logarithm.
 pub const OCTAVE: i32 = 1 << 23;
 
 /// The cube root of a positive number that is neither tiny nor huge. Cost: 2,700.
 #[inline(never)]
 #[small]
 pub fn cube_root(x: f32) -> f32 {
-    // A third of the logarithm: 4 % exact. Newton's steps then leave 0.1 % and 2e-6.
+    // A third of the logarithm is exact to 4 %. Newton's steps then leave 0.1 % and 2e-6.
     let mut root = f32::from_bits(x.to_bits() / 3 + 0x2A51_4067);
     for _ in 0..2u8 {
         root = (root + root + x / (root * root)) * (1.0 / 3.0);

@@ -1,25 +1,26 @@
-//! The governor's stretches in a feedhold: to a standstill, as soon as the limits allow.
+//! The governor's stretches in a feedhold: to a standstill as soon as the limits allow.
 //!
-//! Called by exec instead of [`Governor::stretch`] while a hold is on. Without a jerk limit that is plain deceleration; with one it is
-//! a ramp that is laid out when the hold begins (`ramp`). It goes on over any number of
-//! blocks, each with its own limits. What is planned can be braked for by braking as hard as may be (`speed_constraints`,
-//! `constraint`), so velocities are nowhere above those of the plan, and no corner ahead is too fast.
+//! Called by exec instead of [`Governor::stretch`] while a hold is on. Without a jerk limit a hold is plain
+//! deceleration; with one it is a ramp that is laid out when the hold begins (`ramp`). It goes on over any number of
+//! blocks, each with its own limits. Braking as hard as possible is enough for all that is planned
+//! (`speed_constraints`, `constraint`). So velocities are nowhere above those of the plan, and no corner ahead is too
+//! fast.
 //!
-//! At rest the governor is as if it had never moved: to go on is ordinary governing, from the middle of a
-//! block.
+//! At rest the governor is as if it had never moved: going on is ordinary governing, from the middle of a block.
 //!
-//! Units: mm, s. Cost on AVR: 2,500 cycles a stretch; with a jerk limit 6,000 for the first, and 2,500.
+//! Units: mm, s. Cost on AVR: 2,500 cycles a stretch; with a jerk limit 6,000 for the first stretch, and 2,500 for
+//! each other.
 
 use super::constraint::Ahead;
 use super::float::{greater, least, some};
 use super::governor::{Governor, Stretch};
 use crate::math::sqrt;
 
-/// A stop this close to the end of the block, of what is left of it, is one at the end.
+/// A stop beyond this share of what is left of the block counts as one at its end.
 const AT_END: f32 = 0.9999;
 
 impl Governor {
-    /// The next stretch of a hold, in a block with `left` mm to go.
+    /// Returns the next stretch of a hold, in a block with `left` mm to go.
     #[inline(never)]
     pub fn halt(&mut self, left: f32, ahead: &impl Ahead, nominal: f32) -> Stretch {
         if some(self.limits.jerk) {
@@ -31,7 +32,7 @@ impl Governor {
         }
     }
 
-    /// Without a jerk limit; with `headroom` as in `trapezoid`.
+    /// Returns the next stretch of a hold without a jerk limit; `headroom` is as in `trapezoid`.
     #[inline(never)]
     pub(super) fn halt_sharply(&mut self, left: f32, headroom: f32, nominal: f32) -> Stretch {
         let (v, accel) = (self.velocity, self.limits.accel);
@@ -70,7 +71,7 @@ mod tests {
     use crate::motion::short::Short;
     use proptest::prelude::*;
 
-    /// A block that ends in a stop, far away.
+    /// What is ahead: a block that ends in a stop, far away.
     struct Far;
 
     impl Ahead for Far {
@@ -85,12 +86,12 @@ mod tests {
         }
     }
 
-    /// The shortest way to a standstill from `v` at the acceleration `a`.
+    /// Returns the shortest distance to a standstill from `v` at the acceleration `a`.
     fn shortest(v: f64, a: f64, accel: f64, jerk: f64) -> f64 {
         if jerk == 0.0 {
             return v * v / (2.0 * accel);
         }
-        // To the velocity at which the acceleration is or was 0, and down from there.
+        // The distance to the velocity at which the acceleration is or was 0, and of the ramp down from there.
         let (top, time) = (v + a * a / (2.0 * jerk), a / jerk);
         let way = v * time + a * time * time / 2.0 - jerk * time.powi(3) / 6.0;
         let ramp = if top >= accel * accel / jerk {
@@ -101,7 +102,7 @@ mod tests {
         way + top * ramp / 2.0
     }
 
-    /// Runs a hold; the way it takes.
+    /// Runs a hold, and returns the distance that it takes.
     fn stop(governor: &mut Governor) -> f32 {
         let (mut way, mut stretches) = (0.0, 0);
         let mut before = governor.velocity();

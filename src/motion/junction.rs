@@ -1,8 +1,8 @@
 //! Cornering: how fast the corner between two straight moves may be taken.
 //!
-//! The corner is thought of as rounded by an arc that stays within the junction deviation of it; on
-//! that arc the centripetal acceleration may be the junction acceleration (TinyG's and grbl's
-//! method). The velocity itself is not rounded: at the corner each axis' velocity changes at once.
+//! The corner is treated as if it were rounded by an arc that stays within the junction deviation of it. On that arc
+//! the centripetal acceleration may be the junction acceleration (the method of TinyG and grbl). The motion itself is
+//! not rounded: at the corner the velocity of each axis changes at once.
 //!
 //! Called by the line builder. Units: mm (degrees for rotary axes), s. Costs are AVR cycles.
 
@@ -15,16 +15,18 @@ use crate::hal::arithmetic::product;
 use crate::math::sqrt;
 use crate::units::PerAxis;
 
-/// The square of a change of direction, about 0.1 degree, that counts as none: positions in units of
-/// 0.1 um turn 0.1 mm segments of a straight line by as much. In 2^-28.
+/// The square of a change of direction that counts as none, about 0.1 degree: positions in units of 0.1 um turn 0.1
+/// mm segments of a straight line by as much. In 2^-28.
 const STRAIGHT: u32 = 1000;
-/// Beyond this the direction is reversed, about 0.4 degree from it; rounding decides what is left.
+/// Beyond this the direction counts as reversed, about 0.4 degree from it; rounding decides what is left. The square
+/// of the sine of half the angle.
 const REVERSED: f32 = 1.0 - 1e-5;
 
-/// Changes of direction beyond this, some 30 degrees, are not for [`rough`]: the square of one, in 2^-28.
+/// Changes of direction beyond this, some 30 degrees, are too wide for [`rough`]: their square, in 2^-28.
 const WIDE: u32 = 1 << 26;
-/// The logarithm of the square of the velocity of a corner, less those of deviation and acceleration and with that of the square of the
-/// change of direction, in 2^-28: `c (1 + c) = 1.9` at [`WIDE`], a quarter of the square, and what the logarithms are off.
+/// The constant of [`rough`]: the logarithm of the square of a corner's velocity, less the logarithms of deviation
+/// and acceleration, plus the logarithm of the square of the change of direction in 2^-28. It takes `c (1 + c) = 1.9`
+/// as at [`WIDE`], a quarter of the square, and the error of the logarithms into account.
 const STRAIGHT_ON: i16 = 30 * OCTAVE + 238 - 27;
 
 /// The direction of a move.
@@ -39,7 +41,8 @@ pub struct Heading {
 /// 1 in the units of a heading.
 pub const ONE: i16 = 1 << 14;
 
-/// The junction deviation along `unit` of axes that have different ones. Cost: 1,000, and 900 for each axis that moves.
+/// Returns the junction deviation along `unit` of axes that have different ones. Cost: 1,000, and 900 for each axis
+/// that moves.
 #[inline(never)]
 #[small]
 pub(super) fn mean_deviation(unit: &PerAxis<i16>, dynamics: &Dynamics) -> Short {
@@ -64,9 +67,10 @@ pub struct Velocities {
     pub top: f32,
 }
 
-/// The highest velocity at a corner, mm/s, which has [turned](turn) by so much between lines of these junction deviations, with the junction
-/// `acceleration`, mm/s^2: 0 for a reversal, [`f32::MAX`] straight on, or where it is above the top. Where it is above the cruise velocity, so
-/// that only an override asks for it, it is up to a tenth too low.
+/// Returns the highest velocity at a corner, mm/s. The path has [turned](turn) there by `turned` between lines of
+/// these junction deviations; the junction `acceleration` is in mm/s^2. The result is 0 for a reversal, and
+/// [`f32::MAX`] where the path goes straight on or the velocity is above the top. A velocity above the cruise
+/// velocity, which only an override asks for, is up to a tenth too low.
 ///
 /// Cost: 300; 2,000 more for one that limits the cruise velocity.
 #[inline(never)]
@@ -95,8 +99,8 @@ pub fn limit(
     arc(sine, deviation * acceleration, velocities.top)
 }
 
-/// The velocity of a corner that is not [`WIDE`], or up to a tenth less, by logarithms: what [`arc`] says for a cosine of 1, less what
-/// that may be off. Cost: 170.
+/// Returns the velocity of a corner that is not [`WIDE`], or up to a tenth less, by logarithms: what [`arc`] returns
+/// for a cosine of 1, less the error of that. Cost: 170.
 #[inline(never)]
 fn rough(sum: u32, deviation: Short, acceleration: f32) -> Short {
     if deviation == Short::ZERO || !some(acceleration) {
@@ -106,10 +110,10 @@ fn rough(sum: u32, deviation: Short, acceleration: f32) -> Short {
     Log((product + STRAIGHT_ON - Log::of_wide(sum).0) / 2).power()
 }
 
-/// The square of the change of direction, in 2^-28. Cost: 60 + 30 for each axis whose direction changes.
+/// Returns the square of the change of direction, in 2^-28. Cost: 60 + 30 for each axis whose direction changes.
 ///
-/// The axes' velocities change by `(b - a) * velocity`, also where the two paths are measured differently (linear, rotary, both), so that it is
-/// this difference that counts.
+/// The velocities of the axes change by `(b - a) * velocity`, also where the two paths are measured differently
+/// (linear, rotary, both). So this difference is what counts.
 #[inline(never)]
 pub fn turn(a: &[i16], b: &[i16]) -> u32 {
     // |b - a| = 2 sin(angle / 2): precise for small angles, which 1 - cos(angle) is not.
@@ -117,21 +121,21 @@ pub fn turn(a: &[i16], b: &[i16]) -> u32 {
     for (from, to) in a.iter().zip(b) {
         let change = to.abs_diff(*from);
         if change != 0 {
-            // At most 8 in 2^-28: each of the two, linear and rotary, up to 2 long.
+            // At most 8, in 2^-28: the linear and the rotary part of the difference are each up to 2 long.
             sum = sum.wrapping_add(product(change, change));
         }
     }
     sum
 }
 
-/// Not inlined: or it would be worked out where it is not asked for.
+/// Not inlined: otherwise the mean would be computed where it is not needed.
 #[inline(never)]
 fn mean(a: f32, b: f32) -> f32 {
     0.5 * (a + b)
 }
 
-/// The velocity on the arc, from the square of the sine of half the angle and the product of deviation
-/// and acceleration.
+/// Returns the velocity on the arc, from the square of the sine of half the angle and the product of deviation and
+/// acceleration; [`f32::MAX`] if it is plainly above `most`.
 #[inline(never)]
 #[small]
 fn arc(sine: f32, product: f32, most: f32) -> f32 {

@@ -18,14 +18,14 @@ use crate::gcode::command::Feed;
 use crate::hal::arithmetic::product;
 use crate::math::sqrt;
 
-/// Velocities beyond all machines, mm/s.
+/// A velocity beyond all machines, mm/s: higher ones count as this.
 const CRUISE_MOST: f32 = 1e5;
-/// See [`CRUISE_MOST`].
+/// Lower velocities count as this, mm/s.
 const CRUISE_LEAST: f32 = 1e-6;
-/// The logarithm of [`BLOCK_S_MIN`], or more by what rough ones are off.
+/// The logarithm of [`BLOCK_S_MIN`], with a margin for the error of rough logarithms.
 const BLOCK_S_LOG: i16 = -10 * short::OCTAVE;
 
-/// A feed and what it comes to: mostly that of the move before.
+/// The feed of the last move, and its velocity: most moves have the feed of the move before.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct LastFeed {
     /// mm/min.
@@ -35,7 +35,8 @@ pub(super) struct LastFeed {
 }
 
 impl LastFeed {
-    /// `feed`, mm/min, in mm/s, within what no division goes wrong with. Cost: 20; 300 for another feed.
+    /// Returns `feed`, mm/min, in mm/s, within a range in which no division goes wrong. Cost: 20; 300 for another
+    /// feed.
     #[inline(always)]
     fn per_second(&mut self, feed: f32) -> f32 {
         if self.feed.to_bits() != feed.to_bits() {
@@ -45,25 +46,25 @@ impl LastFeed {
     }
 }
 
-/// Not inlined: or it would be worked out where it is not asked for.
+/// Not inlined: otherwise the product would be computed where it is not needed.
 #[inline(never)]
 fn times(a: f32, b: f32) -> f32 {
     a * b
 }
 
-/// In parts of a step.
+/// Half a step, in parts of a step.
 const HALF_STEP: u16 = 1 << (PARTS_LOG2 - 1);
 
-/// The share of the step rate that short blocks may have.
+/// The share of the step rate that short blocks may use.
 const SHORT_SHARE: f32 = 0.625;
-/// Its logarithm.
+/// The logarithm of [`SHORT_SHARE`].
 const SHORT_SHARE_LOG: i16 = -174;
-/// More than what a sum of three logarithms is off.
+/// More than the error of a sum of three logarithms.
 const SPARE: i16 = 24;
 
 impl Path {
-    /// The axes that move, with the size of their part of the heading, or a little more: never less
-    /// than it is. Ends with the last that moves.
+    /// Returns the axes that move, each with an upper bound of the size of its part of the heading ([`part`]). Ends
+    /// with the last axis that moves.
     #[inline(always)]
     fn axes<'a>(&'a self, dynamics: &'a Dynamics) -> impl Iterator<Item = (u16, &'a Axis)> {
         let mut left = self.moved;
@@ -109,7 +110,7 @@ impl Path {
         }
     }
 
-    /// How fast a move is to be whose feed is none of a length, mm/s.
+    /// Returns how fast a move is to be whose feed is not simply a length per minute, mm/s.
     #[inline(never)]
     #[small]
     fn unusual_velocity(&self, feed: Option<Feed>, last: &mut LastFeed) -> f32 {
@@ -120,7 +121,8 @@ impl Path {
         })
     }
 
-    /// Acceleration and jerk, and the junction deviation. Cost: 350 where all axes that move have the same limits.
+    /// Limits acceleration and jerk, and sets the junction deviation. Cost: 350 where all axes that move have the
+    /// same limits.
     #[inline(never)]
     pub(super) fn limit_change(&mut self, dynamics: &Dynamics) {
         let slowest = match self.like_one(dynamics) {
@@ -140,7 +142,7 @@ impl Path {
             self.jerk = jerk;
         } else if slowest.jerk != Short::ZERO {
             let jerk = slowest.jerk.get();
-            // What a ramp to full speed comes to, so that the jerk alone limits it.
+            // The acceleration that a ramp to full speed reaches, so that the jerk alone limits the ramp.
             let accel = least(sqrt(jerk * power_of_two_above(self.cruise)), ACCEL_MOST);
             self.accel = Short::new(accel);
             self.jerk = Short::new(effective_jerk(jerk, accel));
@@ -149,7 +151,8 @@ impl Path {
         }
     }
 
-    /// The axis whose limits are those of all that move, and the greatest part of the heading; `None` if they have different ones.
+    /// Returns an axis whose limits are those of all axes that move, with the greatest part of the heading; `None` if
+    /// the axes have different limits.
     #[inline(always)]
     fn like_one<'a>(&'a self, dynamics: &'a Dynamics) -> Option<(u16, &'a Axis)> {
         let (mut most, mut first) = (0, None);
@@ -163,7 +166,7 @@ impl Path {
         first.map(|axis| (most, axis))
     }
 
-    /// What limits a move of axes with different limits.
+    /// Returns what limits a move of axes with different limits, and sets the junction deviation.
     #[inline(never)]
     fn look_at_all(&mut self, dynamics: &Dynamics) -> Slowest {
         let mut slowest = Slowest::default();
@@ -171,7 +174,7 @@ impl Path {
         let (mut deviation, mut differ) = (None, false);
         for (u, axis) in self.axes(dynamics) {
             differ |= *deviation.get_or_insert(axis.deviation) != axis.deviation;
-            // Each limit of a move of lengths and angles together is measured along the way.
+            // In a move of lengths and angles together, each limit is converted to one along the path.
             let along = |limit| if limit == Short::ZERO { limit } else { over(limit, u) };
             if stretches {
                 slowest.look(ONE as u16, along(axis.accel), along(axis.jerk));
@@ -187,8 +190,8 @@ impl Path {
         slowest
     }
 
-    /// Whether no motor goes half a step and no axis 3 mm, and the move is over before exec can prepare the next one. Cost: 10; 400 if
-    /// it is so short.
+    /// Whether no motor goes half a step, no axis goes 3 mm, and the move is over before exec can prepare the next
+    /// one. Cost: 10; 400 if no motor goes half a step.
     #[inline(always)]
     pub(super) fn is_brief(&self) -> bool {
         self.most < HALF_STEP && self.is_short_of_time()
@@ -201,11 +204,12 @@ impl Path {
         !self.whole_steps && self.travel.iter().all(near) && self.is_too_fast()
     }
 
-    /// Keeps motors within the rate that so many can have together, or, in chords of arcs and in blocks short enough for parts of a
-    /// step, within five eighths of that: exec has much more to do there than in a long line. Keeps every block long enough for exec.
+    /// Keeps motors within the step rate that all motors that move can have together. Chords of arcs, and blocks short
+    /// enough for parts of a step, get five eighths of that rate: exec has much more to do there than in a long line.
+    /// Keeps every block long enough for exec.
     ///
-    /// Cost: 300 where logarithms tell; 1,000 for a feed beyond the limit, or just below it. What lies between the feed and the
-    /// top, which only an override asks for, is up to a seventh below what the motors can.
+    /// Cost: 300 where logarithms decide; 1,000 for a feed beyond the limit, or just below it. Velocities between the
+    /// feed and the top, which only an override asks for, may be limited to up to a seventh less than the motors can do.
     #[inline(never)]
     pub(super) fn limit_steps(&mut self, rates: &[f32; MOTORS], chord: bool) {
         if self.most < HALF_STEP {
@@ -214,7 +218,7 @@ impl Path {
         let rate = rates[usize::from(self.moving) - 1];
         let short = chord || !self.whole_steps;
         let octaves = if self.whole_steps { 0 } else { i16::from(PARTS_LOG2) };
-        // Inlined: that saves 20 cycles each.
+        // Inlined: this saves 20 cycles for each logarithm.
         let log = |x| Short::new(x).log().0;
         let (top, length) = (log(self.top), log(self.length));
         let share = if short { SHORT_SHARE_LOG } else { 0 };
@@ -235,7 +239,8 @@ impl Path {
         }
     }
 
-    /// Keeps the motor that goes farthest within a step rate, which is not 0. Its way is in steps, or in that power of two of them.
+    /// Keeps the motor that goes farthest within a step rate, which is not 0. The motor's way is in units of
+    /// `2^-octaves` steps.
     #[inline(never)]
     #[small]
     fn limit_rate(&mut self, rate: f32, octaves: i8) {
@@ -246,7 +251,7 @@ impl Path {
         }
     }
 
-    /// Whether it may be over before exec can prepare the next block.
+    /// Whether the block, at its top, is over before exec can prepare the next one.
     #[inline(never)]
     fn is_too_fast(&self) -> bool {
         below(self.length, self.top * BLOCK_S_MIN)
@@ -263,27 +268,27 @@ impl Path {
     }
 }
 
-/// `top`, or what an axis with this part of the heading and this limit allows.
+/// Returns `top`, or less if an axis with this part of the heading and this velocity limit allows less.
 #[inline(never)]
 fn slower(top: f32, u: i16, velocity: f32) -> f32 {
     let u = float(part(u));
     if below(velocity, u * top) { within(velocity / u) } else { top }
 }
 
-/// The size of a part of the heading, or a little more: never less than it is.
+/// Returns an upper bound of the size of a part of the heading, at most [`ONE`].
 #[inline(always)]
 fn part(u: i16) -> u16 {
     (u.unsigned_abs() + 2).min(ONE as u16)
 }
 
-/// No slower than the least and no faster than the most. Cost: 40.
+/// Returns `cruise` within [`CRUISE_LEAST`] and [`CRUISE_MOST`]. Cost: 40.
 #[inline(never)]
 fn within(cruise: f32) -> f32 {
     if below(cruise, CRUISE_LEAST) { CRUISE_LEAST } else { least(cruise, CRUISE_MOST) }
 }
 
-/// A limit along the path: that of an axis, not 0, over its part `u` of the heading, not 0. Cost: 230, where a division
-/// of floats takes 700.
+/// Returns a limit along the path: the limit of an axis over its part `u` of the heading; neither is 0. Cost: 230,
+/// where a division of floats takes 700.
 #[inline(never)]
 pub(super) fn over(limit: Short, u: u16) -> Short {
     let (mantissa, mut power) = limit.parts();
@@ -294,7 +299,7 @@ pub(super) fn over(limit: Short, u: u16) -> Short {
         below <<= 1;
         power = power.wrapping_add(1);
     }
-    // The quotient less one: the leading 1 is left away.
+    // The quotient less one: a mantissa leaves out its leading 1.
     let mut rest = above.wrapping_sub(below);
     if above < below {
         rest = rest.wrapping_add(above);
@@ -303,7 +308,7 @@ pub(super) fn over(limit: Short, u: u16) -> Short {
     Short::of_parts(quotient(u32::from(rest) << 8, below) as u8, power)
 }
 
-/// A part of a heading as a float.
+/// Returns a part of a heading as a float.
 fn float(u: u16) -> f32 {
     scaled(f32::from(u), -14)
 }
@@ -311,20 +316,20 @@ fn float(u: u16) -> f32 {
 /// The axis that limits the acceleration, and the least limits of all axes.
 #[derive(Default)]
 pub(super) struct Slowest {
-    /// Limit and unit of the axis that limits most.
+    /// Limit of the axis that limits most; `unit` is its part of the heading.
     pub(super) accel: Short,
     pub(super) unit: u16,
     pub(super) least: Short,
     pub(super) jerk: Short,
-    /// Not all axes have these limits, or one has no acceleration limit.
+    /// Whether limits differ, or an axis has no acceleration limit.
     pub(super) mixed: bool,
 }
 
 impl Slowest {
-    /// The jerk limit, if it has an effect.
+    /// Returns the jerk limit if it has an effect, else 0.
     #[inline(always)]
     fn effective_jerk(&self) -> Short {
-        // Plainly of none if it allows the acceleration within 2^-10 s.
+        // The limit plainly has no effect if the acceleration builds up within 2^-10 s.
         let octaves = Short::octaves_between(self.least, self.jerk);
         if self.jerk == Short::ZERO || octaves >= 11 {
             return Short::ZERO;
@@ -332,7 +337,7 @@ impl Slowest {
         Short::new(effective_jerk(self.jerk.get(), self.least.get()))
     }
 
-    /// Looks at an axis with such a part of the heading. Cost: 130.
+    /// Takes in the limits of an axis with this part of the heading. Cost: 130.
     #[inline(never)]
     pub(super) fn look(&mut self, u: u16, accel: Short, jerk: Short) {
         if jerk != self.jerk {
@@ -363,28 +368,29 @@ impl Slowest {
     }
 }
 
-/// Whether `a / u` is below `b / v`, given crosswise; none is 0. Exact. Cost: 90, and 10 for each power of two between `a` and `b`.
+/// Whether `a / u` is below `b / v`, compared as `a * v` and `b * u`; none of them is 0. Exact. Cost: 90, and 10 for
+/// each power of two between `a` and `b`.
 #[inline(never)]
 fn is_slower(a: Short, v: u16, b: Short, u: u16) -> bool {
     let whole = |(mantissa, _): (u8, u8), by| product(u16::from(mantissa) | 0x100, by);
     let (a, b) = (a.parts(), b.parts());
     let (left, right) = (whole(a, v), whole(b, u));
     if a.1 >= b.1 {
-        // `left << n < right`, with nothing lost above.
+        // `left << n < right`, without an overflow.
         shifted(right.wrapping_sub(1), a.1 - b.1) >= left
     } else {
         shifted(left, b.1 - a.1) < right
     }
 }
 
-/// `n`, which has 24 bits, without its lowest bits.
+/// Returns `n`, which has 24 bits, without its lowest `bits` bits.
 #[inline(always)]
 fn shifted(n: u32, bits: u8) -> u32 {
     if bits < 24 { n >> bits } else { 0 }
 }
 
-/// The power of two that is not below `x`, as blocks of nearly the same velocity are to have the same
-/// limits. Cost: 20.
+/// Returns the power of two that is not below `x`: blocks of nearly the same velocity are to have the same limits.
+/// Cost: 20.
 fn power_of_two_above(x: f32) -> f32 {
     let bits = x.to_bits();
     f32::from_bits((bits + 0x007F_FFFF) & 0xFF80_0000)

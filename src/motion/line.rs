@@ -3,15 +3,15 @@
 //! Called by the planner task. Owns the direction of the last move and the motor positions at the
 //! end of the last block. Costs are AVR cycles.
 //!
-//! Steps are the difference of two exact absolute positions, so nothing accumulates: neither
-//! rounding nor moves shorter than a step. A move without any steps (shorter than one, or of an axis
-//! without a motor) is still a block and takes its time, or the next step would come too early; a fast one of less than half a step
-//! is merged with the next ([`Built::Merge`]). A block is told
-//! where between two steps its motors arrive, to 1/16 step, and so each motor knows where blocks have taken it, whatever positions are renamed to.
+//! Steps are the difference of two exact absolute positions, so nothing accumulates: neither rounding nor moves
+//! shorter than a step. A move without any steps (shorter than a step, or of an axis without a motor) is still a
+//! block and takes its time; otherwise the next step would come too early. A fast move of less than half a step is
+//! merged with the next one ([`Built::Merge`]). A block says where between two steps its motors arrive, to 1/16 step.
+//! So each motor knows where blocks have taken it, whatever positions are renamed to.
 //!
-//! A ramp may go over many blocks. Without a jerk limit each may have its own acceleration limit, what
-//! its axes allow in its direction. With one, acceleration and jerk must be alike for as long as
-//! possible: then they are those of the slowest axis that moves, whatever the direction.
+//! A ramp may go over many blocks. Without a jerk limit each block may have its own acceleration limit: what its axes
+//! allow in its direction. With a jerk limit, acceleration and jerk must stay alike for as long as possible: then
+//! they are those of the slowest axis that moves, whatever the direction.
 
 use super::block::{Block, Extent, Line as Move, QueuedAction};
 use super::curve::{Bend, Curve};
@@ -49,24 +49,24 @@ pub struct Line<'a> {
     pub to: &'a PerAxis<Length>,
     /// How fast; a traverse if `None`. Positive: the interpreter refuses a feed of 0.
     pub feed: Option<Feed>,
-    /// The arc that it is a chord of.
+    /// The arc of which the move is a chord, if it is one.
     pub curve: Option<&'a Curve>,
-    /// The move may be merged with the next one.
+    /// Whether the move may be merged with the next one.
     pub may_merge: bool,
 }
 
 /// What becomes of a move.
 #[derive(Clone, Copy, Debug)]
 pub enum Built {
-    /// Nothing becomes of the move: it has no length.
+    /// The move has no length.
     Nothing,
-    /// A block, into which the corner may be taken at so many mm/s, or so much faster than it can be run
-    /// that it is no limit.
+    /// A block. The corner before it may be taken at this velocity, mm/s, or one so much higher than the block can be
+    /// run at that it is no limit.
     Line(f32),
-    /// More steps than a block holds: to be made in so many parts.
+    /// More steps than a block holds: the move is to be made in this many parts.
     Parts(u16),
-    /// Less than half a step, and over before exec could prepare it: the next move begins where this one does. The way of each axis
-    /// fits 16 bits.
+    /// Less than half a step, and over before exec could prepare it: the next move begins where this move begins. The
+    /// way of each axis fits 16 bits.
     Merge,
 }
 
@@ -75,7 +75,7 @@ pub enum Built {
 // In this order: AVR reaches a field within 63 bytes of the first in one instruction.
 #[repr(C)]
 pub struct Builder {
-    /// What the machine could do at most in the last move, mm/s; 0 if it stands still after it.
+    /// The highest velocity that the machine could have in the last move, mm/s; 0 if it stands still after it.
     top: f32,
     /// The feed of the last move.
     feed: LastFeed,
@@ -88,7 +88,8 @@ pub struct Builder {
 }
 
 impl Builder {
-    /// The block for a move, put into `out` if it is [`Built::Line`]. Nothing is changed otherwise.
+    /// Makes the block for a move, and puts it into `out` if it returns [`Built::Line`]. Otherwise nothing is
+    /// changed.
     ///
     /// Cost: 3,500 + 1,300 for each axis that moves with its motor, for short moves.
     #[inline(never)]
@@ -154,8 +155,8 @@ impl Builder {
         Built::Line(entry)
     }
 
-    /// A way that is too far for parts of a step, in whole steps: motors keep the fraction that they have. Or says in how many
-    /// parts these would fit, if not 0, and nothing has moved then.
+    /// Makes a way that is too far for parts of a step in whole steps: motors keep the fraction of a step that they
+    /// have. Returns 0, or in how many parts the steps would fit blocks; nothing has moved then.
     #[inline(never)]
     #[small]
     fn stride(
@@ -191,7 +192,8 @@ impl Builder {
         parts
     }
 
-    /// Takes the first `driven` motors back to where the move begins, from `ways`, in parts of a step. Cost: 1,500 each that has moved.
+    /// Takes the first `driven` motors back to where the move begins. `ways` is what they have gone, in parts of a
+    /// step. Cost: 1,500 for each motor that has moved.
     #[inline(never)]
     #[small]
     fn undo(
@@ -215,12 +217,12 @@ impl Builder {
         }
     }
 
-    /// The next move starts from rest.
+    /// Notes that the next move starts from rest.
     pub fn stopped(&mut self) {
         self.top = 0.0;
     }
 
-    /// The block that renames the present position. Motors without an axis keep theirs.
+    /// Returns the block that renames the present position. Motors without an axis keep their positions.
     #[small]
     pub fn set_position(
         &mut self,
@@ -236,30 +238,30 @@ impl Builder {
         QueuedAction::SetPosition(self.motors.map(|motor| motor.steps()))
     }
 
-    /// The machine stands still, and its motors are at these steps.
+    /// Notes that the machine stands still, with its motors at these steps.
     #[small]
     pub fn place(&mut self, steps: &[i32; MOTORS]) {
         self.motors = steps.map(Motor::counted);
         self.stopped();
     }
 
-    /// The block for something that is done at rest.
+    /// Returns the block for something that is done at rest.
     pub fn pause(&mut self, action: QueuedAction, line: u32) -> Block {
         self.stopped();
         Block::action(action, line)
     }
 }
 
-/// Parts of at most [`STEPS_MAX`] steps.
+/// Returns in how many parts of at most [`STEPS_MAX`] steps a way can be made.
 #[inline(never)]
 fn parts_of(steps: u64) -> u16 {
-    // The rounding of their ends may add a step.
+    // Rounding the ends of a part may add a step.
     u16::try_from(steps / u64::from(STEPS_MAX - 1) + 1).unwrap_or(u16::MAX)
 }
 
 impl Path {
-    /// Takes the motors to the end of the move, and says how far each goes, in parts of a step. Returns how many it has come to:
-    /// all, or those before the first for which that does not fit.
+    /// Takes the motors to the end of the move, and sets in `ways` how far each goes, in parts of a step. Returns how
+    /// many motors it has done: all, or those before the first whose way does not fit.
     #[inline(never)]
     fn drive(
         &mut self,
@@ -288,7 +290,7 @@ impl Path {
                 }
             }
         } else {
-            // Without a loop it takes 190 cycles less. With CoreXY it would take 1,000 bytes more.
+            // Without a loop this takes 190 cycles less. With CoreXY it would take 1,000 bytes more.
             each_motor!(M => if !drive(M) {
                 return M as u8;
             });
@@ -296,7 +298,7 @@ impl Path {
         MOTORS as u8
     }
 
-    /// A motor goes so far.
+    /// Takes up that a motor goes `way`.
     #[inline(always)]
     fn go(&mut self, way: u16) {
         if way != 0 {

@@ -1,4 +1,4 @@
-//! Motion: from targets to step pulses.
+//! Motion: from target positions to step pulses.
 //!
 //! ```text
 //! target -> line -> block queue -> exec -> segment ring -> dda -> pins

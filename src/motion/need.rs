@@ -1,8 +1,9 @@
-//! The distance that it takes to slow down, in integers: what a scan (`constraint`) works with.
+//! The distance that it takes to slow down, computed in integers for a scan (`constraint`).
 //!
-//! Floats would cost four times as much on AVR. A scan is about velocities up to one that is known. So the unit
-//! of velocity is the power of four that makes 12 to 14 bits of that, and that of distance is its square, or more where it takes
-//! much to build up a deceleration. Velocities are rounded so that the distance comes out longer, by some 0.05 %.
+//! Floats would cost four times as much on AVR. A scan is about velocities up to a known one. So the unit of velocity
+//! is the power of four that gives this velocity 12 to 14 bits. The unit of distance is its square, or more where a
+//! deceleration takes much distance to build up. Velocities are rounded so that the distance comes out longer, by
+//! some 0.05 %.
 //!
 //! Called at exec level. Units outside: velocities mm/s, distances brake potential, (mm/s)^2 (`constraint`).
 
@@ -15,44 +16,45 @@ use crate::hal::arithmetic::product;
 /// Bits of the fastest velocity, or one more.
 const BITS: i16 = 12;
 
-/// Where distances end: further on than the most that it takes to slow down, and behind.
+/// Distances end here: `END` is further on than the most that it takes to slow down, `BEHIND` is behind the machine.
 const END: u32 = 3 << 29;
 const BEHIND: u32 = 1 << 29;
 
-/// The least of the fastest velocities, as a power of two.
+/// The lowest velocity that a scale is made for, as a power of two.
 const LEAST: i16 = -16;
 
 /// The units of a scan, and its limits in them.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scale {
-    /// The unit of velocity is `2^velocity`, that of distance `2^-distance`.
+    /// The unit of velocity is `2^velocity`; that of distance is `2^-distance`.
     velocity: i8,
     distance: i8,
-    /// By how many bits that is more than the square of the unit of velocity, where the whole deceleration is reached.
+    /// By how many bits the unit of distance is more than the square of the unit of velocity.
     coarse: u8,
     /// Twice kappa, rounded up; all ones if that is beyond any velocity here.
     twice: u16,
-    /// The root of 8 kappa, and by how many bits its product with that of a velocity is too long.
+    /// The root of 8 kappa, 16 bits; `long` is by how many bits its product with the root of a velocity is too long.
     root: u16,
     long: u8,
 }
 
-/// Exponent and the first 16 bits of a positive number: `bits * 2^(exponent - 15)`.
+/// Returns the exponent and the first 16 bits of a positive number: `bits * 2^(exponent - 15)`.
 fn parts(x: f32) -> (i16, u16) {
     let bits = x.to_bits();
     (((bits >> 23) as i16) - 127, (bits >> 8) as u16 | 0x8000)
 }
 
 impl Scale {
-    /// For velocities up to this. Cost: 300.
+    /// Returns the scale for velocities up to `fastest`. Cost: 300.
     #[inline(never)]
     pub fn of(fastest: f32, limits: &Limits) -> Self {
         let (exponent, _) = parts(fastest);
         let unit = (exponent.max(LEAST) - BITS) & !1;
         let (of_root, root) = parts(limits.root);
-        // The product with 256 times the root of a velocity, of which 16 bits are dropped: 2^-7 of what it stands for.
+        // `need` multiplies the root by 256 times the root of a velocity, and drops 16 bits: the product is too small by
+        // this power of two.
         let more = of_root - (unit >> 1) - 7;
-        // Some hundred slices at this velocity are within range as well.
+        // The distance of some hundred slices at this velocity is to be within range as well.
         let slices = exponent + parts(limits.accel).0 - unit - unit - 28;
         let coarse = more.max(slices).clamp(0, 31);
         Self {
@@ -65,26 +67,26 @@ impl Scale {
         }
     }
 
-    /// A velocity, rounded down. Cost: 60.
+    /// Returns a velocity in the unit of the scale, rounded down. Cost: 60.
     #[inline(never)]
     pub fn velocity(&self, velocity: Short) -> u16 {
         let (mantissa, power) = velocity.parts();
         self.shifted(i16::from(power) - 127, 0x8000 | u16::from(mantissa) << 7)
     }
 
-    /// A velocity, rounded up. Cost: 60.
+    /// Returns a velocity in the unit of the scale, rounded up. Cost: 60.
     pub fn velocity_above(&self, velocity: f32) -> u16 {
         let (exponent, bits) = parts(velocity);
         self.shifted(exponent, bits) + 1
     }
 
     fn shifted(&self, exponent: i16, bits: u16) -> u16 {
-        // At most 13 bits before the point.
+        // At most 13 bits before the binary point.
         let places = (exponent - i16::from(self.velocity)).min(13);
         if places < 0 { 0 } else { bits >> (15 - places) as u8 }
     }
 
-    /// A distance. Cost: 150.
+    /// Returns a distance in the unit of the scale. Cost: 150.
     #[inline(never)]
     pub fn distance(&self, distance: f32) -> i32 {
         if !some(distance) {
@@ -94,13 +96,14 @@ impl Scale {
         if distance.is_sign_negative() { -(far.min(BEHIND) as i32) } else { far.min(END) as i32 }
     }
 
-    /// A distance as a float again. Cost: 150.
+    /// Returns a distance as brake potential again. Cost: 150.
     #[inline(never)]
     pub fn potential(&self, distance: i32) -> f32 {
         if distance == 0 { 0.0 } else { scaled(distance as f32, -self.distance) }
     }
 
-    /// What it takes to come from `from` down to `to`, not above it. Cost: 100; 450 if the deceleration does not reach its limit.
+    /// Returns the distance to slow down from `from` to `to`, which is not above it. Cost: 100; 450 if the
+    /// deceleration does not reach its limit.
     #[inline(never)]
     pub fn need(&self, from: u16, to: u16) -> i32 {
         let (drop, sum) = (from - to, from + to);
@@ -113,25 +116,25 @@ impl Scale {
         need as i32 + 1
     }
 
-    /// No less than it takes to come from `from` down to any velocity. Cost: 450.
+    /// Returns an upper bound of the distance to slow down from `from` to any velocity. Cost: 450.
     pub fn most(&self, from: u16) -> i32 {
         let stop = self.need(from, 0);
         stop + (stop >> 3)
     }
 
-    /// What it takes at most to come from `from` down to what a key says: to `to` at its place, or to whatever comes behind it, which
-    /// has higher keys. Cost: 100.
+    /// Returns an upper bound of the distance to slow down from `from` to what a key says: to `to` at its place, or
+    /// to whatever comes behind it, which has higher keys. Cost: 100.
     pub fn by_key(&self, from: u16, to: u16) -> i32 {
         if self.twice > from {
             return END as i32;
         }
-        // With less than twice kappa a key is one of a standstill.
+        // Below twice kappa a key is that of a standstill.
         let to = if to < self.twice { 0 } else { to };
         (product(from + to, from - to + self.twice) >> self.coarse) as i32 + 1
     }
 }
 
-/// A positive number, rounded up, in 16 bits.
+/// Returns a positive number, rounded up, in 16 bits.
 fn above(x: f32) -> u16 {
     let whole = whole(x);
     if whole < 0xFFFF { whole as u16 + 1 } else { 0xFFFF }
@@ -172,7 +175,7 @@ mod tests {
             let scale = Scale::of(top, &limits);
             let from = scale.velocity_above(top);
             let to = scale.velocity(Short::new(top * part)).min(from);
-            // It is enough to stop there.
+            // Coming to a standstill there is enough.
             let need = scale.need(from, to).min(scale.need(from, 0));
             prop_assert!(scale.by_key(from, to) >= need - (need >> 10));
         }

@@ -1,8 +1,8 @@
-//! How close ticks may come: so that the step interrupt, exec and everything else have their time.
+//! How close ticks may come, so that the step interrupt, exec and everything else have enough time.
 //!
-//! Owned by [`Prep`](super::prep::Prep); the planner and the settings ask for the highest rates. The step
-//! interrupt waits out each pulse, so that ticks keep the more distance the wider a pulse is. Times are
-//! CPU cycles unless they are named otherwise.
+//! Owned by [`Prep`](super::prep::Prep); the planner and the settings ask for the highest rates. The step interrupt
+//! waits out each pulse. So the wider a pulse is, the further apart ticks must be. Times are CPU cycles unless they
+//! are named otherwise.
 
 use crate::boards::{MOTORS, STEPS_BY_UNIT};
 use crate::dda::Ticks;
@@ -14,23 +14,23 @@ const _: () = assert!(TIMER_HZ / 1_000_000 < 256, "255 us take more than a tick 
 pub use crate::dda::Drivers;
 
 impl Drivers {
-    /// What the settings have by default.
+    /// The default of the settings.
     pub const USUAL: Self = Self { pulse_us: 2, setup_us: 1 };
 
-    /// By how much ticks are longer than usual: by what the interrupt waits, and half of it, so that as large a part of the time
-    /// is left to the others.
+    /// By how much ticks are longer than usual: by the time that the interrupt waits, and half of it, so that
+    /// everything else keeps its share of the time.
     const fn extra(self) -> u16 {
         let waits = self.waits();
         waits + waits / 2
     }
 
-    /// By how much pulses are longer than those that the ticks are measured with.
+    /// By how much pulses are longer than those with which the tick periods were measured.
     const fn waits(self) -> u16 {
         self.pulse_us.saturating_sub(PULSE_US) as u16 * CYCLES_PER_US
     }
 
-    /// By how much ticks between steps are longer: shortest ones, fine ones and coarse ones. A unit that makes pulses by itself is ready for the next one half a
-    /// microsecond behind a pulse.
+    /// By how much the shortest, the fine and the coarse ticks are longer. A unit that makes pulses by itself is
+    /// ready for the next pulse half a microsecond after one.
     const fn spread(self) -> [u16; 3] {
         let extra = self.extra();
         if STEPS_BY_UNIT {
@@ -40,20 +40,20 @@ impl Drivers {
         }
     }
 
-    /// How long a direction stands before the first step.
+    /// How long a direction must be stable before the first step, CPU cycles.
     pub const fn setup(self) -> u16 {
         self.setup_us as u16 * CYCLES_PER_US
     }
 
-    /// Highest step rate of each of so many motors that move together, steps per second: a step on every tick, but with two motors, which
-    /// would leave exec too little time for ramps.
+    /// Returns the highest step rate of each of `motors` that move together, steps per second. It is a step on
+    /// every tick, except with two motors, where that would leave exec too little time for ramps.
     pub const fn step_rate_max(self, motors: usize) -> f32 {
         let usual = usual(if motors == 0 { 0 } else { motors - 1 });
         TIMER_HZ as f32 / (usual.step + self.extra()) as f32
     }
 }
 
-/// Tick periods with usual pulses, by the number of motors, less one. No table: that would be in RAM.
+/// Tick periods with usual pulses, by the number of motors, less one. Not a table, which would be in RAM.
 const fn usual(motors: usize) -> Ticks {
     match motors {
         0 => const { TICKS[0] },
@@ -63,24 +63,24 @@ const fn usual(motors: usize) -> Ticks {
     }
 }
 
-/// Ticks of blocks so short that they are a single segment: 2^22 / the tick period.
+/// The pace of blocks so short that they are a single segment: 2^22 / the tick period.
 pub const COARSEST: u16 = per(TICKS[0].coarsest);
 
-/// How close ticks may come.
+/// How close ticks may come, for some number of motors that move.
 #[derive(Clone, Copy, Debug)]
 pub struct Pace {
-    /// Shortest tick period: the step interrupt with so many motors, a short interrupt before it, and
+    /// Shortest tick period: the step interrupt with this many motors, a short interrupt before it, and
     /// some time for everything else.
     pub shortest: u16,
     /// 2^22 / the tick period of steady motion: as fine as leaves exec and the planner a third of the CPU.
     pub fine: u16,
-    /// 2^22 / that of short blocks, for which they need more.
+    /// 2^22 / the tick period of short blocks, for which exec and the planner need more of the CPU.
     pub coarse: u16,
     /// From this tick period on pulses wait for the interrupt's worst latency ([`crate::dda::Segment::settle`]).
     pub settles: u16,
 }
 
-/// The paces for such drivers, by the number of motors that move, less one. Cost: 6,000.
+/// Returns the paces for such drivers, by the number of motors that move, less one. Cost: 6,000.
 #[small]
 pub const fn paces(drivers: Drivers) -> [Pace; MOTORS] {
     let [shortest, fine, coarse] = drivers.spread();
@@ -113,7 +113,7 @@ mod tests {
             Drivers { pulse_us, ..Drivers::USUAL }.step_rate_max(motors).round() as u32
         };
         assert_eq!([1, 2].map(|us| rate(us, 1)), [100_000; 2]);
-        // 160 cycles and half more than 8 us of 16.
+        // Pulses are 8 us longer: that makes ticks longer by 128 cycles and half of that.
         assert_eq!((rate(10, 1), rate(10, 4)), (45_455, 31_311));
         let [usual, wide] = [2, 10].map(|pulse_us| paces(Drivers { pulse_us, setup_us: 1 }));
         for (usual, wide) in usual.iter().zip(&wide) {

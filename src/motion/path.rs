@@ -1,7 +1,7 @@
 //! The way of a straight move: how long it is, and in which direction.
 //!
-//! Called by the line builder. In integers of 15 bits where these are exact enough, a third of the cycles of
-//! floats: the length of a long move, which decides how evenly its steps come, is a float's.
+//! Called by the line builder. Works in integers of 15 bits where these are exact enough, at a third of the cycles of
+//! floats. The length of a long move decides how evenly its steps come, so it is computed in floats.
 //!
 //! Units: those of [`Length`] on the way in, mm (or degrees) on the way out.
 
@@ -15,52 +15,53 @@ use crate::hal::arithmetic::product;
 use crate::math::sqrt;
 use crate::units::{FIRST_ROTARY, Length, PerAxis};
 
-/// The longest part of a way is to have at least as many units.
+/// The longest part of a normalized way has at least this many units.
 const MOST: u32 = 1 << 14;
 
 /// Whether there is a way.
 pub(super) enum Way {
     None,
     Near,
-    /// More than [`Length`] holds.
+    /// Farther than [`Length`] holds.
     Far,
 }
 
-/// The way from here to there, and what limits it. Filled in place: to move it costs as much as a
-/// multiplication of floats.
+/// The way of a move, and what limits it. Filled in place, because moving it costs as much as a multiplication of
+/// floats.
 #[derive(Default)]
 pub(super) struct Path {
     /// Travel of each axis, in units of [`Length`].
     pub(super) travel: PerAxis<i32>,
-    /// mm.
+    /// Length of the path, mm.
     pub(super) length: f32,
     /// Travel of each axis for a unit of length.
     pub(super) heading: Heading,
-    /// How much longer the way of the rotary axes is than that of the linear ones, if it is; else 0.
+    /// By which factor the way of the rotary axes is longer than that of the linear ones, if both move and it is
+    /// longer; else 0.
     pub(super) stretch: f32,
     /// The axes that move: a bit for each, the first axis lowest.
     pub(super) moved: u8,
-    /// How far the motor goes that goes farthest, in parts of a step, and how many motors move.
+    /// How far the motor goes that goes farthest, in parts of a step; `moving` is how many motors move.
     pub(super) most: u16,
     pub(super) moving: u8,
-    /// `most` is in whole steps.
+    /// Whether `most` is in whole steps.
     pub(super) whole_steps: bool,
     pub(super) cruise: f32,
-    /// What the machine could do, at most twice the feed, mm/s.
+    /// The highest velocity under any override, at most twice the feed, mm/s.
     pub(super) top: f32,
     pub(super) accel: Short,
     pub(super) jerk: Short,
-    /// The least acceleration and jerk of the axes that move, 0 for none.
+    /// The least acceleration limit and the least jerk limit of the axes that move, 0 for none.
     pub(super) slowest: (Short, Short),
-    /// They may not be those of all axes that move.
+    /// Whether axes that move may have other limits than `slowest`.
     pub(super) mixed: bool,
 }
 
 impl Path {
-    /// Length and direction. 0.01 % exact, for a single axis exact.
+    /// Measures length and direction: to 0.01 %, for a single axis exactly.
     ///
-    /// The length is that of the linear axes, or of the rotary ones (degrees) if these have the longer
-    /// way; the feed, which is that of the linear axes where they move, is more by as much.
+    /// The length is that of the linear axes, or of the rotary ones (degrees) if they have the longer way. The feed
+    /// is that of the linear axes where they move; it is raised by the factor by which the length is longer.
     #[inline(never)]
     pub(super) fn measure(&mut self, from: &PerAxis<Length>, to: &PerAxis<Length>) -> Way {
         let mut all = 0u32;
@@ -97,7 +98,7 @@ impl Path {
                 *u = share(*u, size.reciprocal);
             }
         }
-        // Long moves have the time to be measured exactly, and their steps come evenly.
+        // Long moves leave the time to be measured exactly, so that their steps come evenly.
         self.length = if shift > 0 {
             length_of(&self.travel)
         } else {
@@ -107,7 +108,7 @@ impl Path {
         Way::Near
     }
 
-    /// Length and direction of a move of one axis, or of none; `way` is the size of its travel.
+    /// Measures a move of one axis, or of none; `way` is the size of its travel.
     #[inline(never)]
     fn measure_axis(&mut self, way: u32) -> Way {
         if self.moved == 0 {
@@ -123,14 +124,14 @@ impl Path {
     }
 }
 
-/// The travel in 15 bits and a sign, and the power of two that takes it back. `bits` is the union of
-/// the sizes.
+/// Reduces the travel to 15 bits and a sign. Returns the power of two that takes it back. `bits` is the union of the
+/// sizes.
 #[inline(never)]
 fn normalize(unit: &mut PerAxis<i16>, travel: &PerAxis<i32>, bits: u32) -> i8 {
     if bits >= 2 * MOST {
         return normalize_far(unit, travel, bits);
     }
-    // All 16 bits wide.
+    // Everything is 16 bits wide here.
     let (mut bits, mut shift) = (bits as u16, 0i8);
     while bits < MOST as u16 {
         bits <<= 1;
@@ -148,7 +149,7 @@ fn normalize(unit: &mut PerAxis<i16>, travel: &PerAxis<i32>, bits: u32) -> i8 {
     -shift
 }
 
-/// [`normalize`] for travel of more than 15 bits: there is time.
+/// Does what [`normalize`] does for travel of more than 15 bits, where there is time.
 #[inline(never)]
 #[small]
 fn normalize_far(unit: &mut PerAxis<i16>, travel: &PerAxis<i32>, mut bits: u32) -> i8 {
@@ -163,7 +164,7 @@ fn normalize_far(unit: &mut PerAxis<i16>, travel: &PerAxis<i32>, mut bits: u32) 
     shift
 }
 
-/// The square of a vector's length.
+/// Returns the square of a vector's length.
 #[inline(never)]
 fn square(vector: &[i16]) -> u32 {
     let mut sum = 0u32;
@@ -176,7 +177,7 @@ fn square(vector: &[i16]) -> u32 {
     sum
 }
 
-/// The length of a move, mm: that of the linear axes or of the rotary ones, whichever is longer.
+/// Returns the length of a move, mm: that of the linear axes or of the rotary ones, whichever is longer.
 #[inline(never)]
 fn length_of(travel: &PerAxis<i32>) -> f32 {
     let (linear, rotary) = travel.split_at(FIRST_ROTARY);
@@ -184,7 +185,7 @@ fn length_of(travel: &PerAxis<i32>) -> f32 {
     1e-4 * if below(linear, rotary) { rotary } else { linear }
 }
 
-/// How much longer the way of the rotary axes is than that of the linear ones.
+/// Returns the factor by which the way of the rotary axes is longer than that of the linear ones.
 #[inline(never)]
 fn stretch(travel: &PerAxis<i32>) -> f32 {
     let (linear, rotary) = travel.split_at(FIRST_ROTARY);
@@ -200,16 +201,16 @@ fn exact_norm(travel: &[i32]) -> f32 {
     sqrt(sum)
 }
 
-/// A part of the whole, given by that one's reciprocal in 2^-30, in the units of a heading; rounded down, by less than 2.
-/// Cost: 45.
+/// Returns a part of a vector in the units of a heading, rounded down, by less than 2. `reciprocal` is that of the
+/// vector's length, in 2^-30. Cost: 45.
 #[inline(never)]
 fn share(part: i16, reciprocal: u16) -> i16 {
     let share = (product(part.unsigned_abs(), reciprocal) >> 16) as i16;
     if part < 0 { -share } else { share }
 }
 
-/// A float from its first 16 bits, the top one of which may be 0, but not the next one as well, and its
-/// exponent if it is not. Cost: 30.
+/// Returns a float from its first 16 bits, and the exponent that it has if the top bit is 1. The top bit may be 0,
+/// but then the next bit is 1. Cost: 30.
 #[inline(never)]
 pub(super) fn composed(bits: u16, power: i16) -> f32 {
     let (mantissa, power) =

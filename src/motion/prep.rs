@@ -3,37 +3,40 @@
 //! Owned by the exec task, which calls [`Prep::begin`] for a block and then [`Prep::segment`] or
 //! [`Prep::last`] for each stretch of it.
 //!
-//! The motor that goes farthest in a block is dominant. Its increment is `STEP / 2^k`, so it steps on
-//! every `2^k`th tick exactly, with no jitter; `k` is as large as the shortest tick period allows, so
-//! that the other motors, which may step on any tick, stay close to their true times too. If all motors
-//! that move go equally far there are no others: then `k` is 0 as far as can be, and
-//! the interrupt has next to nothing to do (lockstep).
+//! The motor that goes farthest in a block is dominant. Its increment is `STEP / 2^k`, so that it steps on every
+//! `2^k`th tick exactly, with no jitter. `k` is as large as the shortest tick period allows: the other motors may
+//! step on any tick, and fine ticks keep them close to their true times too. If all motors that move go equally far,
+//! there are no other motors. Then `k` is 0 as far as possible, and the interrupt has next to nothing to do
+//! (lockstep).
 //!
-//! A stretch is cut to whole ticks. What is cut off is still in `left` and comes with the next stretch, as does its time:
-//! nothing is lost.
+//! A stretch is cut to whole ticks. The distance that is cut off is still in `left` and comes with the next stretch,
+//! as does its time: nothing is lost.
 //!
-//! The other motors get the rounded increment, and [`Minor::owed`] remembers exactly what rounding
-//! took: a segment in which it comes to half a unit a tick or more is corrected by a unit a tick. It is
-//! carried from segment to segment, and over the end of the block, so that nothing adds up.
+//! The other motors get the rounded increment, and [`Minor::owed`] remembers exactly what rounding took. When that
+//! comes to half a unit a tick or more in a segment, the increment is corrected by a unit a tick. What is owed is
+//! carried from segment to segment, and over the end of the block, so that rounding errors do not add up.
 //!
-//! **Ends of blocks.** A block ends where its line ends, to 1/16 step ([`PART`]). If blocks ended on whole steps, a curve of
-//! short lines would be rounded twice: its corners, and the steps between them. Ticks rarely fit such a distance. So the
-//! last stretch of a block takes the nearest number of whole ticks. What each motor is then short of, or ahead by, is its
-//! `debt`: what lines have told it to go, less what segments have, modulo 2^16. The next block starts from where the motors are and so pays it. The time of the missing part is carried over with it.
-//! A dominant motor thus keeps its phase, and its steps stay even, over any number of blocks.
+//! **Ends of blocks.** A block ends where its line ends, to 1/16 step ([`PART`]). If blocks ended on whole steps, a
+//! curve of short lines would be rounded twice: at its corners, and at the steps between them. Ticks rarely fit
+//! this distance. So the last stretch of a block takes the nearest number of whole ticks. What each motor is then short
+//! of, or ahead by, is its `debt`: how far lines have told it to go, less how far segments have, modulo 2^16. The
+//! next block starts from where the motors are, and so pays the debt. The time of the missing part is carried over
+//! with it. A dominant motor thus keeps its phase, and its steps stay even, over any number of blocks.
 //!
-//! **Ends of motion.** A block that comes to rest, or that no line follows, is made to its end (`exact`), with finer ticks
-//! for the remainder if need be. That end is less than half a step from the whole step it is rounded to
-//! ([`FRACTIONS`](super::block::FRACTIONS)), by more than rounding can leave. So the position is exact whenever the machine rests.
-//! Blocks of more than 2,030 steps do not fit 1/16 steps: they are a whole number of steps long, and keep the fraction with which they begin.
+//! **Ends of motion.** A block that comes to rest, or that no line follows, is made to its very end (`exact`), with
+//! finer ticks for the remainder if necessary. That end is so much less than half a step from the whole step to which
+//! it is rounded ([`FRACTIONS`](super::block::FRACTIONS)) that rounding errors cannot lead to another step. So the
+//! position is exact whenever the machine rests. Distances in blocks of more than 2,030 steps do not fit 1/16 steps:
+//! these blocks are a whole number of steps long, and keep the fraction with which they begin.
 //!
-//! **Ends of segments.** A segment with one or two ticks a step ends on a step of the dominant motor as far as possible. So the next step
-//! is in time when a later segment has one tick a step. A segment with more ticks a step ends in the middle between two steps: a tick without
-//! a pulse leaves the interrupt time to load the next segment.
+//! **Ends of segments.** A segment with one or two ticks a step ends on a step of the dominant motor as far as
+//! possible. So the next step is in time even if a later segment has one tick a step. A segment with more ticks a
+//! step ends in the middle between two steps: a tick without a pulse leaves the interrupt time to load the next
+//! segment.
 //!
-//! **Pressure advance.** An extruder is ahead of its line by what [`advance`](super::advance) says. Its lead is added to segments that are complete but for
-//! that, and counted apart from the line, which knows nothing of it. So all that is said here of ends holds for what the line asks for, and at rest
-//! there is no lead ([`Prep::relax`]).
+//! **Pressure advance.** An extruder is ahead of its line by its lead ([`advance`](super::advance)). The lead is
+//! added to segments that are otherwise complete, and is counted apart from the line. So all that is said here of
+//! ends holds for what the line asks for, and at rest there is no lead ([`Prep::relax`]).
 //!
 //! Cost on AVR: 600 cycles a segment and 200 for each motor that moves; 400 for `begin`, and 300 for each
 //! motor when `k` changes.
@@ -56,91 +59,91 @@ use crate::hal::arithmetic::product;
 use minor::{Minor, even, share};
 use ticks::{FINE, bit, coarsen, finer, grain, whole_ticks};
 
-/// Phase units in the part of a step to which blocks know their ends.
+/// Phase units in 1/16 step, the resolution of the ends of blocks.
 const PART: u16 = STEP >> PARTS_LOG2;
 
-/// The exponent of it.
+/// The exponent of [`PART`].
 const PART_LOG2: u8 = STEP_LOG2 - PARTS_LOG2;
 
-/// Half a step, in such parts.
+/// Half a step, in 1/16 step.
 const HALF: u8 = 1 << (PARTS_LOG2 - 1);
 
-/// Most ticks of a segment that has more than steps ask for.
+/// Most ticks of a segment that has more ticks than its steps need.
 const LIMIT_MAX: u16 = 2000;
 
 /// Longest stretch, CPU cycles.
 pub const CYCLES_MAX: u32 = 1 << 20;
 
-/// Most time of moves without steps that is kept, CPU cycles: a minute.
+/// Longest time of moves without steps that is kept for later, CPU cycles: a minute.
 const KEPT_MAX: u32 = (1 << 30) - 1;
 
-/// Longest tick.
+/// Longest period of a tick, CPU cycles.
 const PERIOD_MAX: u32 = 0xFFFF;
 
-/// Blocks that take longer than 1/16 s have fine ticks: that power of two.
+/// Blocks that take longer than 1/16 s have fine ticks. This is the exponent of that time, as a power of two.
 pub const FINE_LOG2: i8 = -4;
 
-/// Latest cycle of a tick at which the interrupt may find itself ready for its pulses.
+/// Latest cycle of a tick at which the interrupt may become ready for its pulses.
 const SETTLE: u8 = 76;
 
-/// Latest cycle behind its tick at which a segment's directions stand.
+/// Latest cycle of its first tick at which the directions of a segment stand.
 const TURNED: u16 = 158;
 
-/// Ticks and period of a segment for motors beside a block that stands still.
+/// Ticks and period of a segment for motors that move beside a block that stands still.
 const ASIDE: (u16, u16) = (64, 500);
 
-/// Of one in which they go no farther than 1/32 step.
+/// Ticks and period of a segment in which motors beside a block go no farther than 1/32 step.
 const ASIDE_LITTLE: (u16, u16) = (1, 16_000);
 
-/// A lockstep segment has at least half as many ticks, if it is shorter than as many steps.
+/// A lockstep segment that is shorter than this many steps has at least half this many ticks.
 const LOCKSTEP_TICKS: u16 = 16;
 
-/// If it is longer than so many cycles: a shorter one may not have the time for as many.
+/// A segment longer than this, in cycles, has the time for [`LOCKSTEP_TICKS`]; a shorter one may not.
 const LOCKSTEP_CYCLES: u32 = LOCKSTEP_TICKS as u32 * TICKS[0].coarsest as u32;
 
 /// The state of the preparation of one block.
 #[derive(Debug)]
 #[repr(C)]
 pub struct Prep {
-    // What is used most comes first: the CPU reaches 64 bytes from a pointer.
+    // The most used fields come first: the CPU reaches 64 bytes from a pointer.
     /// Phase units of the dominant motor until the block's end.
     left: u32,
-    /// Time that has not been used, CPU cycles.
+    /// Time of earlier stretches that no segment has used, CPU cycles.
     time: i32,
-    /// Way of the dominant motor, in parts of a step or in whole steps.
+    /// Distance of the dominant motor in the block, in 1/16 step or in whole steps (`parts`).
     most: u16,
-    /// The ways of this block are in parts of a step ([`PART`]).
+    /// Whether distances of this block are in 1/16 step ([`PART`]).
     parts: bool,
-    /// The shift for which increments have been computed; none yet if above [`STEP_LOG2`].
+    /// The exponent of the ticks for which increments have been computed; above [`STEP_LOG2`] if there are none yet.
     shift: u8,
-    /// Motors that go as far as the dominant one.
+    /// Motors that go as far as the dominant one, which is one of them, as bits.
     full: u8,
-    /// Motors that go less far.
+    /// Motors that go less far, as bits.
     minor: u8,
-    /// Motors that move, less one.
+    /// Number of motors that move, less one.
     others: u8,
     backwards: u8,
-    /// Ticks are to be as fine as can be.
+    /// Whether ticks are to be as fine as possible.
     fine: bool,
-    /// Ticks are to be as few as in a block of one segment.
+    /// Whether ticks are to be as few as in a block of one segment.
     coarse: bool,
-    /// A motor has turned round, and no segment tells of it yet.
+    /// Whether a motor has turned round and no segment has the new direction yet.
     turned: bool,
     /// How long directions must stand before the first step, CPU cycles.
     setup: u16,
-    /// What the dominant motor's way is without debts, in the same units, signed.
+    /// Distance of the dominant motor in the line itself, without debts, signed, in the units of `most`.
     own: i16,
     /// How far the dominant motor is past half a step, in its direction, at the block's end: 1/16 step, modulo 16.
     past: u8,
     /// Phase units, positive forwards: how far blocks have told a motor to go, the running one included, less how far segments
     /// have. Modulo 2^16; at the end of a block it is less than that.
     debt: [i16; MOTORS],
-    /// How far the end of the block is beyond half a step before the whole step that it is rounded to, in 1/16 step.
+    /// How far the end of the block is past the point half a step before its rounded whole step, in 1/16 step.
     fraction: [u8; MOTORS],
     minors: [Minor; MOTORS],
-    /// By the number of motors that move, less one.
+    /// The paces by the number of motors that move, less one.
     paces: [Pace; MOTORS],
-    /// A segment that comes behind one in which directions settle.
+    /// A segment that is to follow the tick in which directions settle.
     held: Option<Segment>,
     extruder: [Advance; EXTRUDERS],
 }
@@ -174,7 +177,7 @@ impl Prep {
         }
     }
 
-    /// From the next block on, this is what the drivers ask for.
+    /// Sets what the drivers ask for, from the next block on.
     #[inline(never)]
     #[small]
     pub fn set_drivers(&mut self, drivers: Drivers) {
@@ -182,10 +185,10 @@ impl Prep {
         self.setup = drivers.setup();
     }
 
-    /// The segment that comes before any other, if there is one.
+    /// Takes the segment that comes before any other. Returns false if there is none.
     #[inline(always)]
     pub fn held(&mut self, out: &mut Segment) -> bool {
-        // Looked at first: to take nothing costs as much as to take something.
+        // Looked at first: taking nothing costs as much as taking something.
         self.held.is_some() && self.release(out)
     }
 
@@ -197,24 +200,24 @@ impl Prep {
         true
     }
 
-    /// Whether ticks are to be as fine as can be, from now on, or as coarse.
+    /// Sets whether ticks are to be as fine as possible from now on, or as coarse.
     #[inline(always)]
     pub fn refine(&mut self, fine: bool, coarse: bool) {
         (self.fine, self.coarse) = (fine, coarse);
     }
 
-    /// Phase units of the dominant motor in the block that no segment has covered yet.
+    /// Phase units that the dominant motor still has to go in the block, without what segments cover.
     pub fn left(&self) -> u32 {
         self.left
     }
 
-    /// How far the dominant motor goes in the block, debts apart, phase units. What a debt adds belongs to the first stretch, as
-    /// does its time.
+    /// How far the line itself takes the dominant motor in the block, without debts, phase units. What a debt adds
+    /// belongs to the first stretch, as does its time.
     pub fn own(&self) -> u32 {
         product(self.own.unsigned_abs(), if self.parts { PART } else { STEP })
     }
 
-    /// `cycles` with what has been kept of the time before, at least 1.
+    /// Returns `cycles` and the time that has been kept, at least 1.
     #[inline(always)]
     fn with_kept(&self, cycles: u32) -> u32 {
         // What is kept is below 2^30.
@@ -222,7 +225,7 @@ impl Prep {
         if sum > 0 { sum as u32 } else { 1 }
     }
 
-    /// Time that has not been used, CPU cycles.
+    /// The time of earlier stretches that no segment has used, CPU cycles.
     #[inline(always)]
     pub fn kept(&self) -> i32 {
         self.time
@@ -233,16 +236,17 @@ impl Prep {
         self.time = 0;
     }
 
-    /// Prepares a stretch of `cycles`, up to [`CYCLES_MAX`], at the end of which the dominant motor has
-    /// about `left` phase units to go. False, and no segment, when that time is kept for the next stretch.
+    /// Prepares a stretch of `cycles`, up to [`CYCLES_MAX`], at the end of which the dominant motor has about `left`
+    /// phase units to go. Returns false, and no segment, when the time is kept for the next stretch.
     pub fn segment(&mut self, left: u32, cycles: u32, out: &mut Segment) -> bool {
         let travel = self.left.saturating_sub(left);
         let cycles = self.with_kept(cycles);
         let limit = self.most_ticks(cycles, travel);
         let (mut fine, mut shift) = coarsen(travel, limit);
-        // From where a tick is a step; of fine ticks, from the middle between two, where the interrupt has time for a segment.
+        // The end is aligned to a step of the dominant motor; with fine ticks to the middle between two steps, where
+        // the interrupt has time to load a segment.
         let middle = if shift < STEP_LOG2 - 1 { STEP / 2 } else { 0 };
-        // No tick is longer than a step.
+        // In 16 bits: no tick is longer than a step.
         let at = (self.left as u16)
             .wrapping_sub((u16::from(self.past) << PART_LOG2).wrapping_add(middle));
         let mut step = bit(shift);
@@ -260,7 +264,7 @@ impl Prep {
         if travel <= u32::from(short) {
             return self.idle(cycles, out);
         }
-        // Whole ticks of the travel without what is short.
+        // The whole ticks in the travel up to the aligned end.
         let part = travel as u16 & rest;
         if short > part {
             ticks -= u32::from((short - part + rest) >> shift);
@@ -274,33 +278,35 @@ impl Prep {
         true
     }
 
-    /// The exponent of ticks that end on the steps of the dominant motor: `fits`, if `shift` is more and there is time.
+    /// Returns the exponent of ticks that end on the steps of the dominant motor: `fits` if that is less than `shift`
+    /// and there is time for such ticks, else `shift`.
     fn fitting(&self, shift: u8, fits: u8, cycles: u32, travel: u32) -> u8 {
-        // A period that is no longer than the shortest may have been made as long.
+        // A period that comes out as the shortest may have been raised to it: then there is no time.
         let finer = fits < shift
             && self.period(cycles, finer(travel, fits), fits) > u32::from(self.paces().settles);
         if finer { fits } else { shift }
     }
 
-    /// Prepares the whole of a block that begins: `cycles` for it, no more than a few milliseconds. False,
-    /// and no segment, when it has no steps; the time is kept then.
+    /// Prepares the whole of a block that begins, in `cycles`, which are no more than a few milliseconds. Returns
+    /// false, and no segment, when the block has no steps; the time is kept then.
     ///
-    /// What `last` gives for such a block, in fewer cycles. Cost: 700, and 400 for each motor but the dominant.
+    /// Makes what `last` makes of such a block, in fewer cycles. Cost: 700, and 400 for each motor but the dominant
+    /// one.
     #[inline(never)]
     pub fn whole(&mut self, cycles: u32, exact: bool, out: &mut Segment) -> bool {
         let cycles = self.with_kept(cycles);
         let most = self.most;
         let limit = self.limit(cycles, COARSEST);
-        // What has been kept may be long.
+        // The time that has been kept may be long.
         if exact || most == 0 || !self.parts || cycles >> 24 != 0 {
             return self.last_of(cycles, limit, exact, out);
         }
         if most < u16::from(HALF) {
-            // Nothing moves yet: the next block goes all the way.
+            // Less than half a step. Nothing moves yet: the next block goes this distance too.
             self.left = 0;
             return self.last_of(cycles, limit, exact, out);
         }
-        // Ticks of a part, finer or coarser; and so many times the period.
+        // Begins with ticks of 1/16 step, and makes them finer or coarser. `time / most` stays the period.
         let (mut ticks, mut step, mut time) = (most, PART, cycles);
         if ticks > limit {
             let (mut half, mut upper) = (0, (PART >> 8) as u8);
@@ -334,8 +340,8 @@ impl Prep {
         true
     }
 
-    /// Completes a segment that has ticks and a period, in the `cycles` there are: `step` for the motors that
-    /// move as the dominant one, and what `minor` says for the others.
+    /// Completes a segment that has ticks and a period, where there are `cycles` of time. Motors that go as far as
+    /// the dominant one get the increment `step`; the others get what `minor` returns.
     #[inline(always)]
     fn complete(
         &mut self,
@@ -345,7 +351,8 @@ impl Prep {
         minor: impl Fn(&mut Self, usize) -> u16,
     ) {
         let used = product(out.ticks, out.period);
-        // Time that cannot be caught up is let go, or the machine would race to do so. A tick may be half ahead.
+        // Lateness of more than 1,000 cycles is forgotten, or the machine would race to catch up. Half a tick more
+        // comes from rounding to whole ticks.
         let mut time = cycles as i32 - used as i32;
         if time < -1000 {
             time = time.max(-1000 - i32::from(out.period / 2));
@@ -383,8 +390,8 @@ impl Prep {
         }
     }
 
-    /// Prepares the last stretch of the block, everything that is left, in `cycles`; all of it if `exact`, else the nearest
-    /// number of ticks. False, and no segment, when nothing is left; the time is kept then.
+    /// Prepares the last stretch of the block, all that is left of it, in `cycles`: to the very end if `exact`, else
+    /// to the nearest number of ticks. Returns false, and no segment, when nothing is left; the time is kept then.
     pub fn last(&mut self, cycles: u32, exact: bool, out: &mut Segment) -> bool {
         let cycles = self.with_kept(cycles);
         let limit = self.most_ticks(cycles, self.left);
@@ -402,7 +409,7 @@ impl Prep {
         if exact && left < u32::from(STEP) {
             let fits = left.trailing_zeros() as u8;
             if fits > shift {
-                // The rest of it, in no more ticks than need be.
+                // The remainder, in no more ticks than necessary.
                 (fine, shift) = (finer(left, fits), fits);
             }
         }
@@ -410,10 +417,10 @@ impl Prep {
         let period = self.period(cycles, fine, shift).min(PERIOD_MAX);
         let tick = bit(shift);
         if ticks > u32::from(TICKS_MAX) {
-            // Too much for one segment: a part of it, and the rest when asked again.
+            // Too much for one segment. This segment takes a part; the rest comes with the next call.
             ticks = TICKS_MAX.into();
         } else if !exact {
-            // The nearest; what is over is never above half a tick then.
+            // The nearest number: what is over is never more than half a tick.
             ticks += u32::from(left as u16 & (tick - 1) > tick / 2);
             self.left = product(ticks as u16, tick);
         }
@@ -421,15 +428,15 @@ impl Prep {
         true
     }
 
-    /// The paces of the motors that move. With a motor above the second the interrupt goes through all of them (`dda::WIDE`), so that
-    /// two take as long as three.
+    /// Returns the paces for the motors that move. With a motor above the second, the interrupt goes through all
+    /// motors (`dda::WIDE`), so that two motors take as long as three.
     fn paces(&self) -> &Pace {
         let is_wide = self.others == 1 && self.full | self.minor > 0b11;
         &self.paces[usize::from(if is_wide { 2 } else { self.others })]
     }
 
-    /// Most ticks for a stretch of `travel`: fine ones, if they are to be, where no more than every fourth tick is a step. The
-    /// interrupt takes longer for a tick with a step, and would leave too little to exec.
+    /// Returns the most ticks for a stretch of `travel`. Ticks are fine if they are to be and no more than every
+    /// fourth one is a step: a tick with a step takes the interrupt longer, and would leave too little time to exec.
     #[inline(never)]
     fn most_ticks(&self, cycles: u32, travel: u32) -> u16 {
         if self.fine {
@@ -441,7 +448,7 @@ impl Prep {
         self.limit(cycles, if self.coarse { COARSEST } else { self.paces().coarse })
     }
 
-    /// Most ticks for a stretch.
+    /// Returns the most ticks for a stretch of `cycles` at `pace`.
     #[inline(always)]
     fn limit(&self, cycles: u32, pace: u16) -> u16 {
         let in_lockstep = self.minor == 0 && !self.leads();
@@ -449,13 +456,13 @@ impl Prep {
             return LOCKSTEP_TICKS;
         }
         let cycles = if cycles > PERIOD_MAX { u16::MAX } else { cycles as u16 };
-        // Of 22 bits, 16 are dropped for nothing.
+        // Shifts by 22 bits in all: dropping 16 of them costs nothing.
         let limit = (product(cycles, pace) >> 16) as u16 >> 6;
         limit.clamp(1, if in_lockstep { LOCKSTEP_TICKS } else { LIMIT_MAX })
     }
 
-    /// Cycles from tick to tick when a stretch of so many parts of a tick ([`coarsen`]) takes `cycles`; no less than
-    /// can be sustained, at most 2^16 if it does not fit 16 bits.
+    /// Returns the cycles from tick to tick when a stretch of `fine` parts of a tick ([`coarsen`]) takes `cycles`.
+    /// The period is no less than can be sustained; it is 2^16 if it does not fit 16 bits.
     fn period(&self, cycles: u32, fine: u32, shift: u8) -> u32 {
         let (mut cycles, mut ticks) =
             (if shift < FINE { cycles << shift } else { cycles << FINE }, fine);
@@ -471,8 +478,8 @@ impl Prep {
         u32::from(period.max(self.paces().shortest))
     }
 
-    /// Prepares a pause: the next step is too far off. A tick of the time there is, at most; short times
-    /// are kept.
+    /// Prepares a pause, because the next step is too far off: a single tick, as long as the time there is or as the
+    /// longest period. Returns false, and keeps the time, if that is short.
     fn idle(&mut self, cycles: u32, out: &mut Segment) -> bool {
         if cycles < PERIOD_MAX / 2 {
             self.time = cycles as i32;
@@ -480,18 +487,18 @@ impl Prep {
         }
         let period = if cycles > PERIOD_MAX { u16::MAX } else { cycles as u16 };
         self.time = (cycles - u32::from(period)) as i32;
-        // By far long enough for directions.
+        // By far long enough for directions to settle.
         self.turned = false;
         self.pause(1, period, out);
         true
     }
 
-    /// A segment in which nothing moves.
+    /// Makes a segment in which nothing moves.
     pub fn pause(&self, ticks: u16, period: u16, out: &mut Segment) {
         *out = Segment { ticks, period, backwards: self.backwards, ..Segment::default() };
     }
 
-    /// A segment of `ticks` in each of which the dominant motor travels a `step` of `1 << shift`.
+    /// Makes a segment of `ticks`, in each of which the dominant motor travels `step`, which is `1 << shift`.
     #[inline(never)]
     fn emit(
         &mut self,
@@ -513,8 +520,9 @@ impl Prep {
         self.complete(cycles, step, out, |prep, m| prep.minors[m].advance(ticks, prep.most));
     }
 
-    /// The first segment after motors have turned round, or, if its first steps come too soon after
-    /// that, a tick in which directions settle. Its time is not made up for.
+    /// Gives directions time to settle after motors have turned round. If the first steps of `segment` come too soon,
+    /// it becomes a tick in which directions settle, and the steps come in the next segment. The time of that tick is
+    /// not made up for.
     #[inline(never)]
     fn behind_turn(&mut self, segment: &mut Segment) {
         self.turned = false;
@@ -526,7 +534,7 @@ impl Prep {
         self.pause(1, (self.setup - stand).max(self.paces().shortest), segment);
     }
 
-    /// Computes the increments for ticks in which the dominant motor travels `1 << shift`.
+    /// Computes the increments for ticks in which the dominant motor travels `step`, which is `1 << shift`.
     #[inline(never)]
     fn scale(&mut self, shift: u8, step: u16) {
         let first = core::mem::replace(&mut self.shift, shift) == u8::MAX && self.parts;
@@ -535,7 +543,7 @@ impl Prep {
             let minor = &mut self.minors[M];
             (minor.increment, minor.remainder) = share(minor.way, step, most);
             if first {
-                // Its way has them.
+                // The motor's distance includes what it owed.
                 minor.owed = 0;
             }
         });
@@ -553,7 +561,7 @@ mod tests {
     use super::super::block::{Extent, Line};
     use super::*;
 
-    /// Three steps of 50 us and a half: what is left takes half as long as a step, not sixteen of the shortest ticks.
+    /// Three and a half steps of 50 us: the half that is left takes half as long as a step, not sixteen of the shortest ticks.
     #[test]
     fn a_little_rest_in_lockstep_takes_its_time() {
         let (mut prep, mut out) = (Prep::new(), Segment::default());

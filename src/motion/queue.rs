@@ -1,8 +1,8 @@
 //! The block queue, seen from the planner's side: a ring of blocks, and the speed constraints that say how fast they
 //! may be run. Exec's side is `source`.
 //!
-//! The planner changes the speed constraints under the ceiling lock only, exec at any time. When the ring is
-//! full the planner waits ([`BlockQueue::free`]).
+//! The planner changes the speed constraints only under the ceiling lock; exec changes them at any time. When the
+//! ring is full the planner waits ([`BlockQueue::free`]).
 
 use avr_embassy::{InterruptEnd, Shared};
 
@@ -16,38 +16,39 @@ use crate::hal::exec;
 use crate::hal::ring::{Ceiling, Index, Prefilled, Ring};
 use crate::hal::{Interrupt, LOOK_AHEAD, Thread};
 
-/// Blocks the planner can queue, plus one slot that stays empty. Sequence numbers have a bit less than an [`Index`].
+/// Blocks the planner can queue, plus one slot that stays empty. Sequence numbers have one bit less than an
+/// [`Index`].
 pub const BLOCKS: usize = LOOK_AHEAD + 1;
 const _: () = assert!(BLOCKS <= SEQ as usize + 1);
 
 /// Blocks that can wait at once; what `qr` shows of an idle machine.
 pub const CAPACITY: usize = BLOCKS - 1;
 
-/// Sequence numbers.
+/// The bits of sequence numbers.
 pub(super) const SEQ: Index = Index::MAX >> 1;
 
-/// Marks a key that stays even before a lower one.
+/// Marks a key that stays even if a lower key follows.
 pub(super) const FIRM: Index = !SEQ;
 
-/// Potentials beyond so many times the square of the velocity are counted anew.
+/// Potentials beyond this many times the square of the velocity are counted anew.
 const COARSE: f32 = 1024.0;
 
-/// The logarithm of half of it.
+/// The logarithm of half of [`COARSE`].
 const FINE: i32 = 9 * OCTAVE;
 
-/// The storage.
+/// The storage of the block queue.
 pub struct BlockStore {
     ring: Ring<Block, BLOCKS>,
     constraints: Shared<SpeedConstraints>,
 }
 
 impl BlockStore {
-    /// Without blocks.
+    /// A store without blocks.
     pub const fn new() -> Self {
         Self { ring: Ring::new(), constraints: Shared::new(SpeedConstraints::new()) }
     }
 
-    /// The planner's end. `None` after the first time.
+    /// Returns the planner's end; `None` after the first time.
     pub fn queue(&'static self, thread: Thread) -> Option<BlockQueue> {
         let ring = self.ring.producer()?;
         exec::lock(thread, |ceiling| self.constraints.with(ceiling, SpeedConstraints::begin));
@@ -60,9 +61,9 @@ impl BlockStore {
         })
     }
 
-    /// Exec's end. `None` after the first time.
+    /// Returns exec's end; `None` after the first time.
     ///
-    /// Thread mode cannot have it, nor be given it:
+    /// Thread mode cannot take exec's end, nor be given it:
     ///
     /// ```compile_fail,E0308
     /// fn steal(thread: kerf::hal::Thread) {
@@ -78,7 +79,8 @@ impl BlockStore {
         Some(BlockSource::new(self.ring.consumer()?, InterruptEnd::of(&self.constraints, level)?))
     }
 
-    /// These overrides are wanted: in force at once, but for what is more than the keys are for.
+    /// Sets the overrides that are wanted. They are in force at once, except for what exceeds the overrides that the
+    /// keys are made for.
     pub fn want(&self, factors: Factors, ceiling: &Ceiling) {
         self.constraints.with(ceiling, |constraints| constraints.want(factors));
     }
@@ -95,31 +97,32 @@ machine_static! {
     pub fn store() -> BlockStore = BlockStore::new();
 }
 
-/// Free blocks.
+/// The number of free blocks.
 pub fn free() -> usize {
     CAPACITY - used()
 }
 
-/// Blocks in the queue, with the one that runs; by a call.
+/// The number of blocks in the queue, the running one included; not inlined.
 #[inline(never)]
 #[small]
 pub fn used() -> usize {
     used_here()
 }
 
-/// Blocks in the queue, with the one that runs. Cost: 15 cycles.
+/// The number of blocks in the queue, the running one included. Cost: 15 cycles.
 #[inline(always)]
 pub fn used_here() -> usize {
     store().ring.used()
 }
 
-/// Potential at the end of the queue.
+/// Returns the potential at the end of the queue.
 #[inline(always)]
 fn end(thread: Thread, constraints: &Shared<SpeedConstraints>) -> f32 {
     exec::lock(thread, |ceiling| constraints.with(ceiling, |constraints| constraints.end))
 }
 
-/// Potential at the end of the queue, counted anew if it has become large for this line. There are so many blocks, up to the `newest`.
+/// Returns the potential at the end of the queue, which is counted anew if it has become large for this line. `used`
+/// blocks are queued, and `newest` is the last of them.
 #[inline(never)]
 #[small]
 fn refined(
@@ -142,7 +145,7 @@ fn refined(
     end(thread, constraints)
 }
 
-/// The planner's end.
+/// The planner's end of the queue.
 pub struct BlockQueue {
     pub(super) thread: Thread,
     pub(super) ring: Prefilled<Block, BLOCKS>,
@@ -154,29 +157,30 @@ pub struct BlockQueue {
 }
 
 impl BlockQueue {
-    /// Free blocks.
+    /// The number of free blocks.
     pub fn free(&self) -> usize {
         self.ring.free()
     }
 
-    /// Exec has dropped all blocks: what comes next begins at rest.
+    /// Notes that exec has dropped all blocks: the next block begins at rest.
     pub fn restart(&mut self) {
         self.tail.last = None;
     }
 
-    /// Queues a block at whose start the machine stands still. False, and nothing done, when there is
-    /// no room.
+    /// Queues a block at whose start the machine stands still. Returns false, with nothing done, when there is no
+    /// room.
     pub fn push(&mut self, block: Block) -> bool {
         self.tail.last = None;
         self.put(|slot| *slot = block, None, |_| {})
     }
 
-    /// Queues a block at which the machine does not stop. False, and nothing done, when there is no room.
+    /// Queues a block at which the machine does not stop. Returns false, with nothing done, when there is no room.
     pub fn push_aside(&mut self, block: Block) -> bool {
         self.put(|slot| *slot = block, None, |_| {})
     }
 
-    /// Where the next move is to be put together, for [`BlockQueue::push_line`]: to copy a block takes time. `None` if there is no room.
+    /// Returns the place where the next move is to be put together for [`BlockQueue::push_line`], because copying a
+    /// block takes time. `None` if there is no room.
     #[inline(always)]
     pub fn next_line(&mut self) -> Option<&mut Line> {
         let body = &mut self.ring.vacant_mut()?.body;
@@ -189,11 +193,11 @@ impl BlockQueue {
         }
     }
 
-    /// Queues the move in [`BlockQueue::next_line`], whose corner may be taken at `entry`, mm/s; fills in what depends on the queue. False,
-    /// and nothing done, when there is no room.
+    /// Queues the move in [`BlockQueue::next_line`], whose corner may be taken at `entry`, mm/s. Fills in what
+    /// depends on the queue. Returns false, with nothing done, when there is no room.
     ///
-    /// Cost: 1,000 on a curve at a steady feed; 2,000 more for a corner, and 900 for each key that it
-    /// makes needless.
+    /// Cost: 1,000 on a curve at a steady feed; 2,000 more for a corner, and 900 for each key that the corner makes
+    /// needless.
     #[inline(never)]
     pub fn push_line(&mut self, entry: f32, number: u32) -> bool {
         let (thread, constraints, newest) = (self.thread, self.constraints, self.newest);
@@ -202,7 +206,7 @@ impl BlockQueue {
             return false;
         };
         line.start = end(thread, constraints);
-        // Nothing is there, or it is plainly fine: no need to compare.
+        // Usually the queue is empty, or floats are plainly fine: then there is no need to compare.
         if some(line.start) && log(line.start) >= 2 * log(line.cruise) + FINE {
             line.start = refined(thread, constraints, line, (newest, used));
         }
@@ -211,7 +215,8 @@ impl BlockQueue {
         self.put(|slot| slot.set_line(number), key, |constraints| constraints.end = behind)
     }
 
-    /// Puts a block, which `complete` completes, into the ring and what follows from it into the speed constraints, all at once for exec.
+    /// Puts a block, which `complete` completes, into the ring, and what follows from it into the speed constraints.
+    /// Exec sees both at once. Returns false, with nothing done, when there is no room.
     fn put(
         &mut self,
         complete: impl FnOnce(&mut Block),
@@ -240,8 +245,8 @@ impl BlockQueue {
         true
     }
 
-    /// How many of the last keys a lower one makes needless. Exec goes on meanwhile, which only passes the first ones: it
-    /// must not wait for the mathematics of a whole queue.
+    /// Returns how many of the last keys a lower `key` makes needless. Meanwhile exec goes on, and passes only the
+    /// first keys: it must not wait for the mathematics of a whole queue.
     #[inline(never)]
     fn needless(&self, key: f32) -> Index {
         let newest = self.newest;
@@ -266,7 +271,7 @@ impl BlockQueue {
         let back = usize::from(self.newest.wrapping_sub(seq) & SEQ);
         match self.ring.pushed(back) {
             Some(Block { body: Body::Line(line), .. }) => line.key(&self.tail.factors),
-            // Gone already: no limit.
+            // The block is gone already: no limit.
             _ => f32::MAX,
         }
     }

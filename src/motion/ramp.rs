@@ -1,9 +1,9 @@
-//! A ramp laid out to its end: from a state to a steady velocity at a place.
+//! A ramp that is laid out to its end: from the present state to a steady velocity at a place.
 //!
-//! Owned by the [`Governor`], exec level. Five phases of constant jerk: an acceleration ends, the
-//! velocity is kept, the deceleration builds up, is kept, and ends. Velocity and distance are polynomials of the time that
-//! is left, so a slice is the difference of two values: nothing adds up, the ramp ends where it was meant to, and a slice in
-//! which phases change costs no more than any other.
+//! Owned by the [`Governor`], exec level. A ramp has five phases of constant jerk: an acceleration ends, the velocity
+//! is kept, the deceleration builds up, is kept, and ends. Velocity and distance are polynomials of the time that is
+//! left, so that a slice is the difference of two values. Errors do not add up, the ramp ends where it was meant to,
+//! and a slice in which phases change costs no more than any other.
 //!
 //! Units: mm, s. Cost on AVR: 3,500 cycles to lay out, 1,000 to 1,700 a slice.
 
@@ -15,23 +15,23 @@ use crate::math::sqrt;
 /// What is left of a ramp.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Ramp {
-    /// Time and distance to its end.
+    /// Time and distance to the end of the ramp.
     time: f32,
     distance: f32,
-    /// Velocity at its end, and where its acceleration is 0 before.
+    /// Velocity at the end of the ramp; `top` is the velocity before the deceleration, where the acceleration is 0.
     velocity: f32,
     top: f32,
-    /// How long before the end the deceleration begins to end, and reaches its most.
+    /// How long before the end the deceleration begins to end (`rise`), and reaches its most (`hold`).
     rise: f32,
     hold: f32,
     /// How long before the end the top is reached.
     coast: f32,
-    /// Half of the jerk, and by how much alpha changes in a second.
+    /// Half of the jerk; `pace` is by how much alpha changes in a second.
     half: f32,
     pace: f32,
     /// Distance to the end where the deceleration begins.
     begin: f32,
-    /// What comes after the ramp is known; else the ramp ends in a standstill.
+    /// Whether it is known what comes after the ramp; otherwise the ramp ends in a standstill.
     pub closed: bool,
 }
 
@@ -47,12 +47,12 @@ pub(super) enum Phase {
 }
 
 impl Ramp {
-    /// How long before the end the deceleration begins.
+    /// Returns how long before the end the deceleration begins.
     fn fall(&self) -> f32 {
         self.hold + self.rise
     }
 
-    /// Velocity and distance to the end at a time before it.
+    /// Returns the velocity and the distance to the end at `time` before the end.
     #[inline(never)]
     fn at(&self, time: f32) -> (f32, f32) {
         const THIRD: f32 = 1.0 / 3.0;
@@ -62,7 +62,7 @@ impl Ramp {
             return (w + gain, time * (w + gain * THIRD));
         }
         if !below(self.hold, time) {
-            // As if it had decelerated so from half of the rise on.
+            // As if the deceleration had been constant from half of the rise on.
             let accel = scaled(self.half * self.rise, 1);
             let since = time - scaled(self.rise, -1);
             let gain = accel * since;
@@ -78,21 +78,21 @@ impl Ramp {
             return (self.top, self.begin + self.top * (time - fall));
         }
         if !some(self.coast) {
-            // It does nothing but end an acceleration.
+            // The ramp does nothing but end an acceleration.
             return self.off_top(time);
         }
         let (velocity, far) = self.off_top(time - self.coast);
         (velocity, self.begin + self.top * (self.coast - fall) + far)
     }
 
-    /// Velocity so long before or after the top, and the distance between.
+    /// Returns the velocity `time` before or after the top, and the distance between.
     #[inline(never)]
     fn off_top(&self, time: f32) -> (f32, f32) {
         let loss = self.half * time * time;
         (self.top - loss, time * (self.top - loss * (1.0 / 3.0)))
     }
 
-    /// For how long the acceleration of now has built up; less than 0 if it is a deceleration.
+    /// Returns for how long the present acceleration has built up; less than 0 if it is a deceleration.
     fn built(&self) -> f32 {
         let (time, fall) = (self.time, self.fall());
         if !below(self.rise, time) {
@@ -108,7 +108,7 @@ impl Ramp {
         }
     }
 
-    /// Whether it does nothing but end an acceleration, at this velocity.
+    /// Whether the ramp does nothing but end an acceleration, at this velocity.
     pub fn ends_at(&self, velocity: f32) -> bool {
         same(self.velocity, velocity) && same(self.top, velocity)
     }
@@ -131,32 +131,32 @@ pub(super) struct Leveling {
     pub distance: f32,
 }
 
-/// The share of the acceleration limit that a change of velocity by `drop` reaches.
+/// Returns the share of the acceleration limit that a change of velocity by `drop` reaches.
 fn share_of(drop: f32, kappa: f32) -> f32 {
     let twice = scaled(kappa, 1);
     if below(drop, twice) { sqrt(ratio(drop, twice)) } else { 1.0 }
 }
 
 impl Governor {
-    /// Gives up the ramp: the state is that of now.
+    /// Gives up the ramp, and takes over its present acceleration.
     #[inline(never)]
     pub(super) fn leave_ramp(&mut self) {
         self.take_alpha();
         self.ramp = None;
     }
 
-    /// The state is that of now, if there is a ramp, which runs still.
+    /// Takes over the present acceleration of the ramp, if there is one. The ramp goes on.
     #[inline(never)]
     pub(super) fn take_alpha(&mut self) {
         if let Some(ramp) = &self.ramp {
             let alpha = greater(ramp.built() * ramp.pace, -1.0);
-            // What rounding leaves is no acceleration that could be ended.
+            // Rounding may leave an acceleration that is too small to be ended.
             self.alpha = if below(alpha.abs(), 1e-4) { 0.0 } else { alpha };
         }
     }
 
-    /// Lays out a ramp from the state down to `w`, as hard as the limits allow, with `slack` mm at the top before. A deceleration
-    /// that is more than it takes ends at once, below `w`.
+    /// Lays out a ramp from the present state down to `w`, as hard as the limits allow, with `slack` mm at the top
+    /// before. A deceleration that is stronger than necessary ends at once, below `w`.
     #[inline(never)]
     pub(super) fn lay(&mut self, w: f32, slack: f32, closed: bool) {
         let (alpha, limits) = (self.alpha, &self.limits);
@@ -171,7 +171,7 @@ impl Governor {
         }
         let rise = greater(share, 1e-4) * build;
         let half = scaled(limits.jerk, -1);
-        // Only the whole deceleration is kept.
+        // The deceleration is kept only where it reaches its limit.
         let hold =
             if same(share, 1.0) { greater(ratio(top - w, limits.accel), rise) } else { rise };
         let fall = hold + rise;
@@ -198,7 +198,7 @@ impl Governor {
         }
     }
 
-    /// How an acceleration ends so that the velocity comes to `top`. Cost: 1,100.
+    /// Returns how an acceleration ends so that the velocity comes to `top`. Cost: 1,100.
     #[inline(never)]
     pub(super) fn leveling(&self, top: f32) -> Leveling {
         let gain = top - self.velocity;
@@ -250,7 +250,7 @@ impl Governor {
         (_, ramp.distance) = ramp.at(rise);
     }
 
-    /// A slice of the ramp: to its end, if little more is left.
+    /// Works out a slice of the ramp: to its end, if little more is left.
     #[inline(never)]
     pub(super) fn follow(&mut self, seconds: f32) {
         let Some(ramp) = &mut self.ramp else { return };

@@ -1,13 +1,13 @@
-//! The keys of what is queued, worked out anew for other overrides.
+//! Makes the keys of what is queued anew, for other overrides.
 //!
-//! Called by the planner when the factors that are wanted are not those of the keys. Blocks and their
-//! potentials stay as they are: corners are stored whatever the feeds. From the newest line to the oldest, a
-//! key is kept if it is lower than all behind it, and a limit for whoever comes from the line before, by more than a
-//! thousandth. Exec goes on by the old keys until the new ones are put in their place, all at once. They are made on the stack, so
-//! that exec waits for no more than a copy.
+//! Called by the planner when the factors that are wanted are not those of the keys. Blocks and their potentials stay
+//! as they are, because corners are stored whatever the feeds. The lines are looked at from the newest to the oldest.
+//! A key is kept if it is lower than all behind it, and limits the line before it by more than a thousandth. Exec
+//! goes on by the old keys until the new ones are put in their place, all at once. The new keys are made on the
+//! stack, so that exec waits only for a copy.
 //!
-//! Cost on AVR: 800 cycles a line where the feed is steady, 2,000 at a corner that limits; all that is queued 52,000, or 127,000 if
-//! each line is a corner. Exec waits for 2,000 of them.
+//! Cost on AVR: 800 cycles a line where the feed is steady, 2,000 at a corner that limits. For all that is queued
+//! 52,000, or 127,000 if each line is a corner. Exec waits for 2,000 of these cycles.
 
 use super::block::{Block, Body, Line};
 use super::factors::{Factors, Reserve};
@@ -19,18 +19,18 @@ use super::tail::WORTH;
 use crate::hal::exec;
 use crate::hal::ring::Index;
 
-/// What limits a line, of all that is behind it.
+/// What the lines behind a line require of it.
 struct Behind {
     /// The least key.
     key: f32,
-    /// The lowest velocity up to the next place that is worth a key.
+    /// The lowest velocity of the lines up to the next place that is worth a key.
     low: f32,
-    /// What potentials counted so far have less than those of the line that is asked about.
+    /// By how much `key` has been raised, because potentials of older lines are higher.
     left_out: f32,
     known: Known,
 }
 
-/// The line that was asked about last, which the next one mostly equals: its velocity, and how it brakes.
+/// The line that was asked about last: its velocity, and how it brakes. The next line mostly has the same.
 #[derive(Default)]
 struct Known {
     cruise: f32,
@@ -41,7 +41,8 @@ struct Known {
 }
 
 impl Behind {
-    /// Potentials of the next line to be asked about have so much more than those at the end of the queue.
+    /// Takes into account that potentials of the next line to be asked about are `left_out` higher than at the end of
+    /// the queue.
     fn count_from(&mut self, left_out: f32) {
         if left_out.to_bits() != self.left_out.to_bits() {
             self.key += left_out - self.left_out;
@@ -49,7 +50,8 @@ impl Behind {
         }
     }
 
-    /// The velocity of the key of `this` line, that follows `before` without a stop, and whether it is firm; none if it needs no key.
+    /// Returns the velocity of the key of `this` line, and [`FIRM`] or 0; `None` if the line needs no key. It follows
+    /// `before` without a stop, or begins at rest if that is `None`.
     #[inline(never)]
     fn key(
         &mut self,
@@ -71,7 +73,7 @@ impl Behind {
                 return None;
             }
             if firm != 0 {
-                // What comes before brakes with its own limits.
+                // The line before brakes with its own limits.
                 brakes = before;
             }
         }
@@ -108,7 +110,7 @@ impl Known {
 
 #[small]
 impl BlockQueue {
-    /// The overrides that are wanted, if the keys are for others. Cost: 60.
+    /// Returns the overrides that are wanted, if the keys are for others; else `None`. Cost: 60.
     pub fn wanted(&self) -> Option<Factors> {
         let wanted =
             exec::lock(self.thread, |ceiling| self.constraints.with(ceiling, |h| h.wanted));
@@ -128,7 +130,7 @@ impl BlockQueue {
         self.install(&keys);
     }
 
-    /// Makes the keys, from the newest to the oldest.
+    /// Makes the keys, from the newest line to the oldest.
     #[inline(never)]
     fn look_back(&self, keys: &mut Keys) {
         let mut behind =
@@ -154,14 +156,14 @@ impl BlockQueue {
         }
     }
 
-    /// Puts the keys in the place of those that there are.
+    /// Puts the keys in the place of the present ones.
     #[inline(never)]
     fn install(&self, keys: &Keys) {
         exec::lock(self.thread, |ceiling| {
             let (used, factors) = (self.ring.used() as Index, self.tail.factors);
             let oldest = self.newest.wrapping_sub(used).wrapping_add(1) & SEQ;
             self.constraints.with(ceiling, |constraints| {
-                // What has begun has no key any more, nor what has been run meanwhile.
+                // A line that has begun has no key any more, nor has one that has been run meanwhile.
                 let begun = constraints.nth(0).is_none_or(|first| first & SEQ != oldest);
                 constraints.replace(keys);
                 while let Some(first) = constraints.nth(0) {
@@ -179,13 +181,13 @@ impl BlockQueue {
     }
 }
 
-/// Whether the machine goes on over a block that is no line.
+/// Whether a block is not a line, but the machine goes on over it.
 #[small]
 fn is_aside(block: Option<&Block>) -> bool {
     block.is_some_and(Block::is_aside)
 }
 
-/// The line that a block is.
+/// Returns the line in a block; `None` if it is not a line.
 #[small]
 fn line(block: Option<&Block>) -> Option<&Line> {
     match block {

@@ -1,13 +1,15 @@
 //! The way out of the cut: X moves away at once while the axes of a thread come to rest.
 //!
-//! Owned by exec, which begins it when a pass in step with the spindle ends before its time: the spindle is lost, the error is above its
-//! limit, a feedhold or an alarm has come ([`Exec`](super::exec::Exec)). Exec asks [`Retreat::add`] for each segment while the axes slow down,
-//! and for segments of its own when they stand; at the exec level. It begins in segments that are queued already ([`Exec::lead`](super::exec::Exec::lead)): these are 9 ms, which
-//! X need not wait for. The motors of X stand still in the pass, so that the two motions do not meet
-//! in a motor. X has a ramp up, a cruise and a ramp down of its own.
+//! Owned by exec, at the exec level. Exec begins it when a pass in step with the spindle ends before its time: the
+//! spindle is lost, the error is above its limit, a feedhold or an alarm has come ([`Exec`](super::exec::Exec)). Exec
+//! asks [`Retreat::add`] for each segment while the axes slow down, and for segments of its own when they stand. It
+//! begins in segments that are queued already ([`Exec::lead`](super::exec::Exec::lead)): they last 9 ms, for which X
+//! need not wait. The motors of X stand still in the pass, so that the two motions do not meet in a motor. X has a
+//! ramp up, a cruise and a ramp down of its own.
 //!
-//! Units: steps of X, s. What is handed out is counted in whole phase units, so that nothing is lost; the end is within half a step, and a
-//! ten-thousandth, of the way that was asked for. Cost on AVR: 6,000 cycles a segment. RAM: that of the pass, which is over.
+//! Units: steps of X, s. What is handed out is counted in whole phase units, so that nothing is lost. X ends within
+//! half a step, and a ten-thousandth, of the way that was asked for. Cost on AVR: 6,000 cycles a segment. RAM: it
+//! takes the place of the pass, which is over.
 
 use kerf_macros::small;
 
@@ -20,19 +22,20 @@ use crate::hal::arithmetic::product;
 use crate::math::sqrt;
 use crate::status::Status;
 
-/// What is left at the end and not handed out, phase units: a step has been made well before it, and slower ones would be none in a tick.
+/// What is left at the end and not handed out, phase units. The last step has been made well before it, and a slower
+/// motion would be less than a unit in a tick.
 const END: u32 = STEP as u32 / 16;
 
-/// How a pass is left.
+/// How a pass is left before its end.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Retract {
     /// The motors of X, as bits; none if the tool stays in the cut.
     pub motors: u8,
-    /// How far they go, steps.
+    /// How far the motors go, steps.
     pub way: i16,
-    /// Their acceleration limit, steps/s^2.
+    /// The acceleration limit of the motors, steps/s^2.
     pub accel: Short,
-    /// Their velocity limit, steps/s.
+    /// The velocity limit of the motors, steps/s.
     pub velocity: Short,
 }
 
@@ -40,7 +43,7 @@ impl Retract {
     /// The tool stays in the cut.
     pub const NONE: Self = Self { motors: 0, way: 0, accel: Short::ZERO, velocity: Short::ZERO };
 
-    /// Whether there is one.
+    /// Whether the tool leaves the cut.
     pub fn is_some(&self) -> bool {
         self.motors != 0
     }
@@ -50,19 +53,20 @@ impl Retract {
 #[derive(Clone, Copy, Debug)]
 pub struct Retreat {
     how: Retract,
-    /// Why.
+    /// Why the pass was left.
     pub why: Status,
     /// What is left of the way, phase units.
     left: u32,
     /// steps/s.
     velocity: f32,
-    /// What has been handed out and is no whole step yet, and a half to round by, phase units.
+    /// What has been handed out beyond whole steps, and a half to round by, phase units.
     part: u16,
 }
 
 #[small]
 impl Retreat {
-    /// At rest, in the cut, for this reason. The motors have this debt, as of `Prep`, which is paid on the way.
+    /// Returns a retreat at rest, in the cut, for this reason. `debt` is that of the motors in `Prep`, which is paid
+    /// on the way.
     pub fn new(how: Retract, why: Status, debt: i16) -> Self {
         let ahead = if how.way < 0 { debt.wrapping_neg() } else { debt };
         let left = u32::from(how.way.unsigned_abs()) << STEP_LOG2;
@@ -76,17 +80,17 @@ impl Retreat {
         self.left == 0
     }
 
-    /// The motors that move.
+    /// The motors that move, as bits.
     pub fn motors(&self) -> u8 {
         self.how.motors
     }
 
-    /// Whether they move backwards.
+    /// Whether the motors run backwards.
     pub fn is_backwards(&self) -> bool {
         self.how.way < 0
     }
 
-    /// Has X go on in a segment in which it would stand.
+    /// Moves X in a segment in which it would stand.
     #[inline(never)]
     pub fn add(
         &mut self,
@@ -105,13 +109,13 @@ impl Retreat {
         self.note(increment, segment.ticks, target, debt);
     }
 
-    /// How far X is to go in each of so many ticks, the next ones, phase units; 1 at least until it is out.
+    /// Returns how far X is to go in each of the next `ticks`, phase units; at least 1 until it is out.
     #[inline(never)]
     pub fn plan(&mut self, ticks: u16, period: u16) -> u16 {
         const HZ: f32 = TIMER_HZ as f32;
         let accel = self.how.accel.get();
         let gain = accel * (product(ticks, period) as f32 * (1.0 / HZ));
-        // From there it loses a gain at most in each segment behind this one.
+        // From this velocity X has to lose at most `gain` in each segment behind this one.
         let twice_left = self.left as f32 * (2.0 / f32::from(STEP));
         let stops = sqrt(gain * gain + accel * twice_left) - gain;
         let period = f32::from(period);
@@ -119,12 +123,12 @@ impl Retreat {
         // A step in each tick at most.
         self.velocity = least(wanted, HZ / period);
         let increment = (self.velocity * period * (f32::from(STEP) / HZ) + 0.5) as u16;
-        // What is too slow for that would never come to its end.
+        // A motion too slow for a unit in a tick would never come to its end.
         increment.max((!self.is_done()).into())
     }
 
-    /// X goes so far in each of so many ticks: whole steps are added to `target`, and what is handed out besides is a `debt` of
-    /// half a step at most, as of `Prep`.
+    /// Counts that X goes `increment` in each of `ticks`. Adds whole steps to `target`; what is handed out besides is
+    /// a `debt` of half a step at most, as in `Prep`.
     #[inline(never)]
     pub fn note(
         &mut self,
@@ -139,7 +143,7 @@ impl Retreat {
         let sum = travel + u32::from(self.part);
         self.part = sum as u16 & (STEP - 1);
         let steps = (sum >> STEP_LOG2) as i32;
-        // What it has been told to go, less what it goes, modulo 2^16.
+        // What X has been told to go, less what it goes, modulo 2^16.
         let owed = ((steps as u16) << STEP_LOG2).wrapping_sub(travel as u16);
         let (steps, owed) =
             if self.is_backwards() { (-steps, owed.wrapping_neg()) } else { (steps, owed) };
@@ -153,7 +157,7 @@ impl Retreat {
         }
     }
 
-    /// A segment has run without X: it begins again from rest.
+    /// Notes that a segment has run without X: it begins again from rest.
     pub fn pause(&mut self) {
         self.velocity = 0.0;
     }
@@ -166,7 +170,7 @@ mod tests {
     const PERIOD: u16 = 400;
     const TICKS: u16 = 80;
 
-    /// The velocity of each segment until it is out, steps/s, and how far it has gone.
+    /// Returns the velocity of each segment until X is out, steps/s, then how far X has gone, and its debt.
     fn run(how: Retract, debt: i16) -> (std::vec::Vec<f64>, i32, i16) {
         let (mut target, mut debt) = ([0; MOTORS], [debt; MOTORS]);
         let mut retreat = Retreat::new(how, Status::Terminated, debt[0]);
@@ -208,7 +212,7 @@ mod tests {
                 assert!(debt.unsigned_abs() < STEP / 8, "{way}: {debt}");
                 let (mut before, mut most) = (0.0f64, 0.0f64);
                 for speed in &speeds {
-                    // Of means of neighbours.
+                    // The acceleration between the mean velocities of neighbouring segments.
                     most = most.max((speed - before).abs() / 0.002);
                     before = *speed;
                     assert!(*speed <= f64::from(velocity) * 1.01, "{way}: {speed}");

@@ -2,19 +2,19 @@
 
 use crate::hal::arithmetic::high_product;
 
-/// Eight bits of exponent and eight of mantissa: 0.4 % exact, rounded down, so that a limit stays one.
+/// Eight bits of exponent and eight of mantissa. Exact to 0.4 %, and rounded down, so that a limit is kept.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Short(u16);
 
 impl Short {
-    /// The number, rounded down. 0 for a negative one. Cost: 15.
+    /// Returns a number, rounded down; 0 for a negative one. Cost: 15.
     #[inline]
     pub fn new(x: f32) -> Self {
         let bits = x.to_bits();
         if bits >> 31 != 0 { Short(0) } else { Short((bits >> 15) as u16) }
     }
 
-    /// The least that is no less than a number that is not negative. Cost: 20.
+    /// Returns the least `Short` that is not below a number, which is not negative. Cost: 20.
     #[inline]
     pub fn above(x: f32) -> Self {
         Short(((x.to_bits() + 0x7FFF) >> 15) as u16)
@@ -42,19 +42,19 @@ impl Short {
         b.parts().1.saturating_sub(a.parts().1)
     }
 
-    /// From a mantissa without the leading 1, and an exponent.
+    /// Makes a number from a mantissa without the leading 1, and an exponent.
     #[inline(always)]
     pub fn of_parts(mantissa: u8, power: u8) -> Self {
         Self(u16::from_le_bytes([mantissa, power]))
     }
 
-    /// A number that compares as it does.
+    /// Returns an integer that compares as the number does.
     #[inline(always)]
     pub const fn bits(self) -> u16 {
         self.0
     }
 
-    /// From [`Short::bits`].
+    /// Makes a number from [`Short::bits`].
     #[inline(always)]
     pub const fn of_bits(bits: u16) -> Self {
         Self(bits)
@@ -68,18 +68,19 @@ impl Short {
     }
 }
 
-/// The exponent of 1, as a [`Short`] has it.
+/// The exponent of 1 in a [`Short`].
 const ONE: u8 = 127;
 
-/// A logarithm to base two, in 1/256: of products and powers it makes sums and multiples, at 5 cycles each. 1.5 % exact.
+/// A logarithm to base two, in 1/256: it turns products and powers into sums and multiples, at 5 cycles each. Exact
+/// to 1.5 %.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Log(pub i16);
 
-/// A factor of two.
+/// A factor of two, as a logarithm.
 pub const OCTAVE: i16 = 256;
 
 impl Log {
-    /// From a power of two and a mantissa.
+    /// Makes a logarithm from a power of two and a mantissa.
     #[inline(always)]
     fn new(power: u8, mantissa: u8) -> Self {
         Self(i16::from_le_bytes([mantissa.wrapping_add(bulge(mantissa)), power]))
@@ -94,7 +95,7 @@ impl Log {
     /// The logarithm of an integer, not 0. Cost: 45 to 85.
     #[inline(never)]
     pub fn of(n: u16) -> Self {
-        // The last bit of the first one ends the search, whatever there is.
+        // The bit that is set here ends the search for any number.
         let (mut n, mut power) = if n < 0x100 { (n << 8 | 1, 7u8) } else { (n, 15) };
         while n & 0x8000 == 0 {
             n <<= 1;
@@ -119,7 +120,7 @@ impl Log {
         Self(Self::of(n).0 + octaves)
     }
 
-    /// The number. Cost: 20.
+    /// Returns the number whose logarithm this is. Cost: 20.
     #[inline(always)]
     pub fn power(self) -> Short {
         let [fraction, power] = self.0.to_le_bytes();
@@ -128,7 +129,8 @@ impl Log {
     }
 }
 
-/// How much the logarithm of 1 + m is above m, and nearly how much 1 + m is above 2 to the power of m. All in 1/256.
+/// Returns by how much the logarithm of 1 + m is above m, which is nearly by how much 1 + m is above 2 to the power
+/// of m. All in 1/256.
 #[inline(always)]
 fn bulge(m: u8) -> u8 {
     high_product(high_product(m, !m), 88)

@@ -1,9 +1,10 @@
-//! Time under a jerk limit goes in slices of a few milliseconds, whatever blocks do.
+//! Under a jerk limit the governor works in slices of a few milliseconds, wherever blocks begin and end.
 //!
-//! Called by [`Governor::stretch`](super::governor::Governor::stretch), exec level. A stretch is a slice, or what of it lies in the block;
-//! the rest of the slice belongs to the blocks that follow. So the mathematics of a ramp is done once for a slice, however short
-//! blocks are, and a block that is over within the slice costs one multiplication. Near the end of a block slices are made
-//! longer or shorter, so that no stretch is much shorter than a slice unless its block is.
+//! Called by [`Governor::stretch`](super::governor::Governor::stretch), exec level. A stretch is a slice, or the part
+//! of it that lies in the block; the rest of the slice belongs to the blocks that follow. So the mathematics of a
+//! ramp is done once for a slice, however short blocks are, and a block that ends within the slice costs one
+//! multiplication. Near the end of a block slices are made longer or shorter, so that no stretch is much shorter than
+//! a slice unless its block is.
 //!
 //! Units: mm, s.
 
@@ -12,7 +13,7 @@ use super::exec::SEGMENT_S;
 use super::float::{below, greater, less, ratio, scaled, some};
 use super::governor::{Governor, Stretch, same};
 
-/// A part of a slice that has been worked out and not been handed out.
+/// The part of a slice that has been worked out but not handed out.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Rest {
     pub seconds: f32,
@@ -25,31 +26,32 @@ impl Rest {
     pub const NONE: Self = Self { seconds: 0.0, distance: 0.0, inverse: 0.0 };
 }
 
-/// What a slice is asked for.
+/// What a slice is to be like.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Span {
-    /// Distance from the state to the end of the block.
+    /// Distance from the present state to the end of the block, mm.
     pub left: f32,
-    /// Velocity limit.
+    /// Velocity limit, mm/s.
     pub cruise: f32,
-    /// How long it is to be.
+    /// How long the slice is to be, s.
     pub seconds: f32,
 }
 
-/// Segments for a steady velocity end this many stretches before a ramp begins; a power of two.
+/// Segments for a steady velocity end 2 to this power stretches before a ramp begins.
 const FAR_LOG2: i8 = 3;
 
-/// Longest stretch, s, where most are `nominal` seconds long. A feedhold begins behind those that are handed out.
+/// Returns the longest stretch, s, where most stretches are `nominal` seconds long. A feedhold begins after the
+/// stretches that have been handed out.
 #[inline(always)]
 pub(super) fn longest(nominal: f32) -> f32 {
     if same(nominal, SEGMENT_S) { 1.5 * SEGMENT_S } else { 2.0 * SEGMENT_S }
 }
 
-/// At rest, a distance that rounding leaves: it takes no ramp of its own.
+/// A distance that rounding leaves at rest, mm: it takes no ramp of its own.
 const ROUNDING: f32 = 5e-4;
 
 impl Governor {
-    /// The next stretch, in slices of about `nominal` seconds.
+    /// Returns the next stretch, in slices of about `nominal` seconds.
     #[inline(never)]
     pub(super) fn smooth(
         &mut self,
@@ -81,8 +83,9 @@ impl Governor {
         self.cut(left)
     }
 
-    /// A stretch at the feed, if the machine has it and it is known that it may keep it. Not cut from a slice: it takes all of the
-    /// block if that is short. Cost: 700, 1,200 at the end of a block.
+    /// Returns a stretch at the feed, if the machine is at the feed and is known to be able to keep it; else `None`.
+    /// The stretch is not cut from a slice: it takes all of the block if that is short. Cost: 700, 1,200 at the end
+    /// of a block.
     #[inline(always)]
     fn steady(&mut self, left: f32, cruise: f32, nominal: f32) -> Option<Stretch> {
         let velocity = self.velocity;
@@ -100,7 +103,8 @@ impl Governor {
             slice
         };
         let at = self.potential(distance);
-        // As much again must be known: there is a look while nothing has to be done about it.
+        // Twice the distance must be known to be clear: so the next scan comes while nothing has to be done about its
+        // answer.
         if !self.is_clear(velocity, scaled(at, 1)) {
             return None;
         }
@@ -111,7 +115,7 @@ impl Governor {
         Some(Stretch { seconds, distance, ends })
     }
 
-    /// A stretch of a feedhold.
+    /// Returns a stretch of a feedhold.
     #[inline(never)]
     pub(super) fn smooth_halt(&mut self, left: f32, nominal: f32) -> Stretch {
         if self.is_within_slice(left) {
@@ -133,14 +137,15 @@ impl Governor {
         self.cut(left)
     }
 
-    /// Whether the block is over within the slice.
+    /// Whether the block ends within the slice.
     #[inline(always)]
     fn is_within_slice(&self, left: f32) -> bool {
         below(left, self.rest.distance)
     }
 
-    /// Whether there is to be another slice: a stretch would be too short, or leave too little of the block. Fills in how long
-    /// it is to be, in a `span` that says `nominal`, and how far it is to the end of the block. Cost: 200, 1,000 near the end of a block.
+    /// Whether there is to be another slice: otherwise a stretch would be too short, or leave too little of the
+    /// block. Sets in `span`, where it says `nominal`, how long the slice is to be, and how far it is to the end of
+    /// the block. Cost: 200, 1,000 near the end of a block.
     #[inline(never)]
     fn wanted(&self, left: f32, nominal: f32, span: &mut Span) -> bool {
         let Rest { seconds, distance, .. } = self.rest;
@@ -155,7 +160,7 @@ impl Governor {
         if !below(self.little(), more) {
             return !below(0.0, distance);
         }
-        // Where slices are longer, for want of time, they go on over blocks of up to two thirds of them.
+        // Slices that are longer, for want of time, go on over blocks of up to two thirds of their length.
         let usual = same(nominal, SEGMENT_S);
         let enough = if usual { scaled(more, 1) } else { more + scaled(more, -1) };
         let much = !below(enough, slice);
@@ -163,7 +168,7 @@ impl Governor {
             return false;
         }
         if much && below(more, scaled(slice, 1)) {
-            // So that it ends about where the block does.
+            // Makes the slice end about where the block does.
             let time = ratio(more, velocity);
             let long = !below(time, longest(nominal));
             span.seconds = if long { scaled(time, -1) } else { time };
@@ -171,13 +176,14 @@ impl Governor {
         true
     }
 
-    /// A distance that counts as none.
+    /// Returns a distance that counts as none.
     #[inline(always)]
     fn little(&self) -> f32 {
         if some(self.velocity) { scaled(self.velocity, -13) } else { ROUNDING }
     }
 
-    /// Whether a block without a jerk limit begins with the rest of a slice. A rest shorter than rounding is dropped.
+    /// Whether a block without a jerk limit begins with the rest of a slice. Drops a rest that is shorter than
+    /// rounding.
     pub(super) fn has_rest(&mut self) -> bool {
         if some(self.rest.seconds) && !below(self.little(), self.rest.distance) {
             self.rest = Rest::NONE;
@@ -185,7 +191,7 @@ impl Governor {
         some(self.rest.seconds)
     }
 
-    /// A slice has been worked out, `distance` long, or `at` as brake potential.
+    /// Adds a slice that has been worked out: `distance` long, which is `at` as brake potential.
     #[inline(always)]
     pub(super) fn add(&mut self, seconds: f32, distance: f32, at: f32) {
         self.clear.distance -= at;
@@ -198,14 +204,14 @@ impl Governor {
         }
     }
 
-    /// What of the slices is in the block.
+    /// Returns the part of the slices that is in the block.
     #[inline(never)]
     pub(super) fn cut(&mut self, left: f32) -> Stretch {
         let Rest { seconds, distance, .. } = self.rest;
         let more = left - distance;
         if below(self.little(), more) {
             self.rest = Rest::NONE;
-            // What has been borrowed before a stop is not given back.
+            // The rest may be below 0, borrowed before a stop. It is not given back.
             let (seconds, distance) = (greater(seconds, 1e-6), greater(distance, 0.0));
             return Stretch { seconds, distance, ends: false };
         }
@@ -213,12 +219,12 @@ impl Governor {
             self.rest = Rest::NONE;
             return Stretch { seconds: greater(seconds, 1e-6), distance: left, ends: true };
         }
-        // A little less than nothing may be left.
+        // Because of rounding, slightly less than nothing may be left.
         self.rest.inverse = ratio(seconds, distance);
         self.part(left)
     }
 
-    /// A stretch of the slice, `left` mm long.
+    /// Hands out a stretch of `left` mm, which ends the block, from the slice.
     #[inline(always)]
     fn part(&mut self, left: f32) -> Stretch {
         let seconds = left * self.rest.inverse;

@@ -1,8 +1,8 @@
-//! How motion stands, for whoever wants to know.
+//! The state of motion, for whoever wants to know it.
 //!
-//! Exec keeps one [`Snapshot`] up to date, and thread mode copies it (`tasks::common`). What is told to senders is a
-//! [`Moment`] of it: 1,000 cycles while something moves. All values of a report come from the same one, for exec may
-//! run between any two.
+//! Exec keeps one [`Snapshot`] up to date, and thread mode copies it (`tasks::common`). What senders are told is a
+//! [`Moment`] of it, which costs 1,000 cycles while something moves. All values of a report come from the same
+//! moment, because exec may run between any two readings.
 
 use kerf_macros::small;
 
@@ -11,7 +11,7 @@ use crate::boards::MOTORS;
 use crate::capability::Capability;
 use crate::gcode::command::Surface;
 
-/// How many surface speeds there are: none in an image that cannot turn.
+/// How many surface speeds there are: none in an image without a lathe.
 const LATHES: usize = Capability::Lathe.is_built_in() as usize;
 
 /// What reports show of the motion that is being prepared.
@@ -19,11 +19,11 @@ const LATHES: usize = Capability::Lathe.is_built_in() as usize;
 pub struct Snapshot {
     /// Motor positions at the end of the block being run, in steps.
     pub target: [i32; MOTORS],
-    /// Signed steps of that block.
+    /// Signed steps of the block being run.
     pub steps: [i16; MOTORS],
-    /// What is still to be run of that block, mm.
+    /// What is still to be run of the block, mm.
     pub left: f32,
-    /// The length of that block, mm.
+    /// The length of the block, mm.
     pub length: f32,
     /// Velocity along the path, mm/s.
     pub velocity: f32,
@@ -31,17 +31,17 @@ pub struct Snapshot {
     pub line: u32,
     /// The N word of the line finished last, to its last step.
     pub finished: u32,
-    /// Something moves, or dwells.
+    /// Whether something moves, or dwells.
     pub running: bool,
-    /// A feedhold has brought it to rest.
+    /// Whether a feedhold has brought the machine to rest.
     pub held: bool,
-    /// What the program came to last.
+    /// The state that the program has come to last.
     pub program: Program,
-    /// What the outputs are to be, bits of [`outputs`](crate::boards::outputs).
+    /// The outputs that are wanted, bits of [`outputs`](crate::boards::outputs).
     pub outputs: u8,
-    /// What the speed of the spindle is to be, turns per minute.
+    /// The speed of the spindle that is wanted, turns per minute.
     pub speed: f32,
-    /// The surface speed by which that follows X, in an image with [`Capability::Lathe`].
+    /// The surface speed by which the speed of the spindle follows X, in an image with [`Capability::Lathe`].
     pub surface: [Surface; LATHES],
 }
 
@@ -65,7 +65,8 @@ impl Snapshot {
         }
     }
 
-    /// Where the motors are, to the nearest step, as the step generator rounds. Cost: 1,400 in motion, and 900 for each motor that moves.
+    /// Returns where the motors are, to the nearest step, rounded as the step generator rounds. Cost: 1,400 in
+    /// motion, and 900 for each motor that moves.
     #[inline(never)]
     #[small]
     pub fn positions(&self) -> [i32; MOTORS] {
@@ -83,7 +84,8 @@ impl Snapshot {
         positions
     }
 
-    /// The program has switched outputs, S, or its surface speed. Under one S follows X, whatever else is switched.
+    /// Takes over the outputs, S, or the surface speed that the program has switched. With a surface speed S follows
+    /// X, whatever else is switched.
     #[inline(always)]
     pub fn switch(&mut self, outputs: &Outputs, action: &QueuedAction) {
         self.outputs = outputs.on;
@@ -95,7 +97,7 @@ impl Snapshot {
         self.speed = outputs.speed;
     }
 
-    /// What is told of it.
+    /// Returns what senders are told of it.
     #[small]
     pub fn moment(&self) -> Moment {
         Moment {
@@ -121,22 +123,22 @@ pub struct Moment {
     pub line: u32,
     /// The N word of the line finished last.
     pub finished: u32,
-    /// Something moves, or dwells.
+    /// Whether something moves, or dwells.
     pub running: bool,
-    /// A feedhold has brought it to rest.
+    /// Whether a feedhold has brought the machine to rest.
     pub held: bool,
-    /// What the program came to last.
+    /// The state that the program has come to last.
     pub program: Program,
 }
 
-/// How the program stands.
+/// The state of the program.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Program {
     /// Nothing has run since the reset.
     #[default]
     Ready,
-    /// The queue ran empty, or M0.
+    /// The queue has run empty, or M0 has stopped the program.
     Stopped,
-    /// M2 or M30.
+    /// M2 or M30 has ended the program.
     Ended,
 }

@@ -1,7 +1,7 @@
 //! The block queue, seen from exec's side: the oldest block, and how fast it may be left.
 //!
 //! Owned by exec, which takes block after block, and asks for the limits ahead whenever the speed constraints have
-//! changed. Never waits: an empty queue is one that ends here. Units: mm, s; brake potentials as in
+//! changed. Never waits: the end of the queue counts as a standstill. Units: mm, s; brake potentials as in
 //! `speed_constraints`.
 
 use core::cell::Cell;
@@ -20,26 +20,26 @@ use crate::hal::ring::{Consumer, Index};
 /// A limit ahead of exec.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Constraint {
-    /// Velocity there, mm/s.
+    /// The velocity at the constraint, mm/s.
     pub velocity: Short,
-    /// Brake potential from the end of the oldest block to there.
+    /// Brake potential from the end of the oldest block to the constraint.
     pub ahead: f32,
-    /// Limits change there: what comes after is for the line that begins there.
+    /// Whether limits change there: what comes after is for the line that begins there.
     pub firm: bool,
 }
 
-/// Exec's end.
+/// Exec's end of the queue.
 pub struct BlockSource {
     ring: Consumer<Block, BLOCKS>,
     constraints: InterruptEnd<&'static Shared<SpeedConstraints>>,
     /// Sequence number of the oldest block.
     oldest: Index,
-    /// Potential at its end, and the version of the speed constraints that it was read from.
+    /// The version of the speed constraints, and the potential at the end of the oldest block that was found with it.
     end: Cell<Option<(u8, f32)>>,
 }
 
 impl BlockSource {
-    /// With the ends of a store that are exec's.
+    /// Takes the ends of a store that are exec's.
     pub(super) fn new(
         ring: Consumer<Block, BLOCKS>,
         constraints: InterruptEnd<&'static Shared<SpeedConstraints>>,
@@ -47,23 +47,23 @@ impl BlockSource {
         Self { ring, constraints, oldest: 0, end: Cell::new(None) }
     }
 
-    /// Blocks waiting, with the one that runs.
+    /// The number of blocks that wait, the running one included.
     pub fn len(&self) -> usize {
         self.ring.len()
     }
 
-    /// Changes with each block that is released.
+    /// A number that changes with each block that is released.
     #[inline(always)]
     pub fn released(&self) -> Index {
         self.oldest
     }
 
-    /// Whether there is none.
+    /// Whether there is no block.
     pub fn is_empty(&self) -> bool {
         self.ring.is_empty()
     }
 
-    /// A copy of the oldest block.
+    /// Returns a copy of the oldest block.
     pub fn oldest(&self) -> Option<Block> {
         self.look(|block| *block)
     }
@@ -75,13 +75,13 @@ impl BlockSource {
         self.ring.peek(1, |block| matches!(block.body, Body::Line(_))) == Some(true)
     }
 
-    /// What `look` makes of the oldest block.
+    /// Returns what `look` makes of the oldest block; `None` if there is no block.
     #[inline(always)]
     pub fn look<R>(&self, look: impl FnOnce(&Block) -> R) -> Option<R> {
         self.ring.peek(0, look)
     }
 
-    /// The oldest block is done.
+    /// Releases the oldest block, which is done.
     pub fn release(&mut self) {
         if !self.is_empty() {
             self.ring.release();
@@ -92,7 +92,7 @@ impl BlockSource {
         }
     }
 
-    /// The oldest block begins: what limited its start is of the past.
+    /// Begins the oldest block: a key at its start no longer counts.
     pub fn enter(&mut self) {
         let oldest = self.oldest;
         self.constraints.with(|constraints| {
@@ -102,12 +102,12 @@ impl BlockSource {
         });
     }
 
-    /// Changes when what is ahead changes.
+    /// A number that changes when what is ahead changes.
     pub fn version(&self) -> u8 {
         self.constraints.look(|constraints| constraints.version)
     }
 
-    /// What the oldest block, a line, is run at, mm/s; it changes with the version. Cost: 100.
+    /// Returns the velocity at which the oldest block, a line, is run, mm/s. It changes with the version. Cost: 100.
     #[inline(always)]
     pub fn cruise(&self) -> f32 {
         self.constraints.look(|constraints| {
@@ -124,25 +124,25 @@ impl BlockSource {
         self.line(self.oldest, |line| line.reserve == Reserve::TRAVERSE).unwrap_or_default()
     }
 
-    /// What the oldest block, a line, may be run at whatever overrides say, mm/s.
+    /// Returns the velocity at which the oldest block, a line, may be run whatever overrides say, mm/s.
     #[small]
     pub fn feed(&self) -> f32 {
         self.line(self.oldest, |line| line.cruise).unwrap_or_default()
     }
 
-    /// Whether other overrides were wanted when this was asked last. Cost: 15.
+    /// Whether overrides have changed since this was asked last. Cost: 15.
     #[inline(always)]
     pub fn take_changed(&mut self) -> bool {
         self.constraints.with(|constraints| core::mem::take(&mut constraints.changed))
     }
 
-    /// These overrides are wanted: the planner hears of it if they are not those of the keys.
+    /// Sets the overrides that are wanted. The planner hears of them if the keys are made for others.
     pub fn want(&mut self, factors: Factors) {
         self.constraints.with(|constraints| constraints.want(factors));
     }
 
-    /// The square of the velocity, (mm/s)^2, at which the oldest block, a line, may be left for the
-    /// sake of all that follow, if there is no jerk limit. Cost: 900.
+    /// Returns the square of the velocity, (mm/s)^2, at which the oldest block, a line, may be left so that all that
+    /// follow keep to their limits, if there is no jerk limit. Cost: 900.
     pub fn headroom(&self) -> f32 {
         let end = self.queue_end();
         let first = self.constraints.look(|constraints| {
@@ -151,7 +151,7 @@ impl BlockSource {
             Some(self.lifted(seq, key))
         });
         let key = match first {
-            // Bits tell, mostly: both are above 0.
+            // Comparing bits is enough, mostly: both are above 0.
             Some(key) if key.to_bits() < end.to_bits() && !end.is_sign_negative() => key,
             Some(key) => lesser(key, end),
             None => end,
@@ -159,8 +159,9 @@ impl BlockSource {
         key - self.end()
     }
 
-    /// The first constraint ahead from the `n`th on that is slower than `velocity`, or firm; with its number. The last is the
-    /// end of the queue. Cost: 450, 25 for each that is passed over, and 1,500 more the first time after a change.
+    /// Returns the first constraint ahead from the `n`th on that is slower than `velocity`, or firm, with its number.
+    /// The last constraint is the end of the queue. Cost: 450, 25 for each one that is passed over, and 1,500 more
+    /// the first time after a change.
     pub fn slower(&self, n: Index, velocity: Short) -> (Index, Constraint) {
         self.constraints.look(|constraints| {
             let found = constraints.slower(n, velocity);
@@ -174,21 +175,21 @@ impl BlockSource {
         })
     }
 
-    /// Potential from the end of the oldest block to the end of the queue.
+    /// Returns the potential from the end of the oldest block to the end of the queue.
     pub fn end_of_queue(&self) -> f32 {
         self.queue_end() - self.end()
     }
 
-    /// Potential at the end of the queue, counted as at the oldest block.
+    /// Returns the potential at the end of the queue, counted as at the oldest block.
     fn queue_end(&self) -> f32 {
-        // Behind all blocks, of which the last number is that before the oldest.
+        // The place behind all blocks has the number before the oldest one.
         self.lifted(
             self.oldest.wrapping_sub(1),
             self.constraints.look(|constraints| constraints.end),
         )
     }
 
-    /// A potential at block `seq`, counted as at the oldest one.
+    /// Returns a potential at block `seq`, counted as at the oldest one.
     #[inline(always)]
     fn lifted(&self, seq: Index, potential: f32) -> f32 {
         if self.constraints.look(SpeedConstraints::is_mixed) {
@@ -203,7 +204,7 @@ impl BlockSource {
         self.constraints.look(|constraints| constraints.lifted(potential, seq, self.oldest))
     }
 
-    /// Potential at the end of the oldest block.
+    /// Returns the potential at the end of the oldest block.
     fn end(&self) -> f32 {
         let version = self.version();
         if let Some((of, end)) = self.end.get()
@@ -211,7 +212,7 @@ impl BlockSource {
         {
             return end;
         }
-        // Where the next begins, if that is a line.
+        // The potential where the next block begins, if that is a line.
         let next = self.ring.peek(1, |block| match &block.body {
             Body::Line(line) => Some(line.start),
             _ => None,
@@ -225,8 +226,9 @@ impl BlockSource {
         }
     }
 
-    /// The potential at the end of the oldest block, if no line follows, or one with this `start` while potentials are counted in two ways. A
-    /// function of its own, so that [`BlockSource::end`] saves few registers.
+    /// Returns the potential at the end of the oldest block if no line follows, or if a line with this `start`
+    /// follows while potentials are counted in two ways. A function of its own, so that [`BlockSource::end`] saves
+    /// few registers.
     #[inline(never)]
     #[small]
     fn end_otherwise(&self, version: u8, start: Option<f32>) -> f32 {
@@ -238,7 +240,7 @@ impl BlockSource {
         end
     }
 
-    /// Something of a line in the queue.
+    /// Returns what `look` makes of block `seq`; `None` if it is not a line.
     fn line<R: Copy>(&self, seq: Index, look: impl FnOnce(&Line) -> R) -> Option<R> {
         let ahead = usize::from(seq.wrapping_sub(self.oldest) & SEQ);
         self.ring.peek(ahead, |block| match &block.body {

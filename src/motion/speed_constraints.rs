@@ -1,51 +1,51 @@
 //! Look-ahead: how fast the machine may be so that it can always slow down in time.
 //!
-//! Owned by the block queue: the planner adds to it as it pushes a block, exec asks it.
+//! Owned by the block queue: the planner adds a constraint as it pushes a block, and exec reads the constraints.
 //!
-//! **Brake potential.** Braking at the acceleration limit A changes v^2 by 2 A for each mm. So let P be
-//! the sum of 2 A l over all of the path so far, and whoever is at P with velocity v is able to get
-//! down to velocity w at a later point with potential Q if
+//! **Brake potential.** Braking at the acceleration limit A changes v^2 by 2 A for each mm. So let P be the sum of
+//! 2 A l over all of the path so far. From P with velocity v the machine can slow down to velocity w at a later point
+//! with potential Q if
 //!
 //! ```text
 //! v^2 + P <= w^2 + Q  =: key
 //! ```
 //!
-//! whatever blocks lie between, each with its own A. A corner is a point with a key. Of all keys ahead
-//! only the lowest counts, and it counts for all blocks before it alike: nothing has to be planned
-//! again, block for block, when a block is added. The end of the queue is a key too, with w = 0.
+//! whatever blocks lie between, each with its own A. A corner is a point with a key. Of all keys ahead only the
+//! lowest counts, and it counts for all blocks before it alike: when a block is added, nothing has to be planned
+//! again block by block. The end of the queue is a key too, with w = 0.
 //!
-//! **With a jerk limit** J the acceleration takes A/J to build up and as long to go, which costs way (`reach`
-//! has how much). With k = A^2 / 2J that is never more than
+//! **With a jerk limit** J the acceleration takes A/J to build up and as long to go, which costs distance
+//! (`constraint` says how much). With k = A^2 / 2J the distance is enough if
 //!
 //! ```text
 //! (v + k)^2 + P <= (w - k)^2 + Q  =: key        k^2 + Q if w < 2 k
 //! ```
 //!
-//! says, and whoever can come down to the lower of two such keys is below the velocity of the other
-//! where that is. So the lower key makes the other needless as well; but which of those that are left counts
-//! exec has to find out, from the nearest on to the first before which it could stop. Without a jerk
-//! limit k is 0, and it is the first.
+//! A machine that can slow down for the lower of two such keys is below the velocity of the other key at its place.
+//! So the lower key makes a higher one needless with a jerk limit too. But exec has to find out which of the
+//! remaining keys counts: it looks from the nearest one on to the first before which it could stop. Without a jerk
+//! limit k is 0, and the first key counts.
 //!
-//! **Lowest keys.** Keys that come after a lower one matter once that has been passed; those before a
-//! lower one never. So [`SpeedConstraints`] keeps a list of rising keys ([`SpeedConstraints::seqs`]): adding a key drops
-//! those at the list's end that are not below it, passing a block drops it at the front. Each key is
-//! added once and dropped once. A block that does not limit what is limited already (same
-//! feed, no corner) needs no entry at all.
+//! **Lowest keys.** Keys that come after a lower one matter once the lower one has been passed; keys that come before
+//! a lower one never matter. So [`SpeedConstraints`] keeps a list of rising keys ([`SpeedConstraints::seqs`]). Adding
+//! a key drops the keys at the list's end that are not below it; passing a block drops its key at the front. Each key
+//! is added once and dropped once. A block that limits nothing further (same feed, no corner) needs no entry at all.
 //!
-//! Where jerk limits change, k changes, and keys before and after do not compare. Such a place keeps its
-//! key whatever comes (it is *firm*), with the k of what comes before; its line must be able to stop on
-//! its own, and nobody looks beyond.
+//! Where jerk limits change, k changes, and keys before and after do not compare. Such a place keeps its key whatever
+//! comes (it is *firm*), with the k of what comes before. The line that begins there must be able to stop on its own,
+//! and no lower key drops this one: nobody looks beyond it.
 //!
-//! **Overrides.** The velocity at a corner is the lesser of what the corner and the feeds allow, the latter times a
-//! factor ([`Line::entry`]). Which keys are needless depends on it, so all are worked out anew when it changes
-//! (`replan`). What is needless at one factor is so at every lesser one, as far as corners go: a lesser factor is
-//! in force at once, and until then only a slow line behind a fast one may be entered at more than its part of
-//! the feed. A greater one waits for the keys.
+//! **Overrides.** The velocity at a corner is the lesser of what the corner allows and of what the feeds allow times
+//! a factor ([`Line::entry`]). Which keys are needless depends on the factor, so all keys are made anew when it
+//! changes (`replan`). As far as corners go, a key that is needless at one factor is needless at every lesser factor.
+//! So a lesser factor is in force at once; until the keys have been made, only a slow line behind a fast one may be
+//! entered at more than its part of the feed. A greater factor waits for the keys.
 //!
-//! Potentials grow for ever. When they have got so large that floats would be coarse for a line, they are counted from
-//! zero again from that line on ([`SpeedConstraints::count_anew`]). Until exec has come there, what was left out
-//! ([`SpeedConstraints::lifted`]) is added where potentials on both sides meet. One such place is in the queue at a time: a slow line
-//! behind fast ones that follow it has what is left, and the velocity at its end may be off by some 0.1 % of theirs.
+//! Potentials grow for ever. When they have become so large that floats would be coarse for a line, they are counted
+//! from zero again from that line on ([`SpeedConstraints::count_anew`]). Until exec has come there, what was left out
+//! is added ([`SpeedConstraints::lifted`]) where potentials of both sides meet. Only one such place is in the queue
+//! at a time. So floats may be coarse for a slow line behind fast lines that follow that place: the velocity at its
+//! end may be off by some 0.1 % of theirs.
 //!
 //! Cost: a push 1,000 cycles, and 700 for each key dropped.
 
@@ -57,16 +57,16 @@ use super::short::Short;
 use crate::hal::arithmetic;
 use crate::hal::ring::Index;
 
-// `arithmetic::passed_over` ends at it.
+// `arithmetic::passed_over` ends at a key with this bit.
 const _: () = assert!(FIRM == 1 << (Index::BITS - 1));
 
-/// Half the velocity that is lost while an acceleration limit builds up under a jerk limit: `A^2 / 2J`,
-/// 0 without one. Cost: 650.
+/// Returns half the velocity that is lost while an acceleration limit builds up under a jerk limit: `A^2 / 2J`, 0
+/// without one. Cost: 650.
 pub fn kappa(accel: f32, jerk: f32) -> f32 {
     if some(jerk) { 0.5 * accel * accel / jerk } else { 0.0 }
 }
 
-/// The part of a key that does not depend on the place, for velocity `w`. Cost: 400.
+/// Returns the part of a key that does not depend on the place, for velocity `w`. Cost: 400.
 pub fn key(w: f32, kappa: f32) -> f32 {
     if !some(kappa) {
         return w * w;
@@ -76,30 +76,30 @@ pub fn key(w: f32, kappa: f32) -> f32 {
 }
 
 impl Line {
-    /// Highest velocity at its start, mm/s.
+    /// Returns the highest velocity at the start of the line, mm/s.
     #[inline(always)]
     pub fn entry(&self, factors: &Factors) -> f32 {
         Short::new(least(self.entry.get(), self.velocity(factors))).get()
     }
 
-    /// The key of the line: what potential and square of velocity before its start must not exceed together.
+    /// Returns the key of the line: before its start, potential and square of velocity together must not exceed it.
     /// Cost: 500, 1,300 with a jerk limit.
     pub fn key(&self, factors: &Factors) -> f32 {
         self.start + key(self.entry(factors), kappa(self.accel.get(), self.jerk.get()))
     }
 
-    /// The key of the line for a block before it that has no jerk limit. Cost: 400.
+    /// Returns the key of the line for a block before it that has no jerk limit. Cost: 400.
     pub fn sharp_key(&self, factors: &Factors) -> f32 {
         let entry = self.entry(factors);
         self.start + entry * entry
     }
 
-    /// How much potential it has, (mm/s)^2. More than several times the square of the highest velocity that
-    /// an override gives it never matters, and is left away where it is much. Cost: 160.
+    /// Returns how much potential the line has, (mm/s)^2. What exceeds several times the square of the highest
+    /// velocity that an override gives the line never matters, and is left out if it is much. Cost: 160.
     #[inline(never)]
     pub fn gain(&self) -> f32 {
         let full = brief_product(scaled(self.accel.get(), 1), self.extent.length());
-        // Plainly below the square of its velocity, as short blocks have it.
+        // Plainly below the square of its velocity, as in short blocks.
         if log(full) + OCTAVE < 2 * log(self.cruise) { full } else { self.capped(full) }
     }
 
@@ -114,33 +114,34 @@ impl Line {
 #[derive(Debug)]
 #[repr(C)]
 pub struct SpeedConstraints {
-    // What is used most comes first: the CPU reaches 64 bytes from a pointer.
+    // The most used fields come first: the CPU reaches 64 bytes from a pointer.
     front: Index,
     len: Index,
     /// Potential at the end of the newest block.
     pub end: f32,
-    /// From this block on potentials are counted anew; `left_out` is 0 if no block before it is left.
+    /// Potentials are counted anew from this block on. `left_out` is 0 if no block before it is left.
     anew: Index,
-    /// Potential where they are.
+    /// The potential that is left out from `anew` on.
     left_out: f32,
-    /// Changes with every push, and with the factors.
+    /// A number that changes with every push, and with the factors.
     pub version: u8,
     /// The overrides that are wanted.
     pub wanted: Factors,
-    /// Others were wanted, or planned for, when exec looked last.
+    /// Whether the wanted or the planned overrides have changed since exec looked last.
     pub changed: bool,
-    /// The overrides that the keys are for, or greater ones: nothing may be run faster than by these.
+    /// The overrides that the keys are made for, or greater ones: nothing may run faster than by these factors.
     pub planned: Factors,
     /// Sequence numbers of blocks with rising keys: a ring.
     seqs: [Index; BLOCKS],
-    /// The velocity at which each of them may be entered, with the factors that keys are for: [`Short::bits`].
+    /// The velocity at which each of these blocks may be entered, with the factors that the keys are made for:
+    /// [`Short::bits`].
     entries: [u16; BLOCKS],
 }
 
 impl SpeedConstraints {
     /// The speed constraints of an empty queue.
     pub const fn new() -> Self {
-        // All zero, so that it is not in flash as well: `begin` comes before anything else.
+        // All zero, so that the initial value takes no room in flash. `begin` comes before anything else.
         let none = Factors { feed: 0.0, traverse: 0.0 };
         let (wanted, planned) = (none, none);
         Self {
@@ -158,30 +159,30 @@ impl SpeedConstraints {
         }
     }
 
-    /// The block with the `n`th key.
+    /// Returns the block with the `n`th key; `None` if there are fewer keys.
     #[inline]
     pub fn nth(&self, n: Index) -> Option<Index> {
         (n < self.len).then(|| self.seqs[self.slot(n)])
     }
 
-    /// The block with the last key but `back`.
+    /// Returns the block of a key near the end of the list: `back` 0 is the last key. `None` if there are fewer keys.
     pub fn nth_last(&self, back: Index) -> Option<Index> {
         self.nth(self.len.checked_sub(back)?.wrapping_sub(1))
     }
 
-    /// Drops the last `count` keys, as many as there are.
+    /// Drops the last `count` keys, or all if there are fewer.
     pub fn drop_last(&mut self, count: Index) {
         self.len = self.len.saturating_sub(count);
     }
 
-    /// The velocity of the `n`th key.
+    /// Returns the velocity of the `n`th key.
     #[inline]
     pub fn entry(&self, n: Index) -> Short {
         Short::of_bits(self.entries[self.slot(n)])
     }
 
-    /// The first key from the `n`th on that is slower than `velocity`, or firm, or one more than the last. Cost: 110, and 14 for
-    /// each that is passed over.
+    /// Returns the number of the first key from the `n`th on that is slower than `velocity`, or firm; one more than
+    /// the last if there is none. Cost: 110, and 14 for each key that is passed over.
     #[inline(never)]
     pub fn slower(&self, n: Index, velocity: Short) -> Index {
         let left = self.len.saturating_sub(n);
@@ -195,7 +196,7 @@ impl SpeedConstraints {
         n + passed + self.passed_over(0, left - before_end, velocity)
     }
 
-    /// How many of `count` keys from a slot on are neither slower than `velocity` nor firm.
+    /// Returns how many of `count` keys from a slot on are passed over: until one is slower than `velocity`, or firm.
     #[inline(always)]
     fn passed_over(&self, slot: Index, count: Index, velocity: Short) -> Index {
         let slots = usize::from(slot)..usize::from(slot) + usize::from(count);
@@ -203,7 +204,7 @@ impl SpeedConstraints {
         all.map_or(0, |(seqs, entries)| arithmetic::passed_over(seqs, entries, velocity.bits()))
     }
 
-    /// Adds a block whose key is above all others, that may be entered at `entry`.
+    /// Adds the key of a block, which is above all other keys. The block may be entered at `entry`.
     pub fn add(&mut self, seq: Index, entry: Short) {
         if usize::from(self.len) < BLOCKS {
             let slot = self.slot(self.len);
@@ -221,14 +222,15 @@ impl SpeedConstraints {
         }
     }
 
-    /// Counts potentials anew from block `seq` on, the next one, unless they are from another block in the queue already.
+    /// Counts potentials anew from block `seq` on, the next one. Does nothing if there is such a place in the queue
+    /// already.
     pub fn count_anew(&mut self, seq: Index) {
         if !some(self.left_out) {
             (self.anew, self.left_out, self.end) = (seq, self.end, 0.0);
         }
     }
 
-    /// Block `seq` is the oldest from now on.
+    /// Notes that block `seq` is the oldest from now on.
     pub fn oldest_is(&mut self, seq: Index) {
         if self.anew == seq {
             self.left_out = 0.0;
@@ -241,19 +243,19 @@ impl SpeedConstraints {
         some(self.left_out)
     }
 
-    /// A potential at block `seq`, counted as at the `oldest` one. Cost: 150.
+    /// Returns a potential at block `seq`, counted as at the `oldest` block. Cost: 150.
     pub fn lifted(&self, potential: f32, seq: Index, oldest: Index) -> f32 {
         let place = |seq: Index| seq.wrapping_sub(oldest) & SEQ;
         if place(seq) >= place(self.anew) { potential + self.left_out } else { potential }
     }
 
-    /// What potentials of older blocks than that from which they are counted anew have more; `next` is the block to be
-    /// queued next.
+    /// Returns by how much potentials are higher at blocks before the one from which they are counted anew. `next` is
+    /// the block to be queued next.
     pub fn older(&self, next: Index) -> Older {
         Older { behind: next.wrapping_sub(self.anew) & SEQ, more: self.left_out }
     }
 
-    /// These overrides are wanted.
+    /// Sets the overrides that are wanted.
     pub fn want(&mut self, factors: Factors) {
         self.wanted = factors;
         self.changed = true;
@@ -265,22 +267,22 @@ impl SpeedConstraints {
         (self.wanted, self.planned) = (Factors::ONE, Factors::ONE);
     }
 
-    /// Other keys in the place of all. Cost: 1,500.
+    /// Replaces all keys. Cost: 1,500.
     pub fn replace(&mut self, keys: &Keys) {
         (self.seqs, self.entries) = (keys.seqs, keys.entries);
         (self.front, self.len) = (keys.front, BLOCKS as Index - keys.front);
     }
 
-    /// The overrides in force: those that are wanted, as far as the keys allow.
+    /// Returns the overrides in force: the wanted ones, as far as the keys allow.
     #[inline(always)]
     pub fn factors(&self) -> Factors {
         self.wanted.least(&self.planned)
     }
 
-    /// The factor in force of a line with this reserve.
+    /// Returns the factor in force for a line with this reserve.
     #[inline(always)]
     pub fn factor(&self, reserve: Reserve) -> f32 {
-        // One of the two, because comparisons take time.
+        // Only one of the two factors, because comparisons take time.
         if reserve == Reserve::TRAVERSE {
             least(self.wanted.traverse, self.planned.traverse)
         } else {
@@ -294,7 +296,7 @@ impl SpeedConstraints {
     }
 }
 
-/// Keys that are to be those of the speed constraints, made from the last one to the first.
+/// New keys for the speed constraints, made from the last one to the first.
 pub struct Keys {
     front: Index,
     seqs: [Index; BLOCKS],
@@ -307,7 +309,7 @@ impl Keys {
         Self { front: BLOCKS as Index, seqs: [0; BLOCKS], entries: [0; BLOCKS] }
     }
 
-    /// Adds the key of a block that comes before all others, if there is room.
+    /// Adds the key of a block that comes before all other keys, if there is room.
     pub fn add_before(&mut self, seq: Index, entry: Short) {
         let front = usize::from(self.front.wrapping_sub(1));
         if let (Some(to), Some(velocity)) = (self.seqs.get_mut(front), self.entries.get_mut(front))
@@ -318,16 +320,16 @@ impl Keys {
     }
 }
 
-/// See [`SpeedConstraints::older`].
+/// By how much potentials of older blocks are higher: see [`SpeedConstraints::older`].
 #[derive(Clone, Copy)]
 pub struct Older {
-    /// How many blocks are counted anew.
+    /// How many of the newest blocks are counted anew.
     behind: Index,
     more: f32,
 }
 
 impl Older {
-    /// For the block that so many have been queued after.
+    /// Returns by how much the potential of a block is higher, after which `back` blocks have been queued.
     #[inline(always)]
     pub fn of(&self, back: Index) -> f32 {
         if back >= self.behind { self.more } else { 0.0 }
@@ -345,7 +347,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// What `slower` is to say, one key after the other.
+    /// What `slower` is to return, found one key after the other.
     fn expected(constraints: &SpeedConstraints, n: u8, velocity: Short) -> u8 {
         let stops = |n: &u8| {
             constraints.nth(*n).is_some_and(|seq| seq & FIRM != 0)

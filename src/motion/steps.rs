@@ -1,9 +1,9 @@
 //! Where the motors are when the axes have arrived: exact integers, from absolute positions.
 //!
-//! Owned by the line builder. A motor's position is its axis' position times the ratio of two integers, known to
-//! 1/16 step and what is left of that. Rounded to the nearest step, half away from zero, it is what [`StepRatio::steps`] says.
-//! A short move starts from the position before and what was left there, which gives the same with small numbers, in one
-//! division.
+//! Owned by the line builder. A motor's position is the position of its axis times the ratio of two integers. It is
+//! known to 1/16 step, and by the exact remainder below that. Rounded to the nearest step, half away from zero, it is
+//! what [`StepRatio::steps`] returns. A short move starts from the position before and its remainder. That gives the
+//! exact position too, with small numbers and a single division.
 
 use kerf_macros::small;
 
@@ -19,13 +19,13 @@ const PARTS: u8 = 1 << PARTS_LOG2;
 /// Half a step, in parts.
 const HALF: i8 = PARTS as i8 / 2;
 
-/// No rest is known.
+/// The remainder is not known.
 const NONE: u16 = u16::MAX;
 
-/// The most parts of a short way: with what rounding adds at both ends it fits 16 bits.
+/// The most parts of a short way: with what rounding adds at both ends, the way fits 16 bits.
 const PARTS_MAX: u16 = 0x7EFF;
 
-/// More steps than [`PARTS_MAX`] wherever the way begins.
+/// A number of steps that is more than [`PARTS_MAX`], wherever the way begins.
 const STEPS_MAX: u16 = (PARTS_MAX >> PARTS_LOG2) + 3;
 
 /// A motor at the end of the last block.
@@ -33,11 +33,11 @@ const STEPS_MAX: u16 = (PARTS_MAX >> PARTS_LOG2) + 3;
 pub struct Motor {
     /// Position plus half a step, in steps, rounded down.
     steps: i32,
-    /// What that leaves, in units of 1 / (parts * den); [`NONE`] if it does not fit.
+    /// What `steps` and `part` leave, in units of 1 / (parts * den); [`NONE`] if it does not fit.
     rest: u16,
-    /// What that leaves, in parts.
+    /// What `steps` leaves, in parts, rounded down.
     part: u8,
-    /// Where blocks have taken the motor to, from half a step before `steps`, in parts.
+    /// Where blocks have taken the motor to, in parts, measured from half a step before `steps`.
     told: i8,
 }
 
@@ -48,23 +48,23 @@ impl Default for Motor {
 }
 
 impl Motor {
-    /// A motor whose axis is at `position`. Cost: 1,500.
+    /// Returns a motor whose axis is at `position`. Cost: 1,500.
     #[inline(never)]
     #[small]
     pub fn at(ratio: StepRatio, position: Length) -> Self {
         let steps = ratio.steps(position);
-        // Beyond the range of steps there is no rest, and no short way from there.
+        // Beyond the range of steps no remainder is known, and no short way starts there.
         if steps.unsigned_abs() >= i32::MAX as u32 {
             return Self::counted(steps);
         }
-        // Modulo 2^32, of which the result is the lesser half.
+        // Modulo 2^32: the result fits an `i32`.
         let rest = (position.0 as u32)
             .wrapping_mul(ratio.num)
             .wrapping_sub((steps as u32).wrapping_mul(ratio.den)) as i32;
-        // In 32 bits; what that takes off a large denominator is no matter, for then no rest is known.
+        // In 32 bits. What the shift takes off a large denominator does not matter: no remainder is known then.
         let octaves = if ratio.den < 1 << 26 { 0 } else { 6 };
         let (rest, den) = (rest >> octaves, ratio.den >> octaves);
-        // At least 0, for the rest is half of it at most.
+        // At least 0: the remainder is at most half of the denominator.
         let mut rest = (rest * i32::from(PARTS) + den as i32 * i32::from(HALF)) as u32;
         let mut part = 0;
         while rest >= den && part < PARTS - u8::from(octaves != 0) {
@@ -72,7 +72,7 @@ impl Motor {
             part += 1;
         }
         let rest = if rest < 0x4000 { rest as u16 } else { NONE };
-        // Half a step away from zero.
+        // `part` is a whole step where half a step has been rounded away from zero.
         let mut motor = Self {
             steps: steps + i32::from(part >> PARTS_LOG2),
             rest,
@@ -83,17 +83,17 @@ impl Motor {
         motor
     }
 
-    /// A motor that is at this step, wherever between two its axis may be.
+    /// Returns a motor that is at this step, wherever between two steps its axis may be.
     pub fn counted(steps: i32) -> Self {
         Self { steps, rest: NONE, part: HALF as u8, told: HALF }
     }
 
-    /// The step that it is at, rounded.
+    /// The step at which the motor is, rounded.
     pub fn steps(&self) -> i32 {
         self.steps.wrapping_add((self.told >> PARTS_LOG2).into())
     }
 
-    /// The axis' position is called `position` from now on. The motor does not move.
+    /// Calls the axis' position `position` from now on. The motor does not move.
     #[small]
     pub fn rename(&mut self, ratio: StepRatio, position: Length) {
         let fraction = self.told & (PARTS as i8 - 1);
@@ -101,8 +101,8 @@ impl Motor {
         self.told = (self.told & !(PARTS as i8 - 1)) + fraction;
     }
 
-    /// Moves the axis by `travel` to `position`. The way of the motor, in parts of a step; `None`, and nothing done, if that does not fit.
-    /// Cost: 400 for short moves.
+    /// Moves the axis by `travel` to `position`. Returns the way of the motor in parts of a step, or `None`, with
+    /// nothing done, if that does not fit. Cost: 400 for short moves.
     #[inline(never)]
     pub fn go(&mut self, ratio: StepRatio, travel: i32, position: Length) -> Option<i16> {
         if let Some(way) = self.go_near(ratio, travel, position) {
@@ -111,7 +111,8 @@ impl Motor {
         self.go_far(ratio, travel, position)
     }
 
-    /// Moves the axis where 32 and 16 bits are enough for the arithmetic; `None`, and nothing done, otherwise.
+    /// Moves the axis where 32 and 16 bits are enough for the arithmetic. Returns `None`, with nothing done,
+    /// otherwise.
     #[inline(always)]
     fn go_near(&mut self, ratio: StepRatio, travel: i32, position: Length) -> Option<i16> {
         let way = travel.unsigned_abs();
@@ -120,11 +121,11 @@ impl Motor {
             return None;
         }
         let way = product(way as u16, num);
-        // So that the sum is below 2^31.
+        // Keeps the sum below 2^31.
         if (way >> 24) as u8 >= 4 {
             return None;
         }
-        // Rounded down, so up if it goes back.
+        // Positions are rounded down, so a way back is rounded up.
         let back = travel < 0;
         let more = if back { den - 1 - rest } else { rest };
         let sum = (way << PARTS_LOG2) + u32::from(more);
@@ -145,7 +146,8 @@ impl Motor {
         Some((to & !(i16::from(PARTS) - 1)) + i16::from(told) - i16::from(before))
     }
 
-    /// Moves the axis as [`Motor::go`] does, for ways of any size. Cost: 2,000; 300 if it is too far by more than rounding.
+    /// Moves the axis as [`Motor::go`] does, for ways of any size. Cost: 2,000; 300 if the way is too long by more
+    /// than rounding.
     #[inline(never)]
     #[small]
     fn go_far(&mut self, ratio: StepRatio, travel: i32, position: Length) -> Option<i16> {
@@ -175,7 +177,7 @@ impl Motor {
         i64::from(to) - i64::from(from)
     }
 
-    /// Takes back a way in parts, the one gone last, to `position`.
+    /// Takes back the last way, which was `way` parts, so that the axis is at `position` again.
     #[inline(never)]
     #[small]
     pub fn put_back(&mut self, ratio: StepRatio, position: Length, way: i16) {
@@ -185,7 +187,8 @@ impl Motor {
         self.told = parts.wrapping_add(i32::from(told) - i32::from(way)) as i8;
     }
 
-    /// Where blocks are to take it to: where it is, but so far from half a step that rounding cannot tell of another one.
+    /// Returns where blocks are to take the motor: where it is, but so far from half a step that rounding errors
+    /// cannot lead to another step.
     #[inline(always)]
     fn tell(&self, position: Length) -> i8 {
         const LEAST: u8 = (FRACTIONS.0 + HALF) as u8;
@@ -239,7 +242,7 @@ mod tests {
                 prop_assert_eq!(of(&motor), (fresh.steps, fresh.rest, fresh.part, told));
                 let exact = f64::from(position.0) * f64::from(num) / f64::from(den);
                 let off = exact - f64::from(fresh.steps) - f64::from(fresh.told - 8) / 16.0;
-                // Rounded down but where it is nearly half a step; beyond the range there is none.
+                // Rounded down, except near half a step. Beyond the range of steps nothing is checked.
                 let near = (-0.0626..0.1251).contains(&off) || exact.abs() > 2e9;
                 prop_assert!(near, "{off} steps off");
             }

@@ -1,4 +1,4 @@
-//! The end of the block queue: the line that the next one follows, and whether that one needs a key.
+//! The end of the block queue: the line that the next line follows, and whether the next line needs a key.
 //!
 //! Part of `queue`. Units: mm/s, brake potentials as in `speed_constraints`. Costs are AVR cycles.
 
@@ -13,7 +13,7 @@ use super::speed_constraints::{self, kappa};
 use crate::hal::ring::Index;
 use crate::math::sqrt;
 
-/// A corner is worth a key if it is slower than this share of what holds on both sides.
+/// A corner is worth a key if it is slower than this share of the velocities on both sides.
 pub(super) const WORTH: f32 = 0.999;
 
 /// What the next line follows.
@@ -28,7 +28,7 @@ pub(super) struct Tail {
 #[derive(Clone, Copy)]
 pub(super) struct Last {
     pub(super) cruise: f32,
-    /// The highest velocity since the last key: many that are a little slower each do need one.
+    /// The highest velocity since the last key: many lines that are each a little slower do need a key.
     pub(super) high: f32,
     kappa: f32,
     limits: (Short, Short),
@@ -45,12 +45,12 @@ pub(super) struct Key {
 }
 
 impl Last {
-    /// Whether `line` brakes otherwise, so that keys before and after it do not compare.
+    /// Whether `line` has other jerk limits, so that keys before and after it do not compare.
     fn jerk_limits_change(&self, line: &Line, kappa: f32) -> bool {
         self.limits != (line.accel, line.jerk) && (some(self.kappa) || some(kappa))
     }
 
-    /// Whether a line has the same velocity, at its start as well.
+    /// Whether a line has this velocity too, also at its start.
     fn as_fast(&self, cruise: f32, entry: f32) -> bool {
         let cruise = cruise.to_bits();
         entry.to_bits() >= cruise
@@ -60,7 +60,8 @@ impl Last {
 }
 
 impl Tail {
-    /// A line follows that starts at `line.start`, and whose corner may be taken at `entry`. Its key, if it needs one. Cost: 150 if it does not.
+    /// Takes up a line that starts at potential `line.start`, and whose corner may be taken at `entry`. Returns its
+    /// key, or `None` if it needs none. Cost: 150 if it needs none.
     #[inline(always)]
     pub(super) fn follow(&mut self, line: &mut Line, entry: f32) -> Option<Key> {
         line.entry = Short::new(entry);
@@ -68,14 +69,14 @@ impl Tail {
         if self.goes_on(line, cruise, entry) { None } else { self.corner(line, cruise, entry) }
     }
 
-    /// Whether the line is as fast as the one before, and the corner between them no limit.
+    /// Whether the line is as fast as the one before, and the corner between them is no limit.
     fn goes_on(&self, line: &Line, cruise: f32, entry: f32) -> bool {
         self.last.as_ref().is_some_and(|last| {
             last.limits == (line.accel, line.jerk) && last.as_fast(cruise, entry)
         })
     }
 
-    /// The key of a line that does not simply go on, if it needs one.
+    /// Returns the key of a line that does not simply go on, or `None` if it needs none.
     #[inline(never)]
     fn corner(&mut self, line: &mut Line, cruise: f32, entry: f32) -> Option<Key> {
         let limits = (line.accel, line.jerk);
@@ -85,7 +86,8 @@ impl Tail {
         let mut is_worth = true;
         match &mut self.last {
             None => entry = 0.0,
-            // What comes before brakes with its own limits, and that does not go on: the new line must be able to stop on its own.
+            // What comes before brakes with its own limits, which do not go on: the new line must be able to stop on
+            // its own.
             Some(last) if last.jerk_limits_change(line, own) => {
                 entry = able_to_stop(line, entry, greater(own, last.kappa));
                 (brakes, firm) = (last.kappa, FIRM);
@@ -114,7 +116,8 @@ impl Tail {
     }
 }
 
-/// The velocity, at most `entry`, from which a line can come to rest on its own way, for limits with this [`kappa`].
+/// Returns the velocity, at most `entry`, from which a line can come to rest within its own length, for limits with
+/// this [`kappa`].
 #[inline(never)]
 #[small]
 fn able_to_stop(line: &Line, entry: f32, kappa: f32) -> f32 {

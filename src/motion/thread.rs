@@ -1,25 +1,29 @@
-//! A move in step with the spindle: how fast the axes go, so that they are where its angle says.
+//! A move in step with the spindle: how fast the axes must go to be where its angle says.
 //!
-//! Owned by exec, which asks [`Thread::velocity`] for each stretch of a pass and tells what it has handed out; at the exec level. In a
-//! pass a line is no faster than this says. What it ends at, and that it ends at rest, is the governor's as for any line: the proof
-//! that every motion ends on its step does not know of threads. Units: mm along the path, s; time is in counts of the encoder and CPU cycles.
+//! Owned by exec, at the exec level. Exec asks [`Thread::velocity`] for each stretch of a pass, and tells what it has
+//! handed out. A line of a pass is no faster than this velocity. Where a line ends, and that it ends at rest, is up
+//! to the governor as for any line: the proof that every motion ends on its step does not involve threads. Units: mm
+//! along the path, s. Time is in counts of the encoder and CPU cycles.
 //!
-//! **The phase line** is where the axes are to be: 0 at the first pulse of sync behind an index, and `lead` further on with each turn.
-//! Its place at the last pulse is known exactly. From there it is carried on at the speed of the last pulses to
-//! the moment at which all that has been queued ends: segments are queued 4 to 9 ms ahead of the pins, and since ticks are exact
-//! to the cycle, that moment is known, and so is where the axes are then. What remains of dead time is one stretch, 2 ms.
+//! **The phase line** is where the axes are to be: 0 at the first pulse of sync behind an index, and `lead` further
+//! on with each turn. Its place at the last pulse is known exactly. From there it is extrapolated, at the speed of
+//! the last pulses, to the moment at which all that has been queued ends. Segments are queued 4 to 9 ms ahead of the
+//! pins. Ticks are exact to the cycle, so that this moment, and where the axes are then, are known. The dead time
+//! that remains is one stretch: 2 ms.
 //!
-//! **The law.** With `e` the way from the axes to the line, and `u` the speed of the line, the axes are to go at `u + c`, where `c` has the sign of `e` and is the
-//! lesser of [`GAIN`]` * e` and `sqrt(2 b e)`, with `b` seven tenths of the acceleration limit. The root is the ramp that meets the line
-//! at its speed. So the axes start before the line comes to them, by half the time of the ramp, and meet
-//! it wherever that is: the phase does not depend on the speed. It leaves them three tenths of the limit to correct what is left over.
+//! **The law.** `e` is the distance from the axes to the line, and `u` the speed of the line. The axes are to go at
+//! `u + c`, where `c` has the sign of `e` and is the lesser of [`GAIN`]` * e` and `sqrt(2 b e)`, with `b` seven
+//! tenths of the acceleration limit. The root is the ramp that meets the line at its speed. So the axes start before
+//! the line reaches them, by half the time of the ramp, and the phase at which they meet it does not depend on the
+//! speed. Three tenths of the limit remain to correct what is left over.
 //!
-//! **The start.** A line that has passed the axes at rest comes again a turn later: it is taken back by `lead`.
+//! **The start.** If the line has passed the axes while they rest, it is set back by `lead`: it comes again a turn
+//! later.
 //!
-//! **Pulses that do not fit.** A pulse that comes after twice the time of the one before stands for two, one that comes too soon for none. The
-//! next index says whether that was right. A pulse that is overdue by more than a second one means that the
-//! [spindle is lost](Thread::fault); until then the line goes on at its speed. With a single pulse a turn there is nothing to tell a pulse that is missing from a
-//! spindle at half its speed: it is taken for missing.
+//! **Pulses that do not fit.** A pulse that comes after twice the usual time counts for two. A pulse that comes too
+//! soon counts for none. The next index shows whether that was right. The [spindle is lost](Thread::fault) when two
+//! pulses in a row are overdue; until then the line goes on at its speed. With a single pulse a turn, a missing pulse
+//! looks like a spindle at half its speed: it is taken for a missing pulse.
 //!
 //! Cost on AVR: 2,500 cycles a stretch, 1,500 more with a pulse. RAM: 41 bytes.
 
@@ -34,41 +38,42 @@ use crate::hal::TIMER_HZ;
 use crate::math::sqrt;
 use crate::status::Status;
 
-/// How much of the way to the line is made up in a second: half of it in a stretch.
+/// Correction velocity per distance to the line, 1/s: half of the distance is made up in a stretch.
 const GAIN: f32 = 250.0;
 
-/// The part of the acceleration limit that the ramp takes.
+/// The share of the acceleration limit that the ramp takes.
 const SHARE: f32 = 0.7;
 
-/// The speed is that of pulses at least so many counts apart: 16 ms.
+/// The least time over which the speed is measured, counts: 16 ms.
 const WINDOW: u32 = COUNTS_PER_S / 1_000 * 16;
 
-/// The spindle is lost when no pulse has come for so many times as long as from one to the next.
+/// The spindle is lost when no pulse has come for this many intervals between pulses, and [`SLACK`].
 const OVERDUE: f32 = 2.01;
 
-/// And for so many counts more, 0.5 ms: pulses do not come quite evenly.
+/// What is added to the time after which the spindle is lost, counts: 0.5 ms, since pulses do not come quite evenly.
 const SLACK: f32 = COUNTS_PER_S as f32 * 0.0005;
 
-/// A pulse of a spindle that slows down is of the way there up to this part of the time to its standstill; a later one is of the way back. A forward
-/// one that is taken for that is off by a pulse; the other way round nothing would ever turn.
+/// A spindle slows down to turn round. A pulse counts as forward up to this share of the time to the standstill; a
+/// later pulse belongs to the way back. A forward pulse that is taken for one of the way back is off by a pulse.
+/// After the opposite mistake the spindle would never be seen to turn round.
 const FORWARD: f32 = 0.85;
 
-/// A spindle that turns round has so long between two pulses, counts: 6 s.
+/// The longest time between two pulses of a spindle that turns round, counts: 6 s.
 const PATIENCE: f32 = COUNTS_PER_S as f32 * 6.0;
 
-/// What is queued lasts so many counts at most, 16 ms.
+/// The longest time that the queued segments last, counts: 16 ms.
 const QUEUED: f32 = COUNTS_PER_S as f32 * 0.016;
 
-/// CPU cycles of a count.
+/// CPU cycles in a count.
 const CYCLES: u32 = TIMER_HZ / COUNTS_PER_S;
 
-/// Slower is standing still, mm/s.
+/// A velocity below this is a standstill, mm/s.
 const SLOWEST: f32 = 0.01;
 
-/// How far a pulse may be from its time, as a share of the time between two.
+/// How far a pulse may be from its expected time, as a share of the interval between two.
 const MISFIT: f32 = 0.6;
 
-/// How the pass stands.
+/// The stages of a pass, in this order.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Debug, Default)]
 enum Stage {
     /// No pass.
@@ -76,19 +81,19 @@ enum Stage {
     Off,
     /// Waits for an index.
     Armed,
-    /// Waits for the first pulse of sync behind it.
+    /// Waits for the first pulse of sync behind the index.
     Indexed,
-    /// The line is known; the axes stand still.
+    /// The phase line is known; the axes stand still.
     Known,
-    /// The axes follow.
+    /// The axes follow the phase line.
     Follows,
-    /// They have been within the limit of the error.
+    /// The axes have been within the limit of the error.
     Met,
     /// G33.1: the spindle has been told to turn round.
     Turning,
-    /// It is about to, or has: the axes come to rest.
+    /// The spindle is about to turn round, or has: the axes come to rest.
     Top,
-    /// It has.
+    /// The spindle has turned round.
     Turned,
     /// What was left of the line has been dropped: the way back is to come.
     Waits,
@@ -98,50 +103,51 @@ enum Stage {
     Astray,
 }
 
-/// A pass.
+/// A pass in step with the spindle.
 #[derive(Debug, Default)]
 pub struct Thread {
     stage: Stage,
     per_turn: u16,
     lead: f32,
-    /// Where the line was at the last pulse, from where the axes are at the end of what is queued.
+    /// Distance from where the axes are at the end of what is queued to where the line was at the last pulse, mm.
     ahead: f32,
-    /// Counts from pulse to pulse.
+    /// Time from pulse to pulse, counts.
     interval: f32,
-    /// When the last pulse came, and since when the speed is being measured over how many pulses.
+    /// `at` is when the last pulse came, in counts. The speed is measured over the `measured` pulses since `since`.
     at: u32,
     since: u32,
     measured: u16,
-    /// Pulses by then, and those of sync that the last index has seen, modulo 256: they are looked at every few ms.
+    /// The pulses, the indices, and the pulses of sync at the last index: all as of the last look and modulo 256,
+    /// since they are looked at every few ms.
     pulses: u8,
     index: u8,
     expected: u8,
-    /// Pulses that were put in since the last index, less those that were left out.
+    /// Pulses that were put in since the last index, less the pulses that were left out.
     mended: i8,
     /// When what is queued ends, CPU cycles.
     end: u32,
-    /// There has been an index since [`Thread::error`] was asked last.
+    /// Whether an index has come since [`Thread::error`] was asked last.
     indexed: bool,
     kind: Kind,
 }
 
-/// What becomes of the pass.
+/// How the pass ends.
 #[derive(Clone, Copy, Debug)]
 enum Kind {
-    /// It ends with its lines.
+    /// G33, a pass of G76: it ends with its lines.
     Pass {
         /// How far the axes may be off, mm; 0 for no limit.
         limit: Short,
         /// How it is left before its end.
         retract: Retract,
     },
-    /// G33.1.
+    /// G33.1: the axes go back when the spindle has turned round.
     Tap {
-        /// So many mm before the end of the line the spindle is to turn round.
+        /// Distance to the end of the line at which the spindle is to turn round, mm.
         turn_at: f32,
-        /// By how much the spindle slows down: pulses a count, in a count.
+        /// By how much the spindle slows down: pulses a count, per count.
         decel: f32,
-        /// How long the speed has been measured last, counts.
+        /// Over how long the speed was measured last, counts.
         window: u16,
     },
 }
@@ -179,7 +185,7 @@ impl Thread {
         }
     }
 
-    /// Why the pass is to end at once, if it is.
+    /// Returns why the pass is to end at once, or `None` if it is not.
     pub fn fault(&self) -> Option<Status> {
         match self.stage {
             Stage::Lost => Some(Status::SpindleLost),
@@ -188,7 +194,7 @@ impl Thread {
         }
     }
 
-    /// A pass begins.
+    /// Begins a pass.
     pub fn begin(pass: &Pass) -> Self {
         let Pass { lead, limit, retract, turn_at } = *pass;
         let kind = match some(turn_at) {
@@ -198,12 +204,13 @@ impl Thread {
         Self { stage: Stage::Armed, lead, kind, ..Self::new() }
     }
 
-    /// Whether it is G33.1, and the axes have begun to follow: it must not rest but where the spindle does.
+    /// Whether this is G33.1 and the axes have begun to follow. From then on they may rest only where the spindle
+    /// does.
     pub fn is_tapping(&self) -> bool {
         matches!(self.kind, Kind::Tap { .. }) && self.stage >= Stage::Follows
     }
 
-    /// Whether the spindle is to be told now to turn round, with so many mm of the line left. It says so once.
+    /// Whether the spindle is to be told now to turn round, with `left` mm of the line left. True only once.
     pub fn is_to_turn(&mut self, left: f32) -> bool {
         let turns = match self.kind {
             Kind::Tap { turn_at, .. } => self.stage == Stage::Follows && left <= turn_at,
@@ -220,17 +227,17 @@ impl Thread {
         self.stage >= Stage::Turning && self.stage < Stage::Lost
     }
 
-    /// Whether the axes are to rest, for the spindle turns round.
+    /// Whether the axes are to rest, because the spindle turns round.
     pub fn rests(&self) -> bool {
         matches!(self.stage, Stage::Top | Stage::Turned | Stage::Waits)
     }
 
-    /// Whether it has turned round, and the way back may begin.
+    /// Whether the spindle has turned round, and the way back may begin.
     pub fn has_turned(&self) -> bool {
         self.stage == Stage::Turned
     }
 
-    /// What was left of the line has been dropped. Whether the way back is to come.
+    /// Notes that the rest of the line has been dropped. Returns whether the way back is to come.
     pub fn drop_rest(&mut self) -> bool {
         let waits = self.stage == Stage::Turned;
         if waits {
@@ -244,18 +251,18 @@ impl Thread {
         self.stage == Stage::Waits
     }
 
-    /// Pulses are told the other way round from here on.
+    /// Notes that pulses count in the opposite direction from here on.
     pub fn mirror(&mut self) {
         self.pulses = self.pulses.wrapping_neg();
     }
 
-    /// It begins, with the phase of the way there.
+    /// Begins the way back, with the phase of the way there.
     pub fn turn_back(&mut self) {
         self.ahead = -self.ahead;
         self.stage = Stage::Follows;
     }
 
-    /// How the pass is left before its end, if the axes have begun to follow.
+    /// Returns how the pass is left before its end; [`Retract::NONE`] while the axes have not begun to follow.
     pub fn retract(&self) -> Retract {
         match self.kind {
             Kind::Pass { retract, .. } if self.stage >= Stage::Follows => retract,
@@ -263,30 +270,31 @@ impl Thread {
         }
     }
 
-    /// From here on the path goes so many mm a turn: a taper, or the end of one.
+    /// Sets how far the path goes in a turn from here on, mm: a taper begins or ends.
     pub fn set_lead(&mut self, lead: f32) {
         self.ahead *= lead / self.lead;
         self.lead = lead;
     }
 
-    /// The steppers have been started, and make their first tick so many cycles after `time`, in counts. All that is queued since they stood
-    /// still has been [told](Thread::queued).
+    /// Anchors the end of what is queued in time. The steppers have been started, and make their first tick `cycles`
+    /// after `time`, which is in counts. All that is queued since they stood still has been [told](Thread::queued).
     pub fn anchor(&mut self, time: u32, cycles: u32) {
         self.end = self.end.wrapping_add(time.wrapping_mul(CYCLES)).wrapping_add(cycles);
     }
 
-    /// So many cycles more are queued, to steppers at a `standstill` or not.
+    /// Adds `cycles` that have been queued. `standstill`: the steppers stood still before.
     pub fn queued(&mut self, cycles: u32, standstill: bool) {
         let before = if standstill { 0 } else { self.end };
         self.end = before.wrapping_add(cycles);
     }
 
-    /// What is queued goes so much further.
+    /// Adds `distance`, mm, to where the axes are at the end of what is queued.
     pub fn handed(&mut self, distance: f32) {
         self.ahead -= distance;
     }
 
-    /// Takes up what sensors have seen by `time`, of a spindle that the encoder knows. Whether it has turned round just now.
+    /// Takes up what the sensors have seen by the time of `encoder`. Returns whether the spindle has turned round
+    /// just now.
     #[inline(never)]
     pub fn note(&mut self, pulses: &Pulses, encoder: &Encoder) -> bool {
         let (time, per_turn, turn) = (encoder.time(), encoder.per_turn(), encoder.turn());
@@ -342,8 +350,8 @@ impl Thread {
         self.has_turned() && !had_turned
     }
 
-    /// How far the axes, which go at `velocity` at the end of what is queued, were ahead of the line at the last pulse, mm: behind an
-    /// index, and while they follow.
+    /// Returns how far the axes were ahead of the line at the last pulse, mm, for axes that go at `velocity` at the
+    /// end of what is queued. `None` unless the axes follow and an index has come since the last call.
     pub fn error(&mut self, velocity: f32) -> Option<f32> {
         let indexed = core::mem::take(&mut self.indexed) && self.follows();
         let late = self.end.wrapping_sub(self.at.wrapping_mul(CYCLES)) as i32;
@@ -354,7 +362,8 @@ impl Thread {
         matches!(self.stage, Stage::Follows | Stage::Met)
     }
 
-    /// Whether the time between two pulses tells nothing of the next: the spindle turns round, or has, and changes its speed too much from one to the other.
+    /// Whether the time between two pulses tells nothing of the next interval: the spindle turns round, or has
+    /// turned, and its speed changes too much from one pulse to the next.
     #[inline(never)]
     fn turns_unevenly(&self) -> bool {
         match self.kind {
@@ -365,16 +374,16 @@ impl Thread {
         }
     }
 
-    /// mm a pulse.
+    /// Distance along the path in a pulse, mm.
     #[inline(never)]
     fn pitch(&self) -> f32 {
         self.lead / f32::from(self.per_turn)
     }
 
-    /// An index has come, `turns` after the last, when sync had given so many pulses.
+    /// Corrects the phase at an index that comes `turns` after the last one, when sync has given `at_index` pulses.
     fn check_turns(&mut self, turns: u8, at_index: u8) {
         let expected = self.expected.wrapping_add(turns.wrapping_mul(self.per_turn as u8));
-        // Too few by so many.
+        // How many pulses are missing; negative if there are too many.
         let short = expected.wrapping_sub(at_index) as i8;
         let wrong = i16::from(short) - i16::from(self.mended);
         if wrong != 0 && self.stage > Stage::Indexed {
@@ -383,7 +392,7 @@ impl Thread {
         (self.expected, self.mended) = (at_index, 0);
     }
 
-    /// So many pulses have come, the last of them `at` this time.
+    /// Takes up `new` pulses, the last of them at time `at`. Mends the count if they do not fit.
     #[inline(never)]
     fn take(&mut self, new: u8, at: u32) {
         let after = at.wrapping_sub(self.at) as f32;
@@ -403,7 +412,7 @@ impl Thread {
         self.keep_pace(true_count, at);
     }
 
-    /// So many pulses more are counted, the last of them `at` this time: how fast they come.
+    /// Counts `count` more pulses, the last of them at time `at`, and measures how fast they come.
     #[inline(never)]
     fn keep_pace(&mut self, count: f32, at: u32) {
         self.at = at;
@@ -415,7 +424,7 @@ impl Thread {
         let counts = window as f32;
         let interval = counts / f32::from(self.measured);
         if let Kind::Tap { decel, window: before, .. } = &mut self.kind {
-            // From the middle of one time to that of the other.
+            // From the middle of one window to the middle of the other.
             let apart = 0.5 * (counts + f32::from(*before));
             *decel = (1.0 / self.interval - 1.0 / interval) / apart;
             *before = u16::try_from(window).unwrap_or(u16::MAX);
@@ -424,8 +433,9 @@ impl Thread {
         (self.since, self.measured) = (at, 0);
     }
 
-    /// Pulses of a spindle that is about to turn round. If they tell the direction, it has when they count down. Else one that comes about when it stands, or later, is of the way back, over the mark of the last one; where the
-    /// spindle is then follows from how it has slowed down.
+    /// Takes up pulses of a spindle that is about to turn round. If pulses tell the direction, the spindle has turned
+    /// when they count down. Otherwise a pulse that comes at about the standstill, or later, belongs to the way back,
+    /// over the mark of the last pulse. Where the spindle is then follows from how it has slowed down.
     #[inline(never)]
     fn take_turning(&mut self, new: u8, tells: bool, at: u32) {
         let after = at.wrapping_sub(self.at) as f32;
@@ -440,32 +450,33 @@ impl Thread {
             return self.keep_pace(count, at);
         }
         let back = decel * after - rate;
-        // The first on the way back is at the mark of the last on the way there.
+        // The first pulse on the way back is at the mark of the last one on the way there.
         let way =
             if tells { f32::from(new as i8) + 1.0 } else { (rate - 0.5 * decel * after) * after };
         self.ahead += self.pitch() * way;
-        // Where it is not known how it slows down, as if it had gone a pulse in that time.
+        // If the deceleration is not known, the spindle is taken to go a pulse in that time.
         self.interval = if back > 0.0 { 1.0 / back } else { after };
         (self.at, self.since, self.measured) = (at, at, 0);
         if let Kind::Tap { decel, window, .. } = &mut self.kind {
-            // The speed is that of this moment.
+            // The speed is now that of this moment, not the mean of a window.
             (*decel, *window) = (-*decel, 0);
         }
         self.stage = Stage::Turned;
     }
 
-    /// Pulses a count at the last pulse, and by how much that falls in a count.
+    /// Returns the speed at the last pulse, in pulses a count, and by how much it falls in a count.
     #[inline(never)]
     fn pace(&self) -> (f32, f32) {
         let mean = 1.0 / self.interval;
         let Kind::Tap { decel, window, .. } = self.kind else { return (mean, 0.0) };
-        // The mean is that of the middle of the last window.
+        // The mean is the speed in the middle of the last window.
         let since = 0.5 * f32::from(window) + self.at.wrapping_sub(self.since) as f32;
         (greater(mean - decel * since, 0.0), decel)
     }
 
-    /// The velocity to be reached in the next stretch, mm/s, from `velocity`; 0 for none. Time of which `kept` cycles have not been queued
-    /// belongs to what is. The error is held against its limit unless the axes slow down for the end, `brakes`.
+    /// Returns the velocity to be reached in the next stretch, mm/s, from `velocity`; 0 for a standstill. `kept` is
+    /// time in cycles that has not been queued, but belongs to what is queued. The error is held against its limit
+    /// unless the axes slow down for the end (`brakes`).
     #[inline(never)]
     pub fn velocity(&mut self, kept: i32, velocity: f32, accel: f32, brakes: bool) -> f32 {
         if self.stage < Stage::Known {
@@ -483,14 +494,15 @@ impl Thread {
         if self.rests() {
             return 0.0;
         }
-        // A spindle that turns round may stop dead: it is not far beyond the next pulse until that comes.
+        // A spindle that turns round may stop dead. Until its next pulse comes, it is not far beyond the place of
+        // that pulse.
         let most = rate * QUEUED + 1.7;
         if gone > most && self.turns_unevenly() {
             (gone, speed) = (most, 0.0);
         }
         let mut way = self.ahead + self.pitch() * gone;
         if self.stage == Stage::Known {
-            // What 4 ms bring is made up for.
+            // The axes make up for a line that is up to 4 ms past them.
             while way > 0.004 * speed {
                 way -= self.lead;
                 self.ahead -= self.lead;
@@ -509,7 +521,7 @@ impl Thread {
         wanted
     }
 
-    /// The axes are off by `size` mm.
+    /// Ends the pass if the axes are off by `size` mm and that is above the limit.
     fn hold_against_limit(&mut self, size: f32, brakes: bool) {
         let Kind::Pass { limit, .. } = self.kind else { return };
         let limit = limit.get();
@@ -535,7 +547,7 @@ mod tests {
     /// How far what is queued is ahead of now, counts.
     const AHEAD: u32 = 2_000;
 
-    /// A spindle at a steady speed, and axes that are as fast as they are told within their acceleration.
+    /// Simulates a spindle at a steady speed, and axes that are as fast as they are told within their acceleration.
     struct Pass {
         thread: Thread,
         per_turn: u16,
@@ -545,7 +557,7 @@ mod tests {
         time: u64,
         velocity: f32,
         way: f64,
-        /// Sync pulses that do not come, and that come twice, by number.
+        /// The number of a sync pulse that does not come, and of one that comes twice.
         missing: Option<u64>,
         extra: Option<u64>,
     }
@@ -568,11 +580,11 @@ mod tests {
             pass
         }
 
-        /// What the sensors have seen by now; the spindle was at an index at time 0 of its own.
+        /// What the sensors have seen by now. At time 0 the spindle was at an index.
         fn pulses(&self) -> Pulses {
             let (time, turn, n) = (self.time, u64::from(self.turn), u64::from(self.per_turn));
             let index = time / turn;
-            // Half of the way from pulse to pulse behind the index.
+            // The first pulse of sync is half of the way from pulse to pulse behind the index.
             let half = turn / n / 2;
             let sync_by = |time: u64| (time + half) * n / turn;
             let bent = |count: u64| {
@@ -583,7 +595,7 @@ mod tests {
             let (mut sync, at_index) = (sync_by(time), sync_by(index * turn));
             let told = bent(sync);
             if self.missing == Some(sync) {
-                // The last that has come is the one before.
+                // The last pulse that has come is the one before the missing one.
                 sync -= 1;
             }
             let sync_at = (sync * turn).div_ceil(n).saturating_sub(half);
@@ -667,7 +679,7 @@ mod tests {
                 let mut pass = Pass::new(per_turn, 50_000, 0);
                 pass.run(300);
                 let before = pass.phase();
-                // As if it had happened right now.
+                // As if the fault had happened right now.
                 let base = pass.time * u64::from(per_turn) / 50_000;
                 pass.missing = missing.map(|n| base + n - 7);
                 pass.extra = extra.map(|n| base + n - 7);
@@ -682,13 +694,15 @@ mod tests {
         }
     }
 
-    /// A spindle of 300 turns a minute is told to turn round the part `phase` of the way between two pulses behind a mark, and does within a second. Whether it is lost, or the way back is not that of its pulses.
+    /// Whether a spindle is lost while it turns round, or its way back does not match its pulses. The spindle has 300
+    /// turns a minute. It is told to turn round the part `phase` of the way between two pulses behind a mark, and
+    /// does so within a second.
     fn loses_what_turns_round(per_turn: u16, tells: bool, phase: f64) -> bool {
         let per_second = f64::from(COUNTS_PER_S);
         let rate = 5.0 * f64::from(per_turn);
-        // It is told at this time, s, and slows down by twice its speed in a second.
+        // The spindle is told at this time, s, and slows down by twice its speed in a second.
         let told = (4.0 + phase) / rate;
-        // In pulses.
+        // The place of the spindle, in pulses.
         let place = |at: u64| {
             let (seconds, late) = (at as f64 / per_second, at as f64 / per_second - told);
             rate * seconds - if late > 0.0 { rate * late * late } else { 0.0 }
@@ -732,7 +746,7 @@ mod tests {
             }
         }
         let way = -thread.ahead * f32::from(per_turn);
-        // Behind the mark that it has come back over.
+        // Measured from behind the mark over which it has come back.
         let off = way - (last + 1.0) as f32;
         thread.fault().is_some() || off.abs() > if tells { 0.01 } else { 1.01 }
     }

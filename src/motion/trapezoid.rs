@@ -1,8 +1,8 @@
 //! The governor without a jerk limit: trapezoids of velocity.
 //!
-//! Called by [`Governor::stretch`], exec level. Velocities keep to `v^2 <= headroom + 2 A left`, and a stretch is the solution of
-//! that with its own length in it. Units: mm, s. Cost on AVR: 1,500 cycles a stretch, 2,500 for one that ends a block or
-//! brakes.
+//! Called by [`Governor::stretch`], exec level. At the end of a stretch the velocity keeps to `v^2 <= headroom + 2 A
+//! left`, an equation in which `left` depends on the length of the stretch itself. Units: mm, s. Cost on AVR: 1,500
+//! cycles a stretch, 2,500 for one that ends a block or brakes.
 
 use super::exec::SEGMENT_S;
 use super::float::{OCTAVE, below, greater, least, lesser, log, ratio, scaled, some};
@@ -10,14 +10,15 @@ use super::governor::{Governor, Stretch, same};
 use super::slice::longest;
 use crate::math::sqrt;
 
-/// Logarithms that are further apart leave no doubt about the product of two numbers.
+/// If two logarithms are further apart than this, there is no doubt about the comparison.
 const PLAIN: i32 = OCTAVE / 5;
 
-/// The square of a velocity is not worth a gain of less than a third: as a logarithm.
+/// A gain of less than a third of the velocity's square is not worthwhile: as a logarithm.
 const SCARCE: i32 = 3 * (OCTAVE / 8);
 
 impl Governor {
-    /// The next stretch, of about [`SEGMENT_S`], or twice that where the governor [`spares`](Governor::spares) velocity.
+    /// Returns the next stretch, of about [`SEGMENT_S`], or twice that where the governor
+    /// [`spares`](Governor::spares) velocity.
     #[inline(never)]
     pub(super) fn trapezoid(&mut self, left: f32, cruise: f32, headroom: f32) -> Stretch {
         if self.stays(cruise, headroom) {
@@ -27,12 +28,12 @@ impl Governor {
         }
     }
 
-    /// The next stretch at the velocity that the machine has.
+    /// Returns the next stretch, at the present velocity.
     #[inline(always)]
     fn steadily(&self, left: f32) -> Stretch {
         let v = self.velocity;
         let (seconds, longest) = self.nominal();
-        // Logarithms mostly tell whether the block is over by then.
+        // Logarithms mostly tell whether the stretch reaches the end of the block.
         let beyond = log(v) + log(longest) - log(left);
         if beyond > PLAIN || beyond > -PLAIN && below(left, v * longest) {
             return Stretch { seconds: ratio(left, v), distance: left, ends: true };
@@ -40,25 +41,25 @@ impl Governor {
         Stretch { seconds, distance: v * seconds, ends: false }
     }
 
-    /// The next stretch, with another velocity at its end. Out of line: it saves more registers.
+    /// Returns the next stretch, with another velocity at its end. Out of line, because it saves more registers.
     #[inline(never)]
     fn change(&mut self, left: f32, cruise: f32, headroom: f32) -> Stretch {
         // Rounding may put a stop before the end of the block.
         let headroom = if headroom.is_sign_negative() { 0.0 } else { headroom };
         let v = self.velocity;
         let (seconds, longest) = self.nominal();
-        // Mostly plain: a block that is run through in no more than one.
+        // Logarithms mostly tell that the block is run through in a single stretch.
         if log(v) + log(longest) < log(left) + PLAIN && below(v * longest, left) {
             let gain = self.limits.accel * seconds;
             let half = 0.5 * seconds;
-            // An override may have taken the feed away from under it.
+            // An override may have lowered the feed below the velocity.
             let mut next = greater(lesser(v + gain, cruise), v - gain);
             let mut distance = (v + next) * half;
             let twice = self.limits.accel + self.limits.accel;
             if next * next > headroom + twice * (left - distance) {
                 let b = 0.5 * gain;
                 next = sqrt(b * b + headroom + twice * left - gain * v) - b;
-                // A little more than the limit makes up for rounding.
+                // Braking a little harder than the limit makes up for rounding.
                 let least = v - gain * 1.005;
                 next = greater(lesser(next, cruise), greater(least, 0.0));
                 distance = (v + next) * half;
@@ -71,7 +72,7 @@ impl Governor {
         self.finish(left, cruise, headroom)
     }
 
-    /// How long a stretch is to be, and the longest, s.
+    /// Returns how long a stretch is to be, and the longest, s.
     #[inline(always)]
     fn nominal(&self) -> (f32, f32) {
         if self.spares {
@@ -82,8 +83,8 @@ impl Governor {
         }
     }
 
-    /// Whether the velocity is kept: it is the limit, or, where stretches are longer for want of time, so near to what has to be reached
-    /// at the end of the block that a gain would soon be lost again.
+    /// Whether the velocity is kept. Either it is the limit; or stretches are longer for want of time, and the
+    /// velocity is so near to what has to be reached at the end of the block that a gain would soon be lost again.
     #[inline(always)]
     fn stays(&mut self, cruise: f32, headroom: f32) -> bool {
         let v = self.velocity;
@@ -97,15 +98,16 @@ impl Governor {
         same(v, cruise) || self.spares && below(v, cruise) && log(headroom) < log(square) + SCARCE
     }
 
-    /// `next`, or the least velocity that it can have at the end, from `v` and with so much to lose, if that
-    /// is more by what is not rounding: an override has lowered the limit too late.
+    /// Returns `next`, or the least velocity that can be reached at the end from `v`, if that is above `next` by more
+    /// than rounding: an override has lowered the limit too late. `gain` is by how much the square of the velocity
+    /// can fall.
     #[inline(never)]
     pub(super) fn slowest(&self, v: f32, gain: f32, next: f32) -> f32 {
         let least = sqrt(greater(v * v - gain, 0.0));
         if least > next + self.limits.accel * SEGMENT_S { least } else { next }
     }
 
-    /// All the rest of a block in one.
+    /// Returns all the rest of a block in one stretch.
     #[inline(never)]
     fn finish(&mut self, left: f32, cruise: f32, headroom: f32) -> Stretch {
         let v = self.velocity;
@@ -124,13 +126,13 @@ impl Governor {
         {
             seconds = ratio(scaled(left, 1), sum);
         } else if square > 0.0 {
-            // From rest to rest or nearly so: there is a peak between.
+            // From rest to rest, or nearly so: there is a peak between.
             let peak = sqrt(0.5 * (square + next * next));
             if peak < cruise {
                 seconds = (peak + peak - sum) / self.limits.accel;
             } else {
                 let ramps = (cruise + cruise - sum) / self.limits.accel;
-                // The ramps' way: each at the mean of its ends.
+                // How far the ramps fall behind the cruise velocity, times the acceleration. Each goes at the mean of its ends.
                 let slower =
                     0.5 * ((cruise - v) * (cruise - v) + (cruise - next) * (cruise - next));
                 seconds = (left + slower / self.limits.accel) / cruise;

@@ -1,4 +1,4 @@
-//! Lines that follow the spindle: in step with its angle, at a feed per turn, and the way out of the cut.
+//! Lines that follow the spindle: in step with its angle, at a feed per turn, and the retreat out of the cut.
 
 use super::{Exec, PAUSE, SEGMENT_S, Step};
 use crate::boards::outputs;
@@ -11,29 +11,32 @@ use crate::motion::snapshot::Snapshot;
 use crate::motion::thread::Thread;
 use crate::status::Status;
 
-/// A share of the spindle's speed has to change by so much to count.
+/// The least change of the spindle's share of its planned speed that has an effect.
 const CHANGE: f32 = 0.005;
 
-/// A feed waits so long for a spindle that stands still, s.
+/// How long a feed waits for a spindle that stands still, s.
 const PATIENCE_S: f32 = 6.0;
 
-/// What lines have to do with the spindle.
+/// How lines follow the spindle.
 #[derive(Debug, Default)]
 pub(super) enum Follows {
     /// Lines do not depend on the spindle.
     #[default]
     Nothing,
-    /// G95. Feeds go by its measured speed: that share of what they were planned for. 0 or less if it stands still: minus the seconds for
-    /// which a feed has waited for it.
+    /// G95: feeds follow the measured speed of the spindle. The value is this speed as a share of the speed that
+    /// feeds were planned for. If the spindle stands still, the value is 0 or less: minus the seconds for which a
+    /// feed has waited.
     Speed(f32),
-    /// G33, a pass of G76: they follow its angle.
+    /// G33, G33.1, or a pass of G76: lines follow the angle of the spindle.
     Angle(Thread),
-    /// A pass of G33 or G76 has ended before its time: X leaves the cut while the axes come to rest, and then what is queued waits to be dropped.
+    /// A pass of G33 or G76 has ended before its time: X leaves the cut while the axes come to rest. Then what is
+    /// queued waits to be dropped.
     Retreats(Retreat),
 }
 
 impl Exec {
-    /// What was queued has been dropped for good: no line follows the spindle.
+    /// Ends a G33.1 pass whose way back was still to come, because what was queued has been dropped for good. No line
+    /// follows the spindle then.
     pub fn end_pass(&mut self) {
         if let Follows::Angle(thread) = &self.follows
             && thread.waits()
@@ -51,7 +54,8 @@ impl Exec {
         }
     }
 
-    /// Whether the axes of G33.1 rest where the spindle has turned round, and what is left of the line is to be dropped.
+    /// Whether the spindle has turned round in a G33.1 pass and the axes rest there. The rest of the line is to be
+    /// dropped then.
     pub fn has_turned(&self) -> bool {
         match &self.follows {
             Follows::Angle(thread) => thread.has_turned() && self.governor.is_at_rest(),
@@ -59,7 +63,8 @@ impl Exec {
         }
     }
 
-    /// Why a pass has been left before its end, if one has, and the rest of it waits to be dropped: a hold of its own.
+    /// Returns why a pass has been left before its end, or `None` if none has. While the rest of the pass waits to be
+    /// dropped, this is a hold of its own.
     #[inline(always)]
     pub fn has_left(&self) -> Option<Status> {
         match &self.follows {
@@ -74,13 +79,13 @@ impl Exec {
         Capability::Lathe.is_built_in() && matches!(self.follows, Follows::Speed(_))
     }
 
-    /// G95 is in force for the lines from here on, or no more.
+    /// Switches G95 on or off for the lines from here on.
     pub(super) fn go_by_speed(&mut self, on: bool) {
         self.follows = if on { Follows::Speed(1.0) } else { Follows::Nothing };
     }
 
-    /// The spindle turns at this share of the speed that feeds were planned for; what is more than 1 is 1. A change of less than 0.5 % does
-    /// not count: each has ramps laid out anew.
+    /// Sets the share of the planned speed at which the spindle turns; shares above 1 count as 1. A change of less
+    /// than 0.5 % is ignored, because each change has ramps laid out anew.
     #[inline(never)]
     #[small]
     pub fn set_share(&mut self, share: f32) {
@@ -95,7 +100,7 @@ impl Exec {
         }
     }
 
-    /// Whether a feed has waited for the spindle for too long. It says so once.
+    /// Whether a feed has waited too long for the spindle. When this returns true, the wait is counted from 0 again.
     #[small]
     pub fn takes_too_long(&mut self) -> bool {
         match &mut self.follows {
@@ -107,14 +112,15 @@ impl Exec {
         }
     }
 
-    /// Whether a pass in step with the spindle is to end at once, in the midst of the cut: for an alarm, or as the program is killed.
+    /// Sets whether a pass in step with the spindle is to end at once, in the midst of the cut: after an alarm, or
+    /// when the program is killed.
     #[inline(always)]
     pub fn break_off(&mut self, at_once: bool) {
         self.breaks_off = at_once;
     }
 
-    /// Prepares the next stretch of a line that follows the spindle. A feedhold leaves the cut if there is a retract, else it waits for the end, and
-    /// overrides do not count.
+    /// Prepares the next stretch of a line that follows the spindle. A feedhold leaves the cut if there is a retract;
+    /// otherwise the hold waits for the end of the pass. Overrides have no effect.
     #[inline(never)]
     #[small]
     pub(super) fn follow(
@@ -131,7 +137,7 @@ impl Exec {
         let Follows::Angle(thread) = &mut self.follows else { return Step::Again };
         let wanted = thread.velocity(kept, velocity, accel, brakes);
         if thread.is_to_turn(self.running.left) {
-            // The task switches it.
+            // The exec task switches the spindle.
             out.outputs ^= outputs::COUNTERCLOCKWISE;
         }
         let breaks_off = self.breaks_off || thread.fault().is_some() || thread.rests();
@@ -139,7 +145,7 @@ impl Exec {
             return self.await_spindle(out, segment);
         }
         let retract = thread.retract();
-        // The axes come to rest in this line, in which X stands still.
+        // Whether the axes come to rest within this line, in which X stands still.
         let fits = velocity * velocity < 2.0 * accel * self.running.left;
         let leaves = (breaks_off || self.hold) && retract.is_some() && fits;
         if leaves && self.prep.rest_of(retract.motors) {
@@ -159,7 +165,7 @@ impl Exec {
         self.hand_out_coarsely(&stretch, blocks, out, segment)
     }
 
-    /// The line waits for the spindle.
+    /// Prepares a pause of 1 ms, in which the line waits for the spindle.
     #[inline(never)]
     #[small]
     pub(super) fn await_spindle(&mut self, out: &mut Snapshot, segment: &mut Segment) -> Step {
@@ -169,7 +175,7 @@ impl Exec {
         Step::Segment
     }
 
-    /// What a line that follows the spindle may do, as far as that has changed.
+    /// Takes up the feed and the headroom of a line that follows the spindle, if they have changed.
     fn take_limits(&mut self, blocks: &mut BlockSource) {
         let version = blocks.version();
         let running = &mut self.running;
@@ -181,7 +187,7 @@ impl Exec {
         }
     }
 
-    /// Whether the line slows down for its end within the next stretches.
+    /// Whether the line has to slow down for its end within the next two stretches.
     fn brakes_for_end(&self, velocity: f32, accel: f32) -> bool {
         let running = &self.running;
         let far = running.left - 2.0 * SEGMENT_S * velocity;
@@ -222,7 +228,8 @@ impl Exec {
         Step::Segment
     }
 
-    /// Has X go on in a segment of such ticks that is queued already: `write` is told how far in each tick, and is false if it is too late.
+    /// Moves X in a segment of `ticks` and `period` that is already queued. `write` receives the increment of X, and
+    /// returns false if it is too late to change the segment.
     #[inline(always)]
     pub fn lead(
         &mut self,
@@ -239,7 +246,7 @@ impl Exec {
         }
     }
 
-    /// The motors of X that leave the cut, as bits, and whether they go backwards.
+    /// Returns the motors of X that leave the cut, as bits, and whether they run backwards.
     #[small]
     pub fn leaving(&self) -> (u8, bool) {
         match &self.follows {

@@ -1,4 +1,4 @@
-//! A block begins: how far each motor goes in it, and which of them goes farthest.
+//! The begin of a block: how far each motor goes in it, and which motor goes farthest.
 
 use super::super::block::{Line, PARTS_LOG2};
 use super::ticks::{is_little, parts_of, times};
@@ -8,7 +8,7 @@ use crate::dda::{STEP, STEP_LOG2};
 use crate::hal::arithmetic::product;
 
 impl Prep {
-    /// Starts a block. The steps to the whole ones next to its end are put into `steps` and added to `target`.
+    /// Starts a block. Puts the whole steps to its rounded end into `steps`, and adds them to `target`.
     #[inline(never)]
     pub fn begin(&mut self, line: &Line, steps: &mut [i16; MOTORS], target: &mut [i32; MOTORS]) {
         self.shift = u8::MAX;
@@ -34,7 +34,7 @@ impl Prep {
             }
             steps[M] = whole;
             if !is_little(debt) {
-                // With the parts of a step that it is short of.
+                // Adds the 1/16 steps that the motor is short of.
                 way += parts_of(debt) >> PART_LOG2;
             }
             if way != 0 {
@@ -51,7 +51,7 @@ impl Prep {
         }
     }
 
-    /// Starts a block whose ways are in whole steps. Else as [`Prep::begin`].
+    /// Starts a block whose distances are in whole steps, as [`Prep::begin`] does.
     #[inline(never)]
     #[small]
     fn begin_far(
@@ -76,7 +76,7 @@ impl Prep {
         }
     }
 
-    /// A motor goes this way in the block, of which it has `own` but for its debt.
+    /// Takes up a motor that goes `way` in the block; `own` is its distance in the line, without its debt.
     #[inline(always)]
     fn take_up(&mut self, m: usize, bit: u8, way: i16, own: i16) {
         self.others = self.others.wrapping_add(1);
@@ -104,7 +104,8 @@ impl Prep {
         }
     }
 
-    /// In a block of whole steps the dominant motor makes up what it is short of, and with it those that go as far.
+    /// In a block of whole steps, adds what the dominant motor is short of to its distance, and to that of the motors
+    /// that go as far.
     #[inline(never)]
     #[small]
     fn lengthen(&mut self) {
@@ -115,12 +116,12 @@ impl Prep {
                 let debt = if self.backwards & bit != 0 { -self.debt[m] } else { self.debt[m] };
                 let due = *due.get_or_insert(parts_of(debt));
                 if (debt - due).unsigned_abs() > PART {
-                    // It goes as far, but not as what it was short of.
+                    // The motor goes as far, but its debt is different.
                     self.full &= !bit;
                     self.minor |= bit;
                 }
             } else if self.minor & bit == 0 && !is_little(self.debt[m]) {
-                // It has no part in the line, but not arrived where that begins.
+                // The line does not move it, but it has not arrived where the line begins.
                 self.minor |= bit;
                 self.minors[m].way = 0;
                 self.others += 1;
@@ -133,7 +134,8 @@ impl Prep {
         }
         let due = due.unwrap_or(0);
         self.left = self.left.wrapping_add_signed(due.into());
-        // What makes the dominant motor's way longer makes theirs so in proportion, and they have their own debts.
+        // Lengthening the dominant motor's distance lengthens that of the other motors in proportion. They owe their
+        // own debts instead.
         let mut bit = 1;
         for m in 0..MOTORS {
             let debt = if self.backwards & bit != 0 { -self.debt[m] } else { self.debt[m] };

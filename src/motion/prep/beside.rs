@@ -7,20 +7,21 @@ use crate::boards::MOTORS;
 use crate::dda::Segment;
 
 impl Prep {
-    /// Whether these motors have no part in the block.
+    /// Whether the block moves none of `motors`.
     #[small]
     pub fn rest_of(&self, motors: u8) -> bool {
         (self.full | self.minor) & motors == 0
     }
 
-    /// The debt of the first of these motors, phase units.
+    /// Returns the debt of the first of `motors`, phase units.
     #[small]
     pub fn debt_of(&self, motors: u8) -> i16 {
         let first = motors.trailing_zeros() as usize;
         self.debt.get(first).copied().unwrap_or_default()
     }
 
-    /// These motors, which the block lets stand, are about to move this way, beside it. Segments have ticks for them from here on.
+    /// Prepares `motors`, which the block lets stand, to move beside it in this direction. Segments have ticks for
+    /// them from here on.
     #[inline(never)]
     #[small]
     pub fn join(&mut self, motors: u8, backwards: bool) {
@@ -42,7 +43,7 @@ impl Prep {
         }
     }
 
-    /// A segment in which these motors may move, and no others: 2 ms.
+    /// Makes a segment of 2 ms in which `motors` may move, and no other motor.
     #[small]
     pub fn stand(&mut self, motors: u8, out: &mut Segment) {
         self.pause(ASIDE.0, ASIDE.1, out);
@@ -53,18 +54,19 @@ impl Prep {
         }
     }
 
-    /// Motors beside the block move in its segment, which has room for that.
+    /// Adds the motors of a retreat to a segment of the block, if it has room for them.
     #[inline(never)]
     #[small]
     pub fn add(&mut self, retreat: &mut Retreat, out: &mut Segment, target: &mut [i32; MOTORS]) {
-        // Of two segments the second one is in `held`.
+        // Not in the tick in which directions settle: the segment behind it is in `held`.
         if self.held.is_none() && !retreat.is_done() {
             retreat.add(out, target, &mut self.debt);
             out.settle = 0;
         }
     }
 
-    /// How far motors that have [joined](Prep::join) are to go in each tick of a segment that is queued already; 0 if there is no time for them.
+    /// Returns how far motors that have [joined](Prep::join) are to go in each tick of a segment that is queued
+    /// already; 0 if there is no time for them.
     #[inline(never)]
     #[small]
     pub fn plan_lead(&self, retreat: &mut Retreat, ticks: u16, period: u16) -> u16 {
@@ -72,7 +74,7 @@ impl Prep {
         if stands && period >= self.paces().settles { retreat.plan(ticks, period) } else { 0 }
     }
 
-    /// Counts what motors have been told to go for the lead of a retreat.
+    /// Counts what the motors of a retreat have been told to go in a segment that was queued already.
     #[small]
     pub fn note_lead(
         &mut self,

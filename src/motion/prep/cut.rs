@@ -1,4 +1,4 @@
-//! A block ends before its end: a hold that is not resumed, a limit switch, a probe.
+//! Cuts a block short: a hold that is not resumed, a limit switch, a probe.
 
 use super::{HALF, PART, Prep};
 use crate::boards::MOTORS;
@@ -6,20 +6,19 @@ use crate::dda::{PHASE_START, STEP, STEP_LOG2, Segment};
 use crate::hal::arithmetic::product;
 
 impl Prep {
-    /// The block ends here and now: what of its steps no segment has is taken off `target`. Every motor is at
-    /// its last step from now on ([`Dda::settle`](crate::dda::Dda::settle)). Returns the segment that
-    /// was to come next, if it has been prepared.
-    /// Cost: 4,000 a motor.
+    /// Ends the block here and now: takes off `target` the steps of the block that no segment has. From now on every
+    /// motor counts as being at its last step ([`Dda::settle`](crate::dda::Dda::settle)). Returns the segment that
+    /// was to come next, if it has been prepared. Cost: 4,000 a motor.
     #[inline(never)]
     #[small]
     pub fn cut(&mut self, target: &mut [i32; MOTORS]) -> Option<Segment> {
         let mut bit = 1;
         for (m, target) in target.iter_mut().enumerate() {
-            // Where the whole step is that its end is rounded to, from where it is.
+            // How far the end of the block is beyond the whole step to which it is rounded.
             let beyond = (i32::from(self.fraction[m]) - i32::from(HALF)) * i32::from(PART);
             let left = self.left_of(m, bit);
             let left = if self.backwards & bit != 0 { -left } else { left };
-            // The debt has that as well, modulo 2^16.
+            // The debt includes `left`, modulo 2^16.
             let ahead = match self.extruder.first() {
                 Some(extruder) if usize::from(extruder.motor) == m => extruder.made(),
                 _ => 0,
@@ -35,12 +34,12 @@ impl Prep {
         if let Some(extruder) = self.extruder.first_mut() {
             extruder.cut();
         }
-        // The segment that was to tell of it may be among those that are lost.
+        // The segment that was to set new directions may be among the segments that are lost.
         self.turned = true;
         self.held.take()
     }
 
-    /// Phase units that no segment has of a motor's way, in its direction, but for its debt.
+    /// Returns the phase units of a motor's distance that no segment has, in its direction, without its debt.
     #[inline(never)]
     #[small]
     fn left_of(&self, m: usize, bit: u8) -> i32 {

@@ -13,13 +13,14 @@ impl Prep {
         self.extruder.first().is_some_and(|extruder| extruder.on)
     }
 
-    /// Whether the extruder has a lead in the block, or takes one back: then exec says how fast the machine is ([`Prep::aim`]).
+    /// Whether the extruder has a lead in the block, or takes one back. If so, exec tells how fast the machine is
+    /// ([`Prep::aim`]).
     #[inline(always)]
     pub fn leads(&self) -> bool {
         self.extruder.first().is_some_and(|extruder| extruder.leads)
     }
 
-    /// From the next block on this is the extruder's lead.
+    /// Sets the extruder's lead, from the next block on.
     #[small]
     pub fn set_lead(&mut self, lead: &Lead) {
         if let Some(extruder) = self.extruder.first_mut() {
@@ -27,7 +28,8 @@ impl Prep {
         }
     }
 
-    /// The machine is that fast, mm/s, at the end of a slice: see [`Advance::aim`](super::super::advance::Advance::aim).
+    /// Takes up how fast the machine is at the end of a slice, mm/s: see
+    /// [`Advance::aim`](super::super::advance::Advance::aim).
     #[inline(never)]
     pub fn aim(&mut self, velocity: f32, seconds: f32, pending: f32) {
         if let Some(extruder) = self.extruder.first_mut() {
@@ -35,8 +37,8 @@ impl Prep {
         }
     }
 
-    /// A block begins. If it pushes filament while others travel, the extruder has a lead in it. Its increments are its own then: it is no motor
-    /// that goes as far as others.
+    /// Begins the lead of a block. The extruder has one if the block pushes filament while other motors travel. Its
+    /// increments are its own then: it no longer counts as a motor that goes as far as others.
     #[inline(never)]
     #[small]
     pub(super) fn begin_lead(&mut self, line: &Line) {
@@ -62,12 +64,12 @@ impl Prep {
                 *minor = Minor::default();
             }
         } else if self.others == 0 {
-            // Alone: ticks are those of motors whose increments are not a step.
+            // The extruder is alone: its ticks are those of motors whose increments are not a step.
             self.others = 1;
         }
     }
 
-    /// The extruder's lead is added to a segment that is complete but for its mode.
+    /// Adds the extruder's lead to a segment that is complete except for its mode.
     #[inline(never)]
     pub(super) fn lead(&mut self, out: &mut Segment) {
         let Some(extruder) = self.extruder.first_mut() else { return };
@@ -81,7 +83,7 @@ impl Prep {
         if goes != 0 && (goes < 0) != extruder.backwards {
             extruder.backwards = goes < 0;
             if out.period.saturating_sub(TURNED) < self.setup {
-                // The direction stands from here on, and the motor goes in the next segment.
+                // The direction stands from this segment on, and the motor goes in the next one.
                 goes = 0;
             }
         }
@@ -93,7 +95,7 @@ impl Prep {
         }
     }
 
-    /// The extruder is where its line is, but for little, and the block has no lead.
+    /// Ends the lead of the block: the extruder is where its line is, but for little.
     #[inline(never)]
     #[small]
     fn end_lead(&mut self) {
@@ -113,8 +115,8 @@ impl Prep {
         }
     }
 
-    /// The machine rests at the end of its lines, or in a hold: a segment in which the extruder takes back what is left of its lead. False, and no
-    /// segment, if there is none.
+    /// Makes a segment in which the extruder takes back what is left of its lead: the machine rests at the end of its
+    /// lines, or in a hold. Returns false, and no segment, if no lead is left.
     #[inline(always)]
     pub fn relax(&mut self, out: &mut Segment) -> bool {
         self.has_advance() && self.takes_back(out)

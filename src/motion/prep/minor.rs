@@ -1,4 +1,4 @@
-//! Motors that go less far than the dominant one: their increments, and what rounding takes.
+//! Motors that go less far than the dominant one: their increments, and what rounding takes off them.
 
 use super::super::divide::{quotient, quotient_remainder};
 use crate::dda::STEP;
@@ -9,20 +9,20 @@ use crate::hal::arithmetic::product;
 pub(super) struct Minor {
     /// The way of the motor in the block, in parts of a step or in whole steps.
     pub way: u16,
-    /// Travel in a tick, rounded down, and what that leaves, in 1 / most.
+    /// Travel in a tick, rounded down; `remainder` is what rounding leaves, in 1 / most.
     pub increment: u16,
     pub remainder: u16,
-    /// What increments owe the line from start to end, in phase units / most.
+    /// What the increments so far owe the line, in phase units / most.
     pub owed: i32,
 }
 
 impl Minor {
-    /// Whether it has no way, and owes nothing.
+    /// Whether the motor has no distance to go, and owes nothing.
     pub(super) fn stands(&self) -> bool {
         self.way == 0 && self.owed == 0
     }
 
-    /// The increment for the next `ticks`, and what it owes then.
+    /// Returns the increment for the next `ticks`, and updates what it owes.
     pub(super) fn advance(&mut self, ticks: u16, most: u16) -> u16 {
         let unit = product(ticks, most);
         let half = (unit / 2) as i32;
@@ -45,19 +45,19 @@ impl Minor {
     }
 }
 
-/// `way * step / most`, rounded down, and the remainder.
+/// Returns `way * step / most`, rounded down, and the remainder.
 #[inline(never)]
 pub(super) fn share(way: u16, step: u16, most: u16) -> (u16, u16) {
     quotient_remainder(product(way, step), most)
 }
 
-/// `way * step / most`, rounded to the nearest.
+/// Returns `way * step / most`, rounded to the nearest.
 #[inline(never)]
 pub(super) fn even(way: u16, step: u16, most: u16) -> u16 {
     quotient(product(way, step) + u32::from(most / 2), most)
 }
 
-/// `owed / unit`, rounded. Rare: a debt that meets a short segment.
+/// Returns `owed / unit`, rounded. Rarely needed: when a debt meets a short segment.
 #[inline(never)]
 fn rounded(owed: u32, unit: u32) -> u16 {
     ((owed + unit / 2) / unit) as u16

@@ -1,16 +1,16 @@
-//! Ticks of a stretch: how many, and of how many phase units, in integers.
+//! Ticks of a stretch: how many, and how many phase units each, in integers.
 
 use super::{LIMIT_MAX, PART};
 use crate::dda::STEP_LOG2;
 use crate::hal::arithmetic::product;
 
-/// Whether a debt is less than a part of a step, by rounding.
+/// Whether a debt is mere rounding: half of 1/16 step at most.
 #[inline(always)]
 pub(super) fn is_little(debt: i16) -> bool {
     (debt as u16).wrapping_add(PART / 2) < PART
 }
 
-/// A debt rounded to parts of a step, in phase units.
+/// Returns a debt rounded to 1/16 step, in phase units.
 #[inline(always)]
 pub(super) fn parts_of(debt: i16) -> i16 {
     (debt + (PART / 2) as i16) & !(PART as i16 - 1)
@@ -23,7 +23,7 @@ pub(super) fn times(a: i16, b: u16) -> i32 {
     if a < 0 { -size } else { size }
 }
 
-/// `1 << n`, up to a step. Cost: 15; the compiler makes a loop of six cycles a bit.
+/// Returns `1 << n`, up to a step. Cost: 15, where the compiler makes a loop of six cycles a bit.
 #[inline(always)]
 pub(super) fn bit(n: u8) -> u16 {
     let pair = if n & 2 != 0 { 4 } else { 1 };
@@ -32,17 +32,18 @@ pub(super) fn bit(n: u8) -> u16 {
     if n & 8 != 0 { u16::from(byte) << 8 } else { byte.into() }
 }
 
-/// Parts of a tick for its period: 1/32, if the tick has as many phase units.
+/// Periods are computed from 1/32 tick, if a tick has as many phase units. This is the exponent of 32.
 pub(super) const FINE: u8 = 5;
 
-/// Most ticks of a limit, in such parts.
+/// Returns a limit of ticks in parts of a tick, the parts of a last incomplete tick included.
 const fn limit_in_parts(limit: u16) -> u16 {
     limit << FINE | ((1 << FINE) - 1)
 }
 
 const _: () = assert!(limit_in_parts(LIMIT_MAX) >> FINE == LIMIT_MAX);
 
-/// A travel in parts of ticks, of which there are no more than `limit` if steps allow, and the exponent of a tick. Cost: 100.
+/// Divides a travel into ticks, no more than `limit` if steps allow. Returns the travel in parts of a tick, and the
+/// exponent of a tick. Cost: 100.
 #[inline(never)]
 pub(super) fn coarsen(travel: u32, limit: u16) -> (u32, u8) {
     let limit = limit_in_parts(limit);
@@ -68,7 +69,7 @@ pub(super) fn coarsen(travel: u32, limit: u16) -> (u32, u8) {
     (few.into(), shift)
 }
 
-/// A travel for which ticks of less than [`FINE`] bits do: it is its own parts.
+/// Divides a travel for which ticks of less than [`FINE`] bits do: its phase units are the parts.
 #[inline(never)]
 #[small]
 fn coarsen_little(travel: u32, limit: u16) -> (u32, u8) {
@@ -80,21 +81,21 @@ fn coarsen_little(travel: u32, limit: u16) -> (u32, u8) {
     (travel, shift)
 }
 
-/// A travel in parts of ticks of so many bits.
+/// Returns a travel in parts of ticks that have `shift` bits.
 #[inline(never)]
 #[small]
 pub(super) fn finer(travel: u32, shift: u8) -> u32 {
     travel >> shift.saturating_sub(FINE)
 }
 
-/// Whole ticks of so many parts. Cost: 25.
+/// Returns the whole ticks in `fine` parts. Cost: 25.
 #[inline(always)]
 pub(super) fn whole_ticks(fine: u32, shift: u8) -> u32 {
     if shift < FINE { fine >> shift } else { fine >> FINE }
 }
 
-/// The exponent of what a stretch's end is aligned to: a tick, up to an eighth of the stretch, up to a
-/// step.
+/// Returns the exponent of the grid to which the end of a stretch is aligned: a tick, or more in a long stretch, up
+/// to an eighth of the stretch and up to a step.
 pub(super) fn grain(ticks: u32, shift: u8) -> u8 {
     let mut grain = shift;
     let mut eighth = ticks >> 4;
