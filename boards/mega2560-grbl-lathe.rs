@@ -1,5 +1,5 @@
-//! Arduino Mega 2560 with a grbl-style shield, on a lathe whose sender speaks grbl's dialect: `mega2560-grbl` with threads, and with
-//! grbl's dialect alone.
+//! Arduino Mega 2560 with a grbl-style shield, on a lathe whose sender speaks grbl's dialect. Differs from
+//! `mega2560-grbl`: it has thread cutting, and only grbl's dialect.
 
 use super::{Board, MEGA2560_GRBL};
 

@@ -16,11 +16,11 @@ pub const MEGA2560_GRBL: Board = Board {
         MotorPins { step: pin(A, 5), dir: pin(C, 4), enable: None }, // D27, D33
     ],
     enable_all: Some(pin(B, 7)), // D13
-    // D5 to D9: spindle direction, enable and PWM, flood, mist
+    // D5 to D9: spindle direction, spindle enable, spindle PWM, flood, mist
     hazards: &[pin(E, 3), pin(H, 3), pin(H, 4), pin(H, 5), pin(H, 6)],
     outputs: [Some(pin(H, 3)), Some(pin(E, 3)), Some(pin(H, 6)), Some(pin(H, 5))],
     pwm: Some(Pwm { timer: Timer::T4, channel: 1 }), // D7
-    // D19 and D18; D22 and D23
+    // USB; then receive D19, transmit D18, RTS D22, CTS D23
     serial: &[
         USB,
         Serial {
@@ -31,7 +31,7 @@ pub const MEGA2560_GRBL: Board = Board {
         },
     ],
     inputs: [
-        // D10 to D12: one for both ends of an axis
+        // D10 to D12: one switch input for both ends of an axis
         Some(pin(B, 4)),
         Some(pin(B, 4)),
         Some(pin(B, 5)),
@@ -40,12 +40,12 @@ pub const MEGA2560_GRBL: Board = Board {
         Some(pin(B, 6)),
         None,
         None,
-        // A15, A11, A8: probe, door, and what is the reset button of grbl
+        // A15: probe; A11: door; A8: emergency stop, grbl's reset button
         Some(pin(K, 7)),
         Some(pin(K, 3)),
         Some(pin(K, 0)),
     ],
-    // D11, A15 and A14
+    // Index D11, sync A15, second sync sensor A14
     encoder: Some(Encoder { index: pin(B, 5), sync: pin(K, 7), second: Some(pin(K, 6)) }),
     drivers: None,
     heaters: None,

@@ -1,5 +1,5 @@
-//! Arduino Mega 2560 with a grbl-style shield, on a lathe: `mega2560-grbl` with threads in the place of grbl's dialect, help screens and
-//! built-in jobs, for all of which there is no room.
+//! Arduino Mega 2560 with a grbl-style shield, on a lathe. Differs from `mega2560-grbl`: it has thread cutting
+//! instead of grbl's dialect, because the flash has no room for both.
 
 use super::{Board, MEGA2560_GRBL};
 

@@ -18,7 +18,8 @@ pub const PICO_CNC: Board = Board {
     ],
     dialect: 0,
     clock_hz: 128_000_000,
-    // Steps side by side, and directions right behind them: one state machine of the PIO has them all.
+    // The step pins are adjacent and the direction pins follow them, so that one PIO state machine drives all of
+    // them.
     motors: &[
         MotorPins { step: gp(2), dir: gp(6), enable: None },
         MotorPins { step: gp(3), dir: gp(7), enable: None },
@@ -26,17 +27,17 @@ pub const PICO_CNC: Board = Board {
         MotorPins { step: gp(5), dir: gp(9), enable: None },
     ],
     enable_all: Some(gp(10)),
-    // Spindle enable, direction and pulses, mist, flood
+    // Spindle enable, spindle direction, spindle PWM, mist, flood
     hazards: &[gp(11), gp(12), gp(13), gp(14), gp(15)],
     outputs: [Some(gp(11)), Some(gp(12)), Some(gp(14)), Some(gp(15))],
     pwm: Some(Pwm { timer: Timer::Slices, channel: 13 }),
-    // USB; GP0 and GP1
+    // USB; then transmit GP0, receive GP1
     serial: &[
         NATIVE_USB,
         Serial { usart: Usart::Uart0, rate: 115_200, handshake: None, driver_enable: None },
     ],
     inputs: [
-        // One for both ends of an axis
+        // One switch input for both ends of an axis
         Some(gp(16)),
         Some(gp(16)),
         Some(gp(17)),

@@ -1,4 +1,5 @@
-//! Raspberry Pi Pico on a breakout board with six drivers, as for two motors of Y and two of Z beside X and A: the pins of `pico-cnc` move up.
+//! Raspberry Pi Pico on a breakout board with six drivers, for example two motors each on Y and Z, and one each on X
+//! and A. The other functions move to higher pins than on `pico-cnc`.
 
 use super::{Board, Encoder, MotorPins, PICO_CNC, Pwm, Timer, gp};
 
@@ -25,14 +26,14 @@ pub const PICO_CNC6: Board = Board {
         MotorPins { step: gp(7), dir: gp(13), enable: None },
     ],
     enable_all: Some(gp(14)),
-    // Spindle enable and pulses, flood
+    // Spindle enable, spindle PWM, flood
     hazards: &[gp(15), gp(16), gp(17)],
     outputs: [Some(gp(15)), None, None, Some(gp(17))],
     pwm: Some(Pwm { timer: Timer::Slices, channel: 16 }),
-    // GP0 and GP1
+    // USB; then transmit GP0, receive GP1
     serial: PICO_CNC.serial,
     inputs: [
-        // One for both ends of an axis
+        // One switch input for both ends of an axis
         Some(gp(18)),
         Some(gp(18)),
         Some(gp(19)),

@@ -1,4 +1,5 @@
-//! RAMPS 1.4 as [`RAMPS14`], with an SD card: its image speaks the dialect of printing hosts alone. What `ramps14` has kept in EEPROM it goes by.
+//! RAMPS 1.4 as [`RAMPS14`], with an SD card. Its image has only the dialect of printing hosts. It uses the settings
+//! that `ramps14` has kept in EEPROM.
 
 use super::{Board, RAMPS14};
 

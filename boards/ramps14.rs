@@ -16,7 +16,7 @@ pub const RAMPS14: Board = Board {
         MotorPins { step: pin(A, 4), dir: pin(A, 6), enable: Some(pin(A, 2)) }, // E0: D26, D28, D24
     ],
     enable_all: None,
-    // D10, D8, D9: hot end, bed, fan; then the outputs
+    // D10: hot end; D8: bed; D9: fan; then the outputs
     hazards: &[
         pin(B, 4),
         pin(H, 5),
@@ -27,13 +27,13 @@ pub const RAMPS14: Board = Board {
         pin(B, 5),
         pin(H, 3),
     ],
-    // D4, D5, A3 of AUX-1, D11; the others are servo headers, for nobody wants M8 to heat
+    // D4, D5, A3 of AUX-1, D11: servo headers except A3, so that codes such as M8 never switch a heater output
     outputs: [Some(pin(G, 5)), Some(pin(E, 3)), Some(pin(F, 3)), Some(pin(B, 5))],
     pwm: Some(Pwm { timer: Timer::T4, channel: 0 }), // D6, a servo header
-    // The pins of USART1 and USART3 are those of the limit switches.
+    // The pins of USART1 and USART3 are used by the limit switches.
     serial: &[USB],
     inputs: [
-        // D3, D2, D14, D15, D18, D19
+        // Switches of X, Y and Z, the lower end first: D3, D2, D14, D15, D18, D19
         Some(pin(E, 5)),
         Some(pin(E, 4)),
         Some(pin(J, 1)),
@@ -42,15 +42,15 @@ pub const RAMPS14: Board = Board {
         Some(pin(D, 2)),
         None,
         None,
-        // A10, A12, A9 of AUX-2: probe, door, emergency stop
+        // On AUX-2: probe A10, door A12, emergency stop A9
         Some(pin(K, 2)),
         Some(pin(K, 4)),
         Some(pin(K, 1)),
     ],
-    // D2 and D3
+    // Index D2, sync D3
     encoder: Some(Encoder { index: pin(E, 4), sync: pin(E, 5), second: None }),
     drivers: None,
-    // D10 and A13, or a MAX6675 at D50, D52 and, of AUX-2, D40; D8 and A14; D9
+    // Hot end: D10, sensor A13 or a MAX6675 at D50, D52 and D40 (AUX-2). Bed: D8, sensor A14. Fan: D9
     heaters: Some(Heaters {
         heaters: [
             Heater { pin: pin(B, 4), channel: 13, select: Some(pin(G, 1)) },
@@ -58,7 +58,7 @@ pub const RAMPS14: Board = Board {
         ],
         fan: pin(H, 6),
     }),
-    // D53, as on the displays for RAMPS
+    // Chip select D53, as on the displays for RAMPS
     card: Some(pin(B, 0)),
     step_timer: Timer::T1,
     tick_timer: Timer::T0,

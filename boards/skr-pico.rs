@@ -1,10 +1,10 @@
-//! BTT SKR Pico v1.0: four TMC2209 on board, which are told their current and microsteps by one UART.
+//! BTT SKR Pico v1.0: four TMC2209 drivers on board. One UART configures their current and microsteps.
 
 use super::{
     Board, Heater, Heaters, MotorPins, NATIVE_USB, Pwm, Serial, Timer, Tmc2209, Usart, gp,
 };
 
-/// BTT SKR Pico v1.0; its driver E is motor 4.
+/// BTT SKR Pico v1.0. Its driver E is motor 4.
 pub const SKR_PICO: Board = Board {
     name: "skr-pico",
     features: &[
@@ -30,18 +30,18 @@ pub const SKR_PICO: Board = Board {
         MotorPins { step: gp(14), dir: gp(13), enable: Some(gp(15)) },
     ],
     enable_all: None,
-    // Fans 1 to 3, servo; heaters of the bed and of the hot end
+    // Fans 1 to 3, servo, bed heater, hot-end heater
     hazards: &[gp(17), gp(18), gp(20), gp(29), gp(21), gp(23)],
-    // FAN2, FAN3: spindle and mist
+    // Spindle FAN2, mist FAN3
     outputs: [Some(gp(18)), None, Some(gp(20)), None],
     pwm: Some(Pwm { timer: Timer::Slices, channel: 29 }),
-    // USB; GP0 and GP1
+    // USB; then transmit GP0, receive GP1
     serial: &[
         NATIVE_USB,
         Serial { usart: Usart::Uart0, rate: 115_200, handshake: None, driver_enable: None },
     ],
     inputs: [
-        // X-STOP, Y-STOP, Z-STOP: one for both ends of an axis
+        // X-STOP, Y-STOP, Z-STOP: one switch input for both ends of an axis
         Some(gp(4)),
         Some(gp(4)),
         Some(gp(3)),
@@ -50,13 +50,13 @@ pub const SKR_PICO: Board = Board {
         Some(gp(25)),
         None,
         None,
-        // PROBE; E0-STOP is the emergency stop
+        // PROBE; E0-STOP is used as the emergency stop
         Some(gp(22)),
         None,
         Some(gp(16)),
     ],
     encoder: None,
-    // HE and TH0, HB and THB; FAN1
+    // Hot end: HE, sensor TH0. Bed: HB, sensor THB. Fan: FAN1
     heaters: Some(Heaters {
         heaters: [
             Heater { pin: gp(23), channel: 1, select: None },

@@ -1,21 +1,22 @@
-//! Refuses a board, when the image is built, of which a pin or a timer has two users, or cannot do what it is there for.
+//! Build-time check of a board: the build fails if a pin or a timer has two users, or cannot do what it is used for.
 
 use super::parts::{Handshake, Heaters, Pwm, Serial, Timer, Usart, inputs, outputs};
 use super::pins::{Pin, Port, gp, pin};
 use super::{Board, SPI};
 
-/// Most motors of a board that an image can be built for.
+/// The most motors of any board that an image can be built for.
 const MOST_MOTORS: usize = 6;
 
-/// A pin that the firmware itself uses on every board: the transmitter of USART2, which is driven high for
-/// the sake of its interrupt (`avr_embassy::interrupt`).
+/// The pin that the firmware itself uses on every board: the transmitter of USART2. The data-register-empty interrupt
+/// of USART2 is the software interrupt, and the enabled transmitter drives the pin high (`avr_embassy::interrupt`).
 const OWN_PIN: Pin = pin(Port::H, 1);
 
-/// Ports a board may have, and pins of a port.
+/// The most serial ports of a board, and the pins of one port.
 const MAX_PORTS: usize = 2;
 const SERIAL_PINS: usize = 5;
 
-/// Beside those of motors and ports: of enables, hazards, the firmware, inputs, drivers, and SPI with what it selects.
+/// Pins beside those of motors and serial ports: `enable_all`, hazards, the firmware's own, inputs, drivers, and SPI
+/// with its select pins.
 const OTHER_PINS: usize = 1 + 8 + 1 + inputs::COUNT + 2 + SPI.len() + 3;
 const MAX_PINS: usize = 3 * MOST_MOTORS + MAX_PORTS * SERIAL_PINS + OTHER_PINS;
 
@@ -32,7 +33,7 @@ impl Serial {
         [rx, tx, self.driver_enable, rts, cts]
     }
 
-    /// Panics if one of its own pins is not where one instruction reaches it.
+    /// Panics if the driver-enable, RTS or CTS pin is on a port that single-bit instructions cannot reach.
     const fn check(&self) {
         let pins = self.pins();
         let mut i = 2;
@@ -46,7 +47,7 @@ impl Serial {
 }
 
 impl Board {
-    /// Panics, so fails the build when evaluated in a constant, if a pin or a timer has two users.
+    /// Panics if a pin or a timer has two users. In a constant, the panic fails the build.
     pub const fn check(&self) {
         let mut pins = [None; MAX_PINS];
         let mut n = 0;
@@ -139,7 +140,7 @@ impl Board {
         }
     }
 
-    /// Whether this input is the upper end of an axis on the pin of the lower one.
+    /// Whether this input is the upper end of an axis and shares the pin of the lower end.
     const fn is_shared_end(&self, input: usize) -> bool {
         if input >= inputs::ENDS || input.is_multiple_of(2) {
             return false;
@@ -150,7 +151,7 @@ impl Board {
         }
     }
 
-    /// Panics if the spindle's timer is another's, or has no such output.
+    /// Panics if the timer of the spindle's PWM has another user, or has no such output.
     const fn check_pwm(&self) {
         let Some(pwm) = self.pwm else { return };
         let wide = matches!(pwm.timer, Timer::T3 | Timer::T4 | Timer::T5);
@@ -162,7 +163,8 @@ impl Board {
         );
     }
 
-    /// Panics if a sensor of the spindle has no vector of its own, or another's pin, or if its timer is another's.
+    /// Panics if a sensor of the spindle has no interrupt vector of its own, or is a hazard, or if the encoder's timer
+    /// has another user. Also panics if the second sync sensor is not on the port of the first.
     const fn check_encoder(&self) {
         let Some(encoder) = self.encoder else { return };
         let [index, sync] = encoder.vectors();
@@ -185,8 +187,8 @@ impl Board {
         }
     }
 
-    /// Panics if a heater would stay on after a panic, is an output of M3 to M9, or its sensor is not on a pin of the converter, or on one of
-    /// another's.
+    /// Panics if a heater is not among the hazards (so a panic would leave it on), or is an output of M3 to M9. Also
+    /// panics if a sensor is on no channel of the converter, shares its channel, or is on the pin of an input.
     const fn check_heaters(&self) {
         let Some(Heaters { heaters: [hot_end, bed], fan }) = self.heaters else { return };
         let pins = [hot_end.pin, bed.pin, fan];
@@ -219,7 +221,7 @@ impl Board {
         false
     }
 
-    /// Panics if the pin of a channel is a switch.
+    /// Panics if the pin of a converter channel is an input.
     const fn check_channel(&self, channel: u8) {
         let is_rp2040 = matches!(self.motors[0].step.port, Port::Gpio);
         let pin = match channel {
@@ -237,7 +239,7 @@ impl Board {
         }
     }
 
-    /// Panics if an output would stay on after a panic, or is switched by two codes.
+    /// Panics if an output is not among the hazards (so a panic would leave it on), or has two functions.
     const fn check_outputs(&self) {
         let mut seen = 0u8;
         let mut o = 0;

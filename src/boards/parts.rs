@@ -1,4 +1,4 @@
-//! What a board is made of: drivers, timers, serial ports, inputs and outputs, sensors, heaters.
+//! The parts of a board: drivers, timers, serial ports, inputs and outputs, sensors, heaters.
 
 use super::pins::{Interrupt, Pin, Port, gp, pin};
 
@@ -13,7 +13,7 @@ pub struct MotorPins {
     pub enable: Option<Pin>,
 }
 
-/// A 16-bit or 8-bit timer of the ATmega2560, or what stands for one on the RP2040.
+/// A 16-bit or 8-bit timer of the ATmega2560, or its counterpart on the RP2040.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[allow(missing_docs)]
 pub enum Timer {
@@ -27,11 +27,11 @@ pub enum Timer {
     Pio,
     /// The timer of the RP2040's core.
     SysTick,
-    /// The RP2040's slices of pulse-width outputs.
+    /// The PWM slices of the RP2040.
     Slices,
 }
 
-/// An output of a 16-bit timer that drives a pin by pulses of some width.
+/// A PWM output of a 16-bit timer.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Pwm {
     /// The timer of the output: 3, 4 or 5; [`Timer::Slices`] on the RP2040.
@@ -41,7 +41,7 @@ pub struct Pwm {
 }
 
 impl Pwm {
-    /// The pin (ATmega2560 data sheet, pin configurations).
+    /// Returns the pin of the output (ATmega2560 data sheet, pin configurations).
     pub const fn pin(self) -> Pin {
         let (port, first) = match self.timer {
             Timer::Slices => (Port::Gpio, 0),
@@ -62,7 +62,8 @@ impl Pwm {
     }
 }
 
-/// A USART of the ATmega2560, of which the third, USART2, is the firmware's own (`avr_embassy::interrupt`); or a UART of the RP2040, or its USB.
+/// A USART of the ATmega2560, or a UART or the USB of the RP2040. The third USART of the ATmega2560, USART2, is
+/// missing here because the firmware itself uses it (`avr_embassy::interrupt`).
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[allow(missing_docs)]
 pub enum Usart {
@@ -75,7 +76,8 @@ pub enum Usart {
 }
 
 impl Usart {
-    /// Data-space address of its first register, UCSRnA (ATmega2560 data sheet, register summary). Those of the RP2040 have none.
+    /// Data-space address of the USART's first register, UCSRnA (ATmega2560 data sheet, register summary). 0 on the
+    /// RP2040, which does not use it.
     pub const fn address(self) -> usize {
         match self {
             Usart::U0 => 0xC0,
@@ -85,7 +87,7 @@ impl Usart {
         }
     }
 
-    /// The pins of receiver and transmitter. USB has pins of its own.
+    /// Returns the pins of receiver and transmitter. `None` for USB, which has dedicated pins.
     pub const fn pins(self) -> Option<[Pin; 2]> {
         Some(match self {
             Usart::U0 => [pin(Port::E, 0), pin(Port::E, 1)],
@@ -98,26 +100,26 @@ impl Usart {
     }
 }
 
-/// Flow control by pins, for `{ex:2}`.
+/// Hardware flow control, for `{ex:2}`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Handshake {
-    /// Driven high when the sender is to stop; to its CTS.
+    /// Driven high to stop the sender. Connect it to the sender's CTS.
     pub rts: Pin,
-    /// High when Kerf is to stop; from the other side's RTS.
+    /// Read high when Kerf is to stop. Connect it to the sender's RTS.
     pub cts: Pin,
 }
 
-/// A serial port. Its pins beside the USART's are on ports A to G, where they are one instruction each.
+/// A serial port. Its pins beside the USART's are on ports A to G, so that one instruction sets or clears them.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Serial {
     /// The USART behind it.
     pub usart: Usart,
-    /// The rate at power-up, bits a second. The rate of USB can be changed (`{baud:n}`).
+    /// The rate at power-up, in bits a second. On the port to USB it can be changed (`{baud:n}`).
     pub rate: u32,
     /// The pins for flow control.
     pub handshake: Option<Handshake>,
-    /// High while Kerf sends, for a transceiver of RS-485 (tie its /RE to this pin too). On a port that has
-    /// it Kerf only answers, for others share the line.
+    /// High while Kerf sends, for an RS-485 transceiver (tie its /RE to this pin too). On a port with this pin Kerf
+    /// only answers and never sends on its own, because others share the line.
     pub driver_enable: Option<Pin>,
 }
 
@@ -125,21 +127,23 @@ pub struct Serial {
 pub const USB: Serial =
     Serial { usart: Usart::U0, rate: 115_200, handshake: None, driver_enable: None };
 
-/// The first port of every board with an RP2040: its USB, which has no rate.
+/// The first port of every board with an RP2040: its USB, which has no bit rate.
 pub const NATIVE_USB: Serial = Serial { usart: Usart::Usb, ..USB };
 
-/// Outputs that a program switches, as bits; of [`Board::outputs`](super::Board::outputs) the index is the number of the bit.
+/// Outputs that a program switches, as bits. The bit number is the index in
+/// [`Board::outputs`](super::Board::outputs).
 #[allow(missing_docs)]
 pub mod outputs {
     pub const SPINDLE: u8 = 1;
     pub const COUNTERCLOCKWISE: u8 = 2;
     pub const MIST: u8 = 4;
     pub const FLOOD: u8 = 8;
-    /// How many there are.
+    /// The number of outputs.
     pub const COUNT: usize = 4;
 }
 
-/// Switches that the machine has, by their number in [`Board::inputs`](super::Board::inputs) and as bits of a set.
+/// Switches of the machine. Each constant is an index in [`Board::inputs`](super::Board::inputs), and a bit number in
+/// sets of inputs.
 #[allow(missing_docs)]
 pub mod inputs {
     pub const X_MIN: usize = 0;
@@ -155,30 +159,32 @@ pub mod inputs {
     pub const PROBE: usize = 8;
     pub const DOOR: usize = 9;
     pub const STOP: usize = 10;
-    /// How many there are.
+    /// The number of inputs.
     pub const COUNT: usize = 11;
 }
 
-/// The sensors of a spindle, which pull their pins low: see [`encoder`](crate::encoder). A pin that is an input as well is no input while
-/// the encoder is set up. Each must be able to interrupt, by a vector of its own.
+/// The sensors of a spindle, which pull their pins low: see [`encoder`](crate::encoder). A pin that is an input as
+/// well is not used as an input while the encoder is set up. Index and sync each need an interrupt vector of their
+/// own.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Encoder {
-    /// Once a turn.
+    /// The sensor that pulses once per turn.
     pub index: Pin,
-    /// The pin of the sensor that pulses several times a turn.
+    /// The sensor that pulses several times per turn.
     pub sync: Pin,
-    /// A quarter of the way to the next mark behind `sync`, where the board has a pin for it; on an AVR one of the same port.
+    /// The second track of the encoder, a quarter of a period behind `sync`; `None` if the board has no pin for it.
+    /// On an AVR the pin is on the same port as `sync`.
     pub second: Option<Pin>,
 }
 
 impl Encoder {
-    /// The vectors of its pins, index first.
+    /// Returns the interrupt vectors of index and sync.
     pub const fn vectors(self) -> [u8; 2] {
         [vector(self.index), vector(self.sync)]
     }
 }
 
-/// The number of the vector of a pin's interrupt, 0 for none (ATmega2560 data sheet, interrupt vectors).
+/// Returns the number of the vector of a pin's interrupt; 0 for none (ATmega2560 data sheet, interrupt vectors).
 const fn vector(pin: Pin) -> u8 {
     match pin.interrupt() {
         Some(Interrupt::External(n)) => n + 1,
@@ -188,33 +194,34 @@ const fn vector(pin: Pin) -> u8 {
     }
 }
 
-/// TMC2209 drivers on one line, with sense resistors of 0.11 ohms. What they are told is in [`drivers`](crate::drivers).
+/// TMC2209 drivers on one UART line, with sense resistors of 0.11 ohms. Their configuration is in
+/// [`drivers`](crate::drivers).
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Tmc2209 {
-    /// Where the UART sends and, over the same line, receives.
+    /// The pin on which the UART sends. Sent bytes return on `rx`, because both share one line.
     pub tx: Pin,
-    /// See `tx`.
+    /// The pin on which the UART receives: see `tx`.
     pub rx: Pin,
     /// The address of each motor's driver, motor 1 first.
     pub addresses: &'static [u8],
 }
 
-/// A heater: its pin, high for on, which is a hazard; and the channel of the converter that its sensor is on.
+/// A heater. Its pin is a hazard, and high turns it on.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Heater {
-    /// Switches its transistor.
+    /// The pin that switches the heater's transistor.
     pub pin: Pin,
-    /// 0 to 15: A0 to A15; of the RP2040 0 to 2, GP26 to GP28.
+    /// The channel of the converter for the sensor. 0 to 15 are A0 to A15; on the RP2040 0 to 2 are GP26 to GP28.
     pub channel: u8,
-    /// Selects the MAX6675 that its sensor may be instead, on the SPI of the ATmega2560; low for selected.
+    /// The select pin, active low, of a MAX6675 that may replace the sensor. It is on the SPI of the ATmega2560.
     pub select: Option<Pin>,
 }
 
-/// Heaters and fan of a printer.
+/// The heaters and the fan of a printer.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Heaters {
     /// The hot end and the bed.
     pub heaters: [Heater; 2],
-    /// The fan for what has been printed. A hazard.
+    /// The part-cooling fan. Its pin is a hazard.
     pub fan: Pin,
 }

@@ -1,6 +1,6 @@
 //! Pins of the chips: their ports, addresses and interrupts.
 
-/// An I/O port of the ATmega2560, by its letter; or the only one of the RP2040.
+/// An I/O port of the ATmega2560, by its letter; or the single port of the RP2040.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[allow(missing_docs)]
 pub enum Port {
@@ -15,7 +15,7 @@ pub enum Port {
     J,
     K,
     L,
-    /// The pins GP0 to GP29 of the RP2040; the number of a pin is its bit.
+    /// The pins GP0 to GP29 of the RP2040. The bit of a pin is its number.
     Gpio,
 }
 
@@ -38,8 +38,8 @@ impl Port {
         }
     }
 
-    /// Data-space address of the PORT register; PIN is two below it and DDR one below
-    /// (ATmega2560 data sheet, register summary). The RP2040's port has none.
+    /// Data-space address of the PORT register. PIN is two below it and DDR one below (ATmega2560 data sheet,
+    /// register summary). 0 for the RP2040's port, which has none.
     pub const fn address(self) -> usize {
         match self {
             Port::Gpio => 0,
@@ -67,7 +67,7 @@ pub struct Pin {
     pub bit: u8,
 }
 
-/// Shorthand that board files use.
+/// Shorthand for board files.
 pub const fn pin(port: Port, bit: u8) -> Pin {
     Pin { port, bit }
 }
@@ -80,21 +80,22 @@ pub const fn gp(number: u8) -> Pin {
 /// The interrupt that an edge on a pin raises.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Interrupt {
-    /// An external one by its number: INT0 to INT7, each with a vector of its own.
+    /// An external interrupt by its number: INT0 to INT7, each with a vector of its own.
     External(u8),
-    /// A pin change by its number: PCINT0 to PCINT23, of which eight share a vector.
+    /// A pin-change interrupt by its number: PCINT0 to PCINT23. Eight of them share a vector.
     PinChange(u8),
-    /// The interrupt of a pin of the RP2040, by the pin's number; each pin is told apart.
+    /// The interrupt of a pin of the RP2040, by the number of the pin. Each pin has its own flags.
     Gpio(u8),
 }
 
 impl Pin {
-    /// Whether it is the same pin.
+    /// Whether both are the same pin.
     pub const fn is(self, other: Pin) -> bool {
         self.port as u8 == other.port as u8 && self.bit == other.bit
     }
 
-    /// The output of timer 2 that it is: 0 for A, 1 for B (ATmega2560 data sheet, pin configurations).
+    /// Returns the output of timer 2 on this pin: 0 for A, 1 for B (ATmega2560 data sheet, pin configurations);
+    /// `None` for neither.
     pub const fn channel(self) -> Option<u8> {
         match (self.port, self.bit) {
             (Port::B, 4) => Some(0),
@@ -103,7 +104,7 @@ impl Pin {
         }
     }
 
-    /// The interrupt that an edge on it raises; `None` on ports A, C, F, G, H, L and some pins more.
+    /// Returns the interrupt that an edge on the pin raises; `None` on ports A, C, F, G, H, L and on some other pins.
     pub const fn interrupt(self) -> Option<Interrupt> {
         match (self.port, self.bit) {
             (Port::B, bit) => Some(Interrupt::PinChange(bit)),

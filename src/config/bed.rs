@@ -1,63 +1,65 @@
-//! The bed of a printer as a plane through three points: how much Z is lifted at a place, so that moves follow the bed.
+//! The bed of a printer as a plane through three points. It tells how much Z is lifted at a place, so that moves
+//! follow the bed.
 //!
-//! Pure, and kept beside the settings: the planner, reports and G29 ask there. Lengths are of machine coordinates, and integers: whoever asks for the
-//! lift at a place gets the same number, so nothing drifts when the plane is taken away again.
+//! Pure code, kept beside the settings because the planner, reports and G29 all read it. Lengths are in machine
+//! coordinates, as integers. Every caller gets the same number for the lift at a place, so nothing drifts when the
+//! lift is removed again.
 
 use crate::capability::Capability;
 use crate::math::round;
 use crate::units::{Length, PerAxis};
 
-/// How many machines have a bed that is a plane.
+/// The number of beds: 1 in an image with bed levelling, else 0.
 pub const BEDS: usize = Capability::BedPlane.is_built_in() as usize;
 
-/// A place of the bed: X, Y, and Z where the nozzle touches it.
+/// A point of the bed: X, Y, and the Z at which the nozzle touches the bed.
 pub type Point = [Length; 3];
 
-/// How many points make a plane.
+/// The number of points that define the plane.
 pub const POINTS: usize = 3;
 
-/// The bed rises at most so much, along X and along Y: 1 in 20.
+/// The steepest slope allowed, along X and along Y: 1 in 20.
 const STEEPEST: f32 = 0.05;
-/// How far a point may be from the origin: 10 m.
+/// The largest coordinate of a point: 10 m.
 const FAR: u32 = 100_000_000;
-/// The square of the longest side of the triangle is this at least: 10 mm.
+/// The least square of the triangle's longest side: that of 10 mm.
 const LEAST: f32 = 100_000.0 * 100_000.0;
-/// The triangle is at least as high as this part of its longest side.
+/// The least height of the triangle, as a fraction of its longest side.
 const THINNEST: f32 = 1.0 / 16.0;
 
-/// Z among the axes.
+/// The index of the Z axis.
 const Z: usize = 2;
 
-/// Why there is no plane through a point.
+/// Why a point is refused.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Fault {
-    /// The points are on a line, or nearly so, or all within 10 mm.
+    /// The points are nearly on a line, or all within 10 mm.
     Line,
     /// The bed rises by more than 1 in 20.
     Steep,
-    /// The point is more than 10 m away.
+    /// A coordinate of the point exceeds 10 m.
     Far,
-    /// There are three others.
+    /// There are already three other points.
     Full,
 }
 
-/// The points that are known, and the plane through them.
+/// The known points, and the plane through them.
 #[derive(Clone, Copy, Debug)]
 pub struct Bed {
     points: [Point; POINTS],
     count: u8,
-    /// How much Z rises along X and along Y.
+    /// The slope of Z along X and along Y.
     slopes: [f32; 2],
     follows: bool,
 }
 
 #[small]
 impl Bed {
-    /// Nothing is known.
+    /// A bed without points.
     pub const NONE: Self =
         Self { points: [[Length::ZERO; 3]; POINTS], count: 0, slopes: [0.0; 2], follows: false };
 
-    /// The points that are known.
+    /// Returns the known points.
     pub fn points(&self) -> &[Point] {
         self.points.get(..self.count.into()).unwrap_or(&[])
     }
@@ -72,17 +74,19 @@ impl Bed {
         self.follows
     }
 
-    /// Moves follow the plane from now on, if it is known, or do not. The planner alone says so, for what it calls its position changes.
+    /// Sets whether moves follow the plane. They only follow a plane that is known. Called by the planner only,
+    /// because the machine position that belongs to a motor position changes with it.
     pub fn follow(&mut self, follows: bool) {
         self.follows = follows && self.is_known();
     }
 
-    /// Forgets the points. Moves do not follow the plane by now.
+    /// Forgets the points. To be called only while moves do not follow the plane.
     pub fn forget(&mut self) {
         self.count = 0;
     }
 
-    /// The place `from` is called `to` from now on. Z of a followed bed is what it is called.
+    /// Shifts the points when the machine position `from` is set to `to`, as by G28.3. While moves follow the plane,
+    /// Z of the points stays.
     #[inline(never)]
     pub fn rename(&mut self, from: &PerAxis<Length>, to: &PerAxis<Length>) {
         for (axis, (from, to)) in from.iter().zip(to).enumerate() {
@@ -97,8 +101,8 @@ impl Bed {
         }
     }
 
-    /// Adds a point, which takes the place of one at the same X and Y. With the third one the plane is known. Nothing is changed by a fault. Cost on AVR: 8,000
-    /// cycles with the third one.
+    /// Adds a point. It replaces a point at the same X and Y. The third point makes the plane known. A fault changes
+    /// nothing. Cost on AVR: 8,000 cycles with the third point.
     #[inline(never)]
     pub fn add(&mut self, point: Point) -> Result<(), Fault> {
         if point.iter().any(|at| at.0.unsigned_abs() > FAR) {
@@ -117,7 +121,8 @@ impl Bed {
         Ok(())
     }
 
-    /// How much higher Z is at a place than it is called. A float has 24 bits: where the bed has risen by more than 800 mm units are lost.
+    /// Returns how much Z is lifted at a place. An `f32` has 24 bits, so single units of a length are lost where the
+    /// bed rises by more than 800 mm.
     #[inline(never)]
     fn lift(&self, x: Length, y: Length) -> Length {
         let [[from_x, from_y, z], ..] = self.points;
@@ -126,7 +131,7 @@ impl Bed {
         z.saturating_add(Length(round(rise)))
     }
 
-    /// The place of the motors for a place in machine coordinates. Cost on AVR: 2,000 cycles.
+    /// Converts machine coordinates to the position of the motors. Cost on AVR: 2,000 cycles.
     #[inline(never)]
     pub fn lifted(&self, at: &PerAxis<Length>) -> PerAxis<Length> {
         let mut lifted = *at;
@@ -135,30 +140,31 @@ impl Bed {
         lifted
     }
 
-    /// Z of the motors for that in machine coordinates, at a place. Cost as of [`Self::lifted`].
+    /// Converts Z in machine coordinates to Z of the motors, at a place. Cost: that of [`Self::lifted`].
     #[inline(never)]
     pub fn lifted_z(&self, x: Length, y: Length, z: Length) -> Length {
         z.saturating_add(self.lift(x, y))
     }
 
-    /// Z in machine coordinates for that of the motors, at a place: exactly the one that would be lifted there. Cost as of [`Self::lifted`].
+    /// Converts Z of the motors to Z in machine coordinates, at a place. The exact inverse of [`Self::lifted_z`].
+    /// Cost: that of [`Self::lifted`].
     #[inline(never)]
     pub fn lowered_z(&self, x: Length, y: Length, z: Length) -> Length {
         z.saturating_sub(self.lift(x, y))
     }
 }
 
-/// A vector in the space of the machine.
+/// A vector between two points.
 type Way = [f32; 3];
 
-/// How far it is from one place of an axis to another.
+/// Returns the distance between two positions of one axis.
 #[inline(never)]
 #[small]
 fn between(from: Length, to: Length) -> f32 {
     to.saturating_sub(from).0 as f32
 }
 
-/// The way between two points.
+/// Returns the vector between two points.
 #[inline(never)]
 #[small]
 fn way(from: &Point, to: &Point) -> Way {
@@ -169,28 +175,28 @@ fn way(from: &Point, to: &Point) -> Way {
     way
 }
 
-/// The square of the length of a way in the plane of X and Y.
+/// Returns the square of a vector's length in the plane of X and Y.
 #[inline(never)]
 #[small]
 fn square([x, y, _]: &Way) -> f32 {
     x * x + y * y
 }
 
-/// The difference of two products: of ways along two axes, twice the area that they enclose there.
+/// Returns `a * b - c * d`: the cross product of two vectors in a plane, which is twice the area of their triangle.
 #[inline(never)]
 #[small]
 fn cross(a: f32, b: f32, c: f32, d: f32) -> f32 {
     a * b - c * d
 }
 
-/// How much the plane through the points rises along X and along Y.
+/// Returns the slopes of the plane through the points, along X and along Y.
 #[inline(never)]
 #[small]
 fn slopes([first, second, third]: &[Point; POINTS]) -> Result<[f32; 2], Fault> {
     let (u, v) = (way(first, second), way(first, third));
     let longest = square(&u).max(square(&v)).max(square(&way(second, third)));
     let ([ux, uy, uz], [vx, vy, vz]) = (u, v);
-    // Twice the triangle's area, and what of that rises along X and along Y.
+    // Twice the area of the triangle. The two other cross products, divided by it, are the slopes.
     let area = cross(ux, vy, uy, vx);
     if longest < LEAST || area.abs() < longest * THINNEST {
         return Err(Fault::Line);
@@ -290,7 +296,7 @@ mod tests {
     }
 
     proptest! {
-        /// Each point is on the plane, to 0.2 um; to 10 um where it is meters away.
+        /// Each point is on the plane, to 0.2 um; to 10 um at distances of metres.
         #[test]
         fn planes_go_through_their_points(
             near in prop::collection::vec(within(300), 3),
@@ -305,7 +311,7 @@ mod tests {
             }
         }
 
-        /// What has been lifted is lowered to where it was, wherever that is; X, Y and the others stay.
+        /// `lowered_z` restores what was lifted, at any place. X, Y and the other axes stay.
         #[test]
         fn what_is_lifted_is_lowered_exactly(
             points in prop::collection::vec(within(200), 3),
@@ -320,7 +326,7 @@ mod tests {
             prop_assert_eq!((lifted[0], lifted[1], lifted[3]), (at[0], at[1], at[3]));
         }
 
-        /// The middle of a straight way is lifted by the mean of its ends: moves stay straight.
+        /// The middle of a straight move is lifted by the mean of its ends, so moves stay straight.
         #[test]
         fn straight_ways_stay_straight(
             points in prop::collection::vec(within(200), 3),
@@ -333,7 +339,7 @@ mod tests {
             prop_assert!((lift(&bed, middle(0), middle(1)) - mean).abs() <= 2);
         }
 
-        /// No three points do more than be refused.
+        /// Any three points are either taken or refused, without a panic.
         #[test]
         fn no_point_panics(
             points in prop::array::uniform3(prop::array::uniform3(any::<i32>())),

@@ -1,7 +1,7 @@
-//! Sets settings to what they are by default, or on a machine.
+//! Sets settings to their defaults, or to the profile of a machine.
 //!
-//! Goes through the tables row by row, so that a row is read once for all motors or axes: a reset to defaults, and a new profile,
-//! hold up everything else in thread mode meanwhile.
+//! Goes through the tables row by row, so that a row is read once for all motors or axes. This matters because a
+//! reset to defaults, and a new profile, block everything else in thread mode meanwhile.
 
 use super::Settings;
 use super::groups::{axis, job, motor, system};
@@ -12,13 +12,13 @@ use crate::boards::MOTORS;
 
 #[small]
 impl Settings {
-    /// Sets everything to its default.
+    /// Sets all settings to their defaults.
     pub fn set_defaults(&mut self) {
         self.set(machines::ACTIVE, true);
     }
 
-    /// Sets what a machine's profile says to what it is on the machine of this number: all settings of motors and axes, and what else
-    /// some machine has otherwise than another. Up to 150,000 cycles on AVR.
+    /// Sets the settings that profiles define to their values on a machine: all settings of motors and axes, and
+    /// those settings of the system in which profiles differ. Up to 150,000 cycles on AVR.
     pub fn take_over(&mut self, machine: u8) {
         self.set(machine, false);
     }
@@ -62,7 +62,7 @@ impl Settings {
     fn put_entry(&mut self, entry: &Entry) {
         let index = entry.first().index();
         for owner in entry.owners() {
-            // The first axis may lack what another has.
+            // The first axis may lack a setting that another axis has.
             if let Some(row) = owner.load(index) {
                 self.put(owner.place(&row), entry.value());
             }

@@ -1,41 +1,41 @@
-//! What settings say of drivers that are told by UART: kept beside the settings, for who homes asks there.
+//! The configuration of motor drivers that have a UART. Kept beside the settings, because homing reads it.
 
 use super::Settings;
 #[cfg(feature = "drivers")]
 use super::{Owner, Setting};
 use crate::capability::Capability;
 
-/// How many drivers get their currents from settings: 0 in an image without the capability `drivers`.
+/// The number of drivers with settings: 0 in an image without the capability `drivers`.
 pub const DRIVERS: usize = if Capability::Drivers.is_built_in() { 4 } else { 0 };
 
-/// What settings say of a motor's driver beside its microsteps.
+/// The settings of a motor's driver, beside its microsteps.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Drive {
     /// The current in motion, mA (RMS).
     pub run: u16,
     /// The current at standstill, mA (RMS).
     pub hold: u16,
-    /// Whether its chopper is stealthChop; else spreadCycle.
+    /// Whether the chopper is stealthChop; otherwise it is spreadCycle.
     pub quiet: bool,
-    /// From which load on it tells a stall, 1 to 255, the higher the sooner; 0 for never.
+    /// The load from which the driver reports a stall, 1 to 255; a higher value reports it sooner. 0 for never.
     pub stall: u8,
 }
 
 impl Drive {
-    /// What the settings are at first.
+    /// The defaults of the settings.
     pub const DEFAULT: Self = Self { run: 580, hold: 310, quiet: true, stall: 0 };
 }
 
 impl Settings {
-    /// Whether an axis homes by the load of the motor of its number, not by a switch. The settings need to be at their values: see
-    /// `tasks::drivers`.
+    /// Whether an axis homes by the load of the motor with the axis's number, not by a switch. The fields must have
+    /// been filled from the settings: see `tasks::drivers`.
     #[inline(always)]
     pub fn homes_by_stall(&self, axis: u8) -> bool {
         Capability::Drivers.is_built_in()
             && self.drives.get(usize::from(axis)).is_some_and(|drive| drive.stall != 0)
     }
 
-    /// Takes over a setting, if it is a driver's. Whether it is.
+    /// Takes over the value of a setting of a driver. `false` if the setting is not one of a driver.
     #[cfg(feature = "drivers")]
     pub fn set_drive(&mut self, setting: Setting, value: i32) -> bool {
         if setting.owner() != Owner::Drivers {

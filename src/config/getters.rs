@@ -1,7 +1,7 @@
 //! The settings in the units that the rest of the firmware works in.
 //!
-//! Axes and motors count from 0; one that is not there reads 0. A getter that returns a float costs
-//! about 300 cycles on AVR, the others about 20.
+//! Axes and motors are numbered from 0. For an axis or motor that does not exist a getter returns 0. A getter that
+//! returns a float costs about 300 cycles on AVR, the others about 20.
 
 use super::groups::{axis, motor, system};
 use super::{Settings, StepRatio, setting::small_of};
@@ -9,22 +9,22 @@ use crate::units::Length;
 
 /// Motors.
 impl Settings {
-    /// What a motor drives: an axis, or X and Y together ([`kinematics`](crate::kinematics)).
+    /// Returns what a motor drives: an axis, or X and Y together ([`kinematics`](crate::kinematics)).
     pub fn motor_axis(&self, motor: usize) -> u8 {
         self.motor(motor, motor::MA)
     }
 
-    /// Whether its direction is inverted.
+    /// Whether the motor's direction is inverted.
     pub fn motor_reversed(&self, motor: usize) -> bool {
         self.motor(motor, motor::PO) != 0
     }
 
-    /// Whether its driver steps on a falling edge: its step pin rests high.
+    /// Whether the driver steps on a falling edge, so that the step pin rests high.
     pub fn step_inverted(&self, motor: usize) -> bool {
         self.motor(motor, motor::SP) != 0
     }
 
-    /// When it is powered: 0 never, 1 always, 2 in a cycle, 3 while it moves.
+    /// Returns when the motor is powered: 0 never, 1 always, 2 in a cycle, 3 while it moves.
     pub fn motor_power_mode(&self, motor: usize) -> u8 {
         self.motor(motor, motor::PM)
     }
@@ -34,24 +34,24 @@ impl Settings {
         self.motor(motor, motor::MI)
     }
 
-    /// How many times the steps of the shortest length have to be halved until no motor makes more than one, and once more if a motor
-    /// drives X and Y together; 15 or more for more than 14.
+    /// Returns how often the steps of the shortest length have to be halved until no motor makes more than one step,
+    /// plus one if a motor drives X and Y together. 15 or more stand for more than 14.
     pub fn octaves(&self) -> u8 {
         self.octaves
     }
 
-    /// The steps of a motor for a length.
+    /// Returns the steps of a motor per length.
     pub fn step_ratio(&self, motor: usize) -> StepRatio {
         self.ratios.get(motor).copied().unwrap_or(StepRatio::NONE)
     }
 }
 
-/// An end of travel that is none.
+/// The value of a travel end that is not limited.
 pub const TRAVEL_NONE: Length = Length(-i32::MAX);
 
 /// Axes.
 impl Settings {
-    /// 0 disabled, 1 standard, 2 inhibited, 3 radius.
+    /// Axis mode: 0 disabled, 1 standard, 2 inhibited, 3 radius.
     pub fn axis_mode(&self, axis: usize) -> u8 {
         self.small(small_of(axis as u8) + axis::AM)
     }
@@ -66,12 +66,12 @@ impl Settings {
         self.axis(axis, axis::FR) as f32 * 1e-3
     }
 
-    /// The lower end of its travel.
+    /// The lower end of an axis's travel.
     pub fn travel_min(&self, axis: usize) -> Length {
         Length(self.axis(axis, axis::TN))
     }
 
-    /// The upper end of its travel.
+    /// The upper end of an axis's travel.
     pub fn travel_max(&self, axis: usize) -> Length {
         Length(self.axis(axis, axis::TM))
     }
@@ -81,7 +81,7 @@ impl Settings {
         self.axis(axis, axis::JM) as f32 * 1e3
     }
 
-    /// Acceleration limit, mm or degrees per minute squared; 0 for none. It is kept per second.
+    /// Acceleration limit, mm or degrees per minute squared; 0 for none. The setting itself is per second squared.
     pub fn accel_max(&self, axis: usize) -> f32 {
         self.axis(axis, axis::AC) as f32 * (0.1 * 3_600.0)
     }
@@ -96,7 +96,7 @@ impl Settings {
         self.axis(axis, axis::JD) as f32 * 1e-6
     }
 
-    /// Radius that turns a length into an angle, nm.
+    /// Radius that converts a length into an angle, in nm.
     pub fn radius_nm(&self, axis: usize) -> u32 {
         self.axis(axis, axis::RA).unsigned_abs()
     }
@@ -106,7 +106,7 @@ impl Settings {
         self.switch(axis, axis::SN)
     }
 
-    /// Switch at the upper end, likewise.
+    /// Switch at the upper end: 0 off, 1 homing, 2 limit, 3 both.
     pub fn switch_max(&self, axis: usize) -> u8 {
         self.switch(axis, axis::SX)
     }
@@ -116,17 +116,17 @@ impl Settings {
         self.homing(axis, axis::SV) as f32 * 1e-3
     }
 
-    /// Speed off a homing switch, mm or degrees per minute.
+    /// Speed when leaving a homing switch, mm or degrees per minute.
     pub fn latch_velocity(&self, axis: usize) -> f32 {
         self.homing(axis, axis::LV) as f32 * 1e-3
     }
 
-    /// Way off a homing switch before it is latched.
+    /// Largest distance to leave a homing switch before its position is latched.
     pub fn latch_backoff(&self, axis: usize) -> Length {
         Length(self.homing(axis, axis::LB))
     }
 
-    /// Way from the latched switch to zero.
+    /// Distance from the latched switch to zero.
     pub fn zero_backoff(&self, axis: usize) -> Length {
         Length(self.homing(axis, axis::ZB))
     }
@@ -139,7 +139,7 @@ impl Settings {
         self.system_large(system::JA) as f32 * 1e-2
     }
 
-    /// How far a chord may leave its arc, mm.
+    /// Largest distance between a chord and its arc, mm.
     pub fn chordal_tolerance(&self) -> f32 {
         self.system_large(system::CT) as f32 * 1e-6
     }
@@ -149,7 +149,7 @@ impl Settings {
         self.system(system::PSW) != 0
     }
 
-    /// Whether a probe goes back to the contact.
+    /// Whether the machine returns to the contact after a probing.
     pub fn backs_off_probe(&self) -> bool {
         self.system(system::PBO) != 0
     }
@@ -159,17 +159,17 @@ impl Settings {
         self.system(system::SL) != 0
     }
 
-    /// Whether switches open when they are hit.
+    /// Whether switches are normally closed, so that they open when hit.
     pub fn switches_normally_closed(&self) -> bool {
         self.system(system::ST) != 0
     }
 
-    /// The switch of the door: 0 off, 1 closes when the door opens, 2 opens.
+    /// The door switch: 0 off, 1 closes when the door opens, 2 opens when the door opens.
     pub fn door_switch(&self) -> u8 {
         self.system(system::SAF)
     }
 
-    /// The emergency stop: 0 off, 1 closes when it is hit, 2 opens.
+    /// The emergency stop: 0 off, 1 closes when it is hit, 2 opens when it is hit.
     pub fn stop_switch(&self) -> u8 {
         self.system(system::EST)
     }
@@ -179,12 +179,12 @@ impl Settings {
         self.system_large(system::MT).unsigned_abs()
     }
 
-    /// How long a step pulse lasts, microseconds, 1 to 10.
+    /// Length of a step pulse, microseconds, 1 to 10.
     pub fn step_pulse_us(&self) -> u8 {
         self.system(system::SPW)
     }
 
-    /// How long a direction pin must stand before a step, microseconds, 0 to 100.
+    /// Time for which a direction pin must be stable before a step, microseconds, 0 to 100.
     pub fn direction_setup_us(&self) -> u8 {
         self.system(system::DSU)
     }
@@ -194,12 +194,12 @@ impl Settings {
         self.system(system::EJ) != 0
     }
 
-    /// Whether lines of text mode are answered in JSON mode, as `txt`.
+    /// Whether lines of text mode are answered in JSON, as `txt`.
     pub fn wraps_text(&self) -> bool {
         self.is_g2core() && self.system(system::EJ) != 2
     }
 
-    /// 0 silent, 1 footers, 2 messages, 3 settings, 4 line numbers, 5 blocks.
+    /// What JSON responses contain: 0 nothing, 1 footers, 2 also messages, 3 settings, 4 line numbers, 5 blocks.
     pub fn json_verbosity(&self) -> u8 {
         self.system(system::JV)
     }
@@ -209,17 +209,17 @@ impl Settings {
         self.system(system::JS) != 0
     }
 
-    /// 0 no prompts, 1 prompts.
+    /// Prompts in text mode: 0 off, 1 on.
     pub fn text_verbosity(&self) -> u8 {
         self.system(system::TV)
     }
 
-    /// 0 off, 1 free blocks, 2 and 3 also those added and removed.
+    /// Queue reports: 0 off, 1 free blocks, 2 and 3 also blocks added and removed.
     pub fn queue_verbosity(&self) -> u8 {
         self.system(system::QV)
     }
 
-    /// 0 off, 1 changes, 2 everything.
+    /// Status reports: 0 off, 1 changes, 2 everything.
     pub fn status_verbosity(&self) -> u8 {
         self.system(system::SV)
     }
@@ -229,7 +229,7 @@ impl Settings {
         self.system_large(system::SI) as u16
     }
 
-    /// The rate of the serial line, as it was set: a code or bits a second.
+    /// The rate of the serial line, as it was set: a code, or bits a second.
     pub fn baud(&self) -> i32 {
         self.system_large(system::BAUD)
     }
@@ -239,12 +239,12 @@ impl Settings {
         self.system(system::EC) != 0
     }
 
-    /// Whether what is received is sent back.
+    /// Whether received lines are echoed.
     pub fn echo(&self) -> bool {
         self.system(system::EE) != 0
     }
 
-    /// 0 none, 1 XON/XOFF, 2 RTS/CTS.
+    /// Flow control: 0 none, 1 XON/XOFF, 2 RTS/CTS.
     pub fn flow_control(&self) -> u8 {
         self.system(system::EX)
     }
@@ -254,13 +254,14 @@ impl Settings {
         self.system(system::RXM) == 0
     }
 
-    /// In which dialect ports begin: 0 that which is decided by what is said, 1 g2core's, 2 TinyG's, 3 grbl's.
+    /// The dialect in which ports begin: 0 undecided, until a line decides; 1 g2core's, 2 TinyG's, 3 grbl's.
     pub fn dialect(&self) -> u8 {
         self.system(system::DIA) & 3
     }
 
-    /// In which dialect a port begins, as [`dialect`](Self::dialect) has it. The next two bits of the setting are the second port's own choice; 0 there is the
-    /// first port's. 4 is RepRap's, of which the setting has a bit for each port.
+    /// The dialect in which a port begins, numbered as in [`dialect`](Self::dialect), and 4 for RepRap's. In the
+    /// setting the next two bits are the choice of the second port, where 0 stands for the choice of the first port.
+    /// RepRap's dialect has a bit of its own for each port.
     pub fn dialect_of(&self, port: u8) -> u8 {
         if cfg!(feature = "dialect-reprap") && self.system(system::DIA) & (16 << port) != 0 {
             return 4;
@@ -272,7 +273,8 @@ impl Settings {
         }
     }
 
-    /// Whether what a sender says first on a port decides between dialects. Whoever has chosen text mode, or silence, has chosen TinyG's.
+    /// Whether the first line on a port that is valid in one dialect alone decides the dialect. Not if the user has
+    /// set text mode or silence, which only TinyG's dialect has.
     pub fn lets_senders_choose(&self, port: u8) -> bool {
         self.dialect_of(port) == 0 && self.starts_in_json() && self.json_verbosity() != 0
     }
@@ -297,17 +299,17 @@ impl Settings {
         self.system(system::GRM) & 4 != 0
     }
 
-    /// Whether the machine holds behind a line of G-code that is refused in grbl's dialect.
+    /// Whether the machine holds after a line of G-code that is refused in grbl's dialect.
     pub fn holds_behind_errors(&self) -> bool {
         self.system(system::GRM) & 8 != 0
     }
 
-    /// Whether reports of grbl's dialect have the error of a thread.
+    /// Whether reports of grbl's dialect tell the sync error of a thread.
     pub fn reports_sync_error(&self) -> bool {
         self.system(system::GRM) & 16 != 0
     }
 
-    /// Whether each index pulse in a thread tells it.
+    /// Whether the sync error of a thread is reported at each index pulse.
     pub fn reports_each_turn(&self) -> bool {
         self.system(system::GRM) & 32 != 0
     }
@@ -322,7 +324,7 @@ impl Settings {
         self.system(system::GUN)
     }
 
-    /// Coordinate system at power-up and program end, 1 G54 to 6 G59.
+    /// Coordinate system at power-up and program end: 1 for G54 to 9 for G59.3.
     pub fn default_coordinates(&self) -> u8 {
         self.system(system::GCO)
     }

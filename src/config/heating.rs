@@ -1,31 +1,31 @@
-//! What lines may ask of heaters: kept beside the settings, for who interprets lines asks there.
+//! What lines may ask of heaters. Kept beside the settings, because the interpreter reads it.
 
 use crate::boards::ACTIVE;
 use crate::capability::Capability;
 use crate::status::Status;
 
-/// How many machines have heaters.
+/// The number of printers: 1 in an image that can print, else 0.
 pub const PRINTERS: usize = Capability::Printer.is_built_in() as usize;
 
-/// What lines may ask for, the hot end first. The heat task keeps it up to date.
+/// What lines may ask of heaters. Arrays have the hot end first. The heat task keeps the values up to date.
 #[derive(Clone, Copy, Debug)]
 pub struct Heating {
-    /// How hot each may be made, eighths of a degree; 0 if there is none.
+    /// The highest temperature allowed for each heater, in eighths of a degree; 0 if the heater does not exist.
     pub hottest: [u16; 2],
-    /// Why none may be switched on, or `Ok`.
+    /// Why no heater may be switched on, or `Ok`.
     pub refused: Status,
-    /// Whether the A axis is an extruder: the board has heaters, or a printing host has been heard.
+    /// Whether the A axis is an extruder: the board has heaters, or a printing host has sent a line.
     pub extruder: bool,
-    /// Whether the hot end is hot enough for filament to be moved.
+    /// Whether the hot end is hot enough to move filament.
     pub warm: bool,
-    /// Whether filament may be moved however cold it is, until the next start.
+    /// Whether filament may be moved at any temperature, until the next start.
     pub allows_cold: bool,
-    /// Pressure advance: K that is in force, 0.1 ms.
+    /// The pressure advance K in force, 0.1 ms.
     pub advance: u16,
 }
 
 impl Heating {
-    /// Nothing is hot, and nothing may be heated.
+    /// All heaters cold, and none available.
     pub const NONE: Self = Self {
         hottest: [0; 2],
         refused: Status::Ok,
@@ -35,7 +35,7 @@ impl Heating {
         advance: 0,
     };
 
-    /// Whether the A axis may be moved.
+    /// Whether the A axis may be moved now.
     pub fn extrudes(&self) -> bool {
         !self.extruder || self.warm || self.allows_cold
     }

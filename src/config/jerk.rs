@@ -1,8 +1,8 @@
-//! Jerk limits that are not in force.
+//! Jerk limits that have no effect.
 //!
-//! A jerk limit that lets an axis reach its acceleration limit within a millisecond is as good as none, and motion
-//! does without it (`motion::governor::effective_jerk`): slices of motion are no shorter. The protocol says so
-//! when such a limit is set. Cost on AVR: 1,500 cycles.
+//! A jerk limit that lets an axis reach its acceleration limit within a millisecond has no effect. The motion code
+//! ignores it (`motion::governor::effective_jerk`), because no slice of motion is shorter. The sender is told when it
+//! sets such a limit. Cost on AVR: 1,500 cycles.
 
 use super::groups::axis;
 use super::setting::large_of;
@@ -10,18 +10,19 @@ use super::table::Kind;
 use super::{Owner, Setting, Settings};
 use crate::units::FIRST_ROTARY;
 
-/// How much of a jerk limit as it is kept, 1,000 mm/min^3, comes to 0.1 mm/s^2 in a millisecond.
+/// The jerk, in units of the setting (1,000 mm/min^3), that reaches 0.1 mm/s^2 in a millisecond.
 const PER_ACCEL: i32 = 21_600;
 
 #[small]
 impl Settings {
-    /// Whether `setting` is a jerk limit, or the acceleration limit beside one, that leaves the jerk limit without effect.
+    /// Whether `setting` is a jerk limit, or the acceleration limit of the same axis, and leaves the jerk limit
+    /// without effect.
     #[inline(never)]
     pub fn has_idle_jerk(&self, setting: Setting) -> bool {
         let (Owner::Axis(owner), row) = (setting.owner(), setting.row()) else { return false };
         let first = large_of(owner);
         let accel = self.large(first + axis::AC);
-        // No jerk limit that there is reaches more than that so soon.
+        // No jerk limit that fits 32 bits reaches a higher acceleration within a millisecond.
         if row.kind != Kind::Large || !(1..=i32::MAX / PER_ACCEL).contains(&accel) {
             return false;
         }
@@ -74,7 +75,7 @@ mod tests {
             accel in 1..49_000i32, part in 0.5..2.0f64,
         ) {
             let jerk = (f64::from(accel) * f64::from(PER_ACCEL) * part) as i32;
-            // What a float makes of it may be on either side of the limit.
+            // Close to the limit a float may round to either side.
             prop_assume!((part - 1.0).abs() > 1e-4);
             let (accel_s, jerk_s) = (accel as f32 * 0.1, jerk as f32 * 1e3 * PER_SECOND_CUBED);
             let mut settings = Settings::new();

@@ -1,11 +1,12 @@
-//! Machines as data: what the settings are on a router, a mill, a printer, a lathe.
+//! Machine profiles: the values of the settings on a router, a mill, a printer, a lathe.
 //!
-//! A machine is one constant in one file under `machines/`: the settings that it has otherwise than the careful
-//! one, whose own file changes TinyG's. Names, ranges and decimals are checked when the image is built. In program
-//! memory are six bytes for each difference; one of X and Y alike is one.
+//! A profile is one constant in one file under `machines/`. It lists the settings that differ from those of the
+//! careful machine; the careful machine's own file lists what differs from TinyG. Names, ranges and decimals are
+//! checked when the image is built. Each difference takes six bytes of program memory. A difference that X and Y
+//! share counts once.
 //!
-//! An image is built for [`ACTIVE`], whose values are its defaults. `{mch:2}` takes those of another over
-//! ([`Settings::take_over`](super::Settings::take_over)).
+//! An image is built for the profile [`ACTIVE`], whose values are its defaults. `{mch:2}` switches to the values of
+//! another profile ([`Settings::take_over`](super::Settings::take_over)).
 
 use core::ops::Range;
 
@@ -33,23 +34,23 @@ use mill::MILL;
 use printer::PRINTER;
 use router::ROUTER;
 
-/// A machine.
+/// The profile of a machine.
 #[derive(Debug)]
 pub struct MachineProfile {
-    /// The name that `--machine` takes.
+    /// The name for the option `--machine`.
     pub name: &'static str,
-    /// What it is, in some words.
+    /// A short description.
     pub about: &'static str,
-    /// The settings of this machine that differ from those of the careful machine.
+    /// The settings that differ from those of the careful machine.
     pub entries: &'static [Entry],
 }
 
-/// The machines, by their numbers: what `mch` is.
+/// All profiles, in the order of their numbers, which are the values of `mch`.
 pub const ALL: [&MachineProfile; COUNT] = [&CAREFUL, &ROUTER, &MILL, &PRINTER, &LATHE];
-/// How many there are.
+/// The number of profiles.
 pub const COUNT: usize = 5;
 
-/// The number of the machine that this image is built for.
+/// The number of the profile that this image is built for.
 pub const ACTIVE: u8 = if cfg!(feature = "machine-router") {
     1
 } else if cfg!(feature = "machine-mill") {
@@ -62,45 +63,45 @@ pub const ACTIVE: u8 = if cfg!(feature = "machine-router") {
     0
 };
 
-/// The number of the setting that chooses one.
+/// The number of the setting that chooses a profile.
 pub(super) const CHOICE: u8 = row_of(&system::LIST, "mch");
 
-/// A setting of a machine, or of several of its motors or axes.
+/// One setting in a profile, for the machine itself or for several of its motors or axes.
 #[derive(Clone, Copy, Debug)]
 pub struct Entry {
-    /// The setting, of the first motor or axis.
+    /// The number of the setting; for motors and axes, that of the first one.
     setting: u8,
     /// The motors or axes, as bits; 1 for the machine itself.
     owners: u8,
-    /// Scaled as kept.
+    /// The value, scaled as kept.
     value: i32,
 }
 
 impl Entry {
     const NONE: Entry = Entry { setting: 0, owners: 0, value: 0 };
 
-    /// The setting, of the first motor or axis.
+    /// Returns the setting; for motors and axes, that of the first one.
     pub(super) fn first(&self) -> Setting {
         Setting::of_entry(self.setting)
     }
 
-    /// Whose settings these are.
+    /// Returns the owners of the setting.
     pub(super) fn owners(&self) -> impl Iterator<Item = Owner> {
         let (first, owners) = (self.first().owner(), self.owners);
         let numbers = (0..u8::BITS as u8).filter(move |number| owners >> number & 1 != 0);
         numbers.map(move |number| first.numbered(number))
     }
 
-    /// Their value, scaled as kept.
+    /// Returns the value, scaled as kept.
     pub(super) fn value(&self) -> i32 {
         self.value
     }
 }
 
-/// A setting of the groups that `owners` names: `"xy"`, `"14"`, or none for the machine itself. `value` in the
-/// setting's own unit.
+/// Makes an entry for the setting `name` of the owners that `owners` lists: `"xy"`, `"14"`, or `""` for the machine
+/// itself. `value` is in the setting's own unit.
 ///
-/// Panics, so fails the build, if there is no such setting or it cannot have the value.
+/// Panics, and so fails the build, if there is no such setting or it cannot have the value.
 const fn set(owners: &str, name: &str, value: f64) -> Entry {
     let owners = owners.as_bytes();
     if owners.is_empty() {
@@ -132,7 +133,7 @@ const fn entry(setting: usize, owners: u8, row: &SettingRow, value: f64) -> Entr
     Entry { setting: setting as u8, owners, value }
 }
 
-/// The groups of `owners` as bits, by their order in `all`.
+/// Returns `owners` as bits, numbered by their order in `all`.
 const fn bits(owners: &[u8], all: &[u8]) -> u8 {
     let (mut bits, mut i) = (0, 0);
     while i < owners.len() {
@@ -147,7 +148,7 @@ const fn bits(owners: &[u8], all: &[u8]) -> u8 {
 }
 
 impl Values {
-    /// These with those of `entries` in their places.
+    /// Returns these values with those of `entries` replaced.
     pub(super) const fn with(mut self, entries: &[Entry]) -> Values {
         let mut i = 0;
         while i < entries.len() {
@@ -177,7 +178,7 @@ impl Values {
     }
 }
 
-/// Where the entries of each machine end in [`ENTRIES`]. The careful one has none there.
+/// Where the entries of each machine end in [`ENTRIES`]. The careful machine has none there.
 const ENDS: [u8; COUNT] = {
     let (mut ends, mut machine) = ([0; COUNT], 1);
     while machine < COUNT {
@@ -204,7 +205,7 @@ const fn joined() -> [Entry; ENDS[COUNT - 1] as usize] {
     all
 }
 
-/// By row of the system: 1 if some machine has it otherwise than another.
+/// By row of the system: 1 if the profiles differ in this setting.
 const fn of_machines() -> [u8; system::COUNT] {
     let (entries, mut rows, mut i) = (joined(), [0; system::COUNT], 0);
     while i < entries.len() {
@@ -223,7 +224,7 @@ progmem! {
     static OF_MACHINES: [u8; system::COUNT] = of_machines();
 }
 
-/// The value of the first of these entries that is of `setting`. About 30 cycles an entry on AVR.
+/// Returns the value of the first of these entries that sets `setting`. About 30 cycles an entry on AVR.
 #[inline(never)]
 #[small]
 fn first_of(setting: Setting, mut entries: Range<u8>) -> Option<i32> {
@@ -235,13 +236,14 @@ fn first_of(setting: Setting, mut entries: Range<u8>) -> Option<i32> {
     })
 }
 
-/// What a machine has otherwise than the careful one; `None` if not this. About 1,000 cycles on AVR.
+/// Returns the value of a setting in a profile; `None` if it is the same as on the careful machine. About 1,000
+/// cycles on AVR.
 #[small]
 pub(super) fn value(machine: u8, setting: Setting) -> Option<i32> {
     first_of(setting, range(machine))
 }
 
-/// Where the entries of a machine are in [`ENTRIES`].
+/// Returns the range of a profile's entries in [`ENTRIES`].
 #[small]
 fn range(machine: u8) -> Range<u8> {
     let machine = usize::from(machine);
@@ -249,12 +251,12 @@ fn range(machine: u8) -> Range<u8> {
     begin..END_OF.at(machine).unwrap_or(0)
 }
 
-/// What a machine has otherwise than the careful one.
+/// Returns the entries in which a profile differs from the careful machine.
 pub(super) fn differences(machine: u8) -> impl Iterator<Item = Entry> {
     range(machine).filter_map(|index| ENTRIES.at(index.into()))
 }
 
-/// Whether some machine has this setting of the system otherwise than another.
+/// Whether the profiles differ in this setting of the system.
 pub(super) fn is_of_machine(row: usize) -> bool {
     OF_MACHINES.at(row).is_some_and(|yes| yes != 0)
 }
@@ -316,7 +318,7 @@ mod tests {
         assert_eq!(settings.get(setting("si")), 200);
     }
 
-    /// Every machine: its number, its name, its settings.
+    /// All profiles: number, name, settings.
     fn each() -> impl Iterator<Item = (u8, &'static str, Settings)> {
         (0..).zip(ALL).map(|(n, machine)| (n, machine.name, settings_of(n)))
     }
@@ -356,7 +358,7 @@ mod tests {
         }
     }
 
-    /// The axes that some motor moves.
+    /// The axes that have a motor.
     fn moved(settings: &Settings) -> HashSet<usize> {
         let axes = (0..MOTORS).map(|motor| usize::from(settings.motor_axis(motor)));
         axes.filter(|axis| *axis < AXES).collect()

@@ -1,8 +1,8 @@
-//! Settings: the table of what there is, and the values in force.
+//! Settings: the table that describes them, and their current values.
 //!
-//! `protocol` reads and writes them by name through [`Setting`]; everything else uses the getters of
-//! [`Settings`], which cost a load. Values are integers scaled by a power of ten, so text goes in
-//! and out exactly. Those that are seldom asked for are in EEPROM alone, and `tasks::storage` has them.
+//! `protocol` reads and writes settings by name through [`Setting`]. Everything else uses the getters of
+//! [`Settings`], each of which costs one load. Values are integers scaled by a power of ten, so text converts to them
+//! and back exactly. Settings that are rarely read are in EEPROM only, and `tasks::storage` reads them.
 
 pub mod bed;
 #[cfg(feature = "std")]
@@ -40,19 +40,20 @@ use heating::Heating;
 use setting::{LARGES, SMALLS, large_of, small_of};
 use table::{CLAMP, JERK, Kind, MODE, RADIUS, RANGE, SettingRow, UNIT};
 
-/// The values in force.
+/// The current values of the settings.
 pub struct Settings {
     small: [u8; SMALLS],
     large: [i32; LARGES],
-    /// Derived from a motor's angle, travel and microsteps; used for every block.
+    /// Steps per length of each motor, derived from its angle, travel and microsteps. Read for every block.
     ratios: [StepRatio; MOTORS],
-    /// The octaves of the motor with the finest steps: see [`StepRatio::octaves`]. One more if a motor drives X and Y together.
+    /// The octaves of the motor with the finest steps: see [`StepRatio::octaves`]. One more if a motor drives X and Y
+    /// together.
     octaves: u8,
-    /// What lines may ask of heaters, in an image that has them.
+    /// What lines may ask of heaters. Empty in an image without heaters.
     pub heating: [Heating; heating::PRINTERS],
-    /// What drivers are told, in an image that tells them anything.
+    /// The configuration of the motor drivers. Empty in an image without configurable drivers.
     pub drives: [Drive; DRIVERS],
-    /// Where the bed of a printer is, in an image that follows it.
+    /// The plane of the printer's bed. Empty in an image without bed levelling.
     pub bed: [Bed; BEDS],
 }
 
@@ -63,14 +64,14 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// The defaults.
+    /// Returns settings that all have their defaults.
     pub fn new() -> Settings {
         let mut settings = Settings::blank();
         settings.set_defaults();
         settings
     }
 
-    /// Settings without values, for [`Settings::set_defaults`].
+    /// Returns settings without values, to be filled by [`Settings::set_defaults`].
     pub const fn blank() -> Settings {
         let ratios = [StepRatio::NONE; MOTORS];
         Settings {
@@ -84,32 +85,32 @@ impl Settings {
         }
     }
 
-    /// The plane that moves follow, if they do.
+    /// Returns the plane that moves follow; `None` if moves follow no plane.
     #[inline(always)]
     pub fn followed_bed(&self) -> Option<&Bed> {
         self.bed.first().filter(|bed| bed.follows())
     }
 
-    /// The value of a setting, scaled as kept.
+    /// Returns the value of a setting, scaled as kept. For a setting that is in EEPROM only this is its default.
     #[small]
     pub fn get(&self, setting: Setting) -> i32 {
         match setting.place() {
             Place::Small(slot) => self.small(slot).into(),
             Place::Large(slot) => self.large(slot),
             Place::Constant => self.constant(setting),
-            // One that is in EEPROM is asked for elsewhere.
+            // `tasks::storage` reads the values that are in EEPROM only.
             Place::Log => setting.default_value(),
         }
     }
 
-    /// Who we are depends on whom the sender takes us for.
+    /// Returns the value of a constant. Some constants have other values while the machine passes for a g2core.
     #[small]
     fn constant(&self, setting: Setting) -> i32 {
         let other = if self.is_g2core() { table::G2CORE.at(setting.number().into()) } else { None };
         other.unwrap_or_else(|| setting.default_value())
     }
 
-    /// Sets a value that [`Settings::check`] returned.
+    /// Stores a value that [`Settings::check`] returned.
     #[small]
     pub fn store(&mut self, setting: Setting, value: i32) {
         self.keep(setting, value);
@@ -118,7 +119,7 @@ impl Settings {
         }
     }
 
-    /// The value to store for `number` as sent, or why it is refused.
+    /// Returns the value to store for `number` as sent, or the status with which it is refused.
     #[small]
     pub fn check(&self, setting: Setting, number: Number, inches: bool) -> Result<i32, Status> {
         let row = setting.row();
@@ -146,12 +147,12 @@ impl Settings {
         Ok(value)
     }
 
-    /// A value of a setting as shown.
+    /// Returns a value of a setting as it is shown to senders.
     pub fn show(&self, setting: Setting, value: i32, inches: bool) -> Fixed {
         self.show_as(setting, value, inches, setting.row().shown)
     }
 
-    /// A value of a setting as shown, with at most `decimals` decimals.
+    /// Returns a value of a setting as it is shown to senders, with at most `decimals` decimals.
     #[small]
     pub fn show_as(&self, setting: Setting, value: i32, inches: bool, decimals: u8) -> Fixed {
         let row = setting.row();
@@ -163,7 +164,7 @@ impl Settings {
         }
     }
 
-    /// Whether it is a length, and no angle: shown in inches with G20.
+    /// Whether the setting is a length and not an angle. A length is shown in inches with G20.
     pub fn shows_length(&self, setting: Setting) -> bool {
         self.is_length(setting, &setting.row())
     }
@@ -213,7 +214,7 @@ impl Settings {
         }
         let finest = self.ratios.iter().map(|ratio| ratio.octaves()).max().unwrap_or(0);
         let shares = |motor| kinematics::is_shared(self.motor_axis(motor));
-        // A sum of two lengths is twice as long.
+        // On a motor that adds X and Y the length to be converted is up to twice as long.
         self.octaves = finest + u8::from((0..MOTORS).any(shares));
     }
 
@@ -252,7 +253,8 @@ impl Settings {
     }
 }
 
-/// `number` scaled as kept and within the limits of `row` with upper limit `max`.
+/// Returns `number` scaled as kept and within the limits of `row`, with `max` as the upper limit. A value out of
+/// range is an error, or the nearest limit if the row has [`CLAMP`].
 fn limit(row: &SettingRow, max: i32, number: Number, inches: bool) -> Result<i32, Status> {
     let clamp = row.is(CLAMP);
     let (below, above) = if row.is(RANGE) && !row.is(MODE) {

@@ -19,7 +19,7 @@ impl Name {
         Name::default()
     }
 
-    /// This name with `text` behind it in lower case, or `None` if that is too long.
+    /// Appends `text` in lower case. `None` if the name is too long then.
     pub fn with(mut self, text: &[u8]) -> Option<Name> {
         for &byte in text {
             *self.bytes.get_mut(usize::from(self.len))? = byte.to_ascii_lowercase();
@@ -28,7 +28,7 @@ impl Name {
         Some(self)
     }
 
-    /// The name that `text` begins with in lower case: as much of it as fits, without commas.
+    /// Returns the start of `text` as a name, in lower case and without commas, as far as it fits.
     pub fn beginning(text: &[u8]) -> Name {
         let mut name = Name::new();
         for byte in text.iter().filter(|byte| **byte != b',') {
@@ -37,38 +37,38 @@ impl Name {
         name
     }
 
-    /// This name with the bytes of a table's `token`, up to its zeros.
+    /// Appends a table's `token`, up to its zeros.
     pub fn with_token(self, token: [u8; 4]) -> Name {
         let len = token.iter().position(|&b| b == 0).unwrap_or(token.len());
         self.with(token.get(..len).unwrap_or(&[])).unwrap_or(self)
     }
 
-    /// The bytes.
+    /// Returns the bytes of the name.
     pub fn bytes(&self) -> &[u8] {
         self.bytes.get(..usize::from(self.len)).unwrap_or(&[])
     }
 
-    /// Whether it is `text`.
+    /// Whether the name is `text`.
     pub fn is(&self, text: Plain) -> bool {
         text.bytes().eq(self.bytes().iter().copied())
     }
 
-    /// The first byte, 0 if there is none.
+    /// Returns the first byte; 0 if the name is empty.
     pub fn first(&self) -> u8 {
         self.bytes[0]
     }
 
-    /// The last byte, 0 if there is none.
+    /// Returns the last byte; 0 if the name is empty.
     pub fn last(&self) -> u8 {
         self.bytes().last().copied().unwrap_or(0)
     }
 
-    /// The bytes, padded with zeros.
+    /// Returns the bytes, padded with zeros.
     pub fn padded(&self) -> [u8; LONGEST] {
         self.bytes
     }
 
-    /// What follows the first `skip` bytes as a table's zero-padded name, or `None` if that is too long.
+    /// Returns the name without its first `skip` bytes, zero-padded as in tables. `None` if the rest is too long.
     pub fn row_name(&self, skip: usize) -> Option<[u8; 4]> {
         let rest = self.bytes().get(skip..)?;
         let mut padded = [0; 4];
@@ -77,13 +77,13 @@ impl Name {
     }
 }
 
-/// The letter of an axis, X Y Z A B C in lower case.
+/// Returns the letter of an axis, X Y Z A B C in lower case.
 #[small]
 pub fn axis_letter(axis: u8) -> u8 {
     if axis < 3 { b'x' + axis } else { b'a' + (axis - 3) }
 }
 
-/// The axis of a lower-case letter.
+/// Returns the axis of a lower-case letter; `None` for other letters.
 #[small]
 pub fn axis_of(letter: u8) -> Option<u8> {
     match letter {
@@ -93,12 +93,12 @@ pub fn axis_of(letter: u8) -> Option<u8> {
     }
 }
 
-/// A table's zero-padded name of a setting or value from a literal.
+/// Makes a table's zero-padded name from a literal.
 pub const fn token(text: &str) -> [u8; 4] {
     padded(text)
 }
 
-/// A zero-padded name from a literal.
+/// Makes a zero-padded name from a literal.
 #[small]
 pub const fn padded<const N: usize>(text: &str) -> [u8; N] {
     let text = text.as_bytes();

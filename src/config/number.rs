@@ -1,10 +1,10 @@
 //! Decimal numbers without floats: text to fixed point and back.
 //!
-//! Conversions round half away from zero and are otherwise exact, inches included (an inch is
-//! 25.4 mm). Dividing by ten with truncation before the one rounding division keeps that true:
-//! what is cut off can never lift a value over a tie.
+//! Conversions round half away from zero and are otherwise exact, inches included (an inch is 25.4 mm). A number is
+//! first divided by ten with truncation, then rounded in the last division. This keeps the result exact, because the
+//! truncated part can never lift a value over a tie.
 //!
-//! Cost on AVR: a few thousand cycles a conversion (64-bit arithmetic); never on the motion path.
+//! Cost on AVR: a few thousand cycles a conversion (64-bit arithmetic). Never used on the motion path.
 
 use crate::progmem;
 
@@ -13,21 +13,21 @@ use crate::progmem;
 pub struct Fixed {
     /// The scaled integer.
     pub value: i32,
-    /// Decimals in `value`.
+    /// The number of decimals in `value`.
     pub decimals: u8,
 }
 
-/// Room for any [`Fixed`] as text.
+/// A buffer with room for any [`Fixed`] as text.
 pub type Digits = [u8; 12];
 
 #[small]
 impl Fixed {
-    /// An integer.
+    /// Makes an integer.
     pub fn int(value: i32) -> Fixed {
         Fixed { value, decimals: 0 }
     }
 
-    /// With at most `decimals` decimals.
+    /// Returns the number rounded to at most `decimals` decimals.
     pub fn rounded(self, decimals: u8) -> Fixed {
         let mut value = self.value.unsigned_abs();
         let mut have = self.decimals;
@@ -42,7 +42,7 @@ impl Fixed {
         Fixed { value: signed(value.into(), self.value < 0), decimals: have }
     }
 
-    /// These millimetres as inches with at most `decimals` decimals.
+    /// Converts millimetres to inches with at most `decimals` decimals.
     pub fn inches(self, decimals: u8) -> Fixed {
         let decimals = decimals.min(self.decimals);
         let mut divisor = 254u64;
@@ -53,7 +53,7 @@ impl Fixed {
         Fixed { value: signed(inches, self.value < 0), decimals }
     }
 
-    /// With at least `decimals` decimals; there must be room for them.
+    /// Returns the number with at least `decimals` decimals. The scaled value must fit 32 bits.
     pub fn padded(mut self, decimals: u8) -> Fixed {
         while self.decimals < decimals {
             self.value = self.value.wrapping_mul(10);
@@ -62,7 +62,8 @@ impl Fixed {
         self
     }
 
-    /// The number as text, every decimal shown. Cost on AVR: 300 cycles up to 9,999, else 700; and 70 for each digit that is not 0.
+    /// Returns the number as text with every decimal. Cost on AVR: 300 cycles up to 9,999, else 700; and 70 for each
+    /// digit that is not 0.
     pub fn render(self, buffer: &mut Digits) -> &[u8] {
         let decimals = self.decimals.min(9);
         let mut rest = self.value.unsigned_abs();
@@ -77,12 +78,12 @@ impl Fixed {
             put(b'-');
         }
         let mut begun = false;
-        // Most have four digits at most.
+        // Most numbers have at most four digits.
         let places = if rest < 10_000 && decimals < 4 { 4 } else { POWERS.len() as u8 };
         for place in (0..places).rev() {
             let power = POWERS.at(place.into()).unwrap_or(1);
             let mut digit = b'0';
-            // A division takes 600 cycles, a turn 15.
+            // Repeated subtraction is faster: a division takes 600 cycles, one round of this loop 15.
             while rest >= power {
                 rest -= power;
                 digit += 1;
@@ -111,9 +112,9 @@ fn signed(magnitude: u64, negative: bool) -> i32 {
     if negative { -magnitude } else { magnitude }
 }
 
-/// A number as read: (-1)^`negative` * `digits` * 10^`exponent`.
+/// A number as received: (-1)^`negative` * `digits` * 10^`exponent`.
 ///
-/// Sixteen significant digits are kept; more could not change any value that fits 32 bits.
+/// Sixteen significant digits are kept. More digits could not change any value that fits 32 bits.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Number {
     digits: u64,
@@ -123,13 +124,13 @@ pub struct Number {
 
 #[small]
 impl Number {
-    /// An integer.
+    /// Makes an integer.
     pub fn int(value: u32) -> Number {
         Number { digits: value.into(), exponent: 0, negative: false }
     }
 
-    /// Reads `-12.5e3`: digits with an optional sign, decimals and exponent, and nothing else but
-    /// commas, which mean nothing.
+    /// Reads a number such as `-12.5e3`: digits with an optional sign, decimals and exponent. Commas are ignored.
+    /// `None` for any other text.
     pub fn parse(text: &[u8]) -> Option<Number> {
         let mut number = Number::int(0);
         let mut bytes = text.iter().copied().filter(|byte| *byte != b',').peekable();
@@ -169,7 +170,7 @@ impl Number {
         }
     }
 
-    /// Whether there is nothing behind the decimal point.
+    /// Whether the number has no fraction.
     #[inline(never)]
     #[small]
     pub fn is_integer(self) -> bool {
@@ -183,23 +184,23 @@ impl Number {
         true
     }
 
-    /// Whether it is below zero.
+    /// Whether the number is below zero.
     pub fn is_negative(self) -> bool {
         self.negative && self.digits != 0
     }
 
-    /// A thousandth of it.
+    /// Returns a thousandth of the number.
     pub fn thousandth(self) -> Number {
         Number { exponent: self.exponent - 3, ..self }
     }
 
-    /// A millionth of it.
+    /// Returns a millionth of the number.
     pub fn millionth(self) -> Number {
         Number { exponent: self.exponent - 6, ..self }
     }
 
-    /// The number as a fixed-point integer, `None` beyond its range. With `inches` the text is in inches and
-    /// the result in millimetres.
+    /// Returns the number as a fixed-point integer; `None` if it is out of range. With `inches` the number is in
+    /// inches and the result in millimetres.
     pub fn fixed(self, decimals: u8, inches: bool) -> Option<i32> {
         let mut value = self.digits;
         let mut exponent = self.exponent + i16::from(decimals);

@@ -1,8 +1,8 @@
-//! Velocities that the motors can follow.
+//! Limits velocities to what the motors can follow.
 //!
-//! A setting that makes an axis ask for more steps a second than the steppers can be given lowers the
-//! velocity limits of that axis; the protocol says so. Called when a setting is stored. Cost on AVR:
-//! 6,000 cycles for each motor of the axis.
+//! A setting may make an axis need more steps a second than can be generated. The velocity limits of the axis are
+//! then lowered, and the protocol reports it. Called when a setting is stored. Cost on AVR: 6,000 cycles for each
+//! motor of the axis.
 
 use kerf_macros::small;
 
@@ -16,8 +16,8 @@ use crate::units::{AXES, FIRST_ROTARY};
 
 #[small]
 impl Settings {
-    /// Lowers the velocity limits of the axes that `setting` is about to what their motors can follow:
-    /// `rate` steps a second for so many motors. Whether one was above it.
+    /// Lowers the velocity limits of the axes that `setting` affects to what their motors can follow. `rate` returns
+    /// the possible steps a second for a number of motors. Returns whether a limit was lowered.
     pub fn limit_velocity(&mut self, setting: Setting, rate: impl Fn(usize) -> u32) -> bool {
         match setting.owner() {
             Owner::System if setting.is_pulse_width() || setting.is_machine() => {
@@ -39,7 +39,8 @@ impl Settings {
         }
     }
 
-    /// Whether `setting` is the search velocity of an axis, or its traverse velocity, that leaves the search slower than it was asked for.
+    /// Whether `setting` is the search velocity or the traverse velocity of an axis, and the traverse velocity is the
+    /// lower one. The search is then slower than its setting.
     #[inline(never)]
     #[small]
     pub fn has_fast_search(&self, setting: Setting) -> bool {
@@ -75,13 +76,13 @@ impl Settings {
     }
 }
 
-/// The velocity, as it is kept (thousandths of a mm or degree per minute), at which a motor makes `rate`
-/// steps a second; at least 1. `None` if it makes no steps.
+/// Returns the velocity at which a motor makes `rate` steps a second, scaled as kept (thousandths of a mm or degree
+/// per minute), at least 1. `None` if the motor never steps.
 fn fastest(ratio: StepRatio, rate: u32) -> Option<i32> {
     if ratio.num == 0 {
         return None;
     }
-    // A unit of a `Length` a second is six thousandths of a millimetre a minute.
+    // A unit of a `Length` is 0.0001 mm, so one unit a second is six thousandths of a millimetre a minute.
     let velocity = u64::from(rate) * 6 * u64::from(ratio.den) / u64::from(ratio.num);
     Some(i32::try_from(velocity).unwrap_or(i32::MAX).max(1))
 }
@@ -107,7 +108,7 @@ mod tests {
     #[test]
     fn what_the_motors_can_follow_stays() {
         let mut settings = Settings::new();
-        // 1280 steps/mm at 40,000 a second are 31.25 mm/s.
+        // With 1280 steps/mm, 40,000 steps a second are 31.25 mm/s.
         assert!(!store(&mut settings, "xvm", 1_875_000));
         assert!(!store(&mut settings, "xjm", i32::MAX));
         assert!(!store(&mut settings, "si", 300));
@@ -129,7 +130,7 @@ mod tests {
         let mut settings = Settings::new();
         assert!(!store(&mut settings, "2mi", 16));
         assert!(!store(&mut settings, "xvm", 1_800_000));
-        // Motor 2 joins motor 1 on X.
+        // Motor 2 now moves X, together with motor 1.
         assert!(store(&mut settings, "2ma", 0));
         assert_eq!(get(&settings, "xvm"), 937_500);
         assert!(!store(&mut settings, "yvm", 9_000_000), "Y has no motor left");

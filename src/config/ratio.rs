@@ -1,8 +1,8 @@
-//! Steps of a motor for a length, exactly.
+//! Exact conversion between lengths and steps of a motor.
 //!
-//! Source of the method: continued fractions. The convergents of steps per unit end in its reduced
-//! fraction; stopping before one leaves 32 bits gives the best approximation that fits, within half
-//! a step over the whole range of a [`Length`].
+//! Source of the method: continued fractions. The convergents of the steps per unit end in the reduced fraction. The
+//! last convergent that fits 32 bits is the best approximation that does. It is within half a step over the whole
+//! range of a [`Length`].
 
 use kerf_macros::small;
 
@@ -12,17 +12,17 @@ use crate::units::Length;
 /// Steps per unit of [`Length`], as the fraction `num` / `den`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct StepRatio {
-    /// Steps.
+    /// The steps of a length of `den` units.
     pub num: u32,
-    /// In so many units of 0.0001 mm; never 0.
+    /// The length in units of 0.0001 mm; never 0.
     pub den: u32,
 }
 
 impl StepRatio {
-    /// No steps for any length.
+    /// The ratio of a motor that never steps.
     pub const NONE: StepRatio = StepRatio { num: 0, den: 1 };
 
-    /// For a motor of `angle` (0.0001 degree a full step), `travel` (0.000001 mm a turn) and
+    /// Returns the ratio of a motor with `angle` (0.0001 degree a full step), `travel` (0.000001 mm a turn) and
     /// `microsteps`: 360 * microsteps / (angle * travel). About 20,000 cycles on AVR.
     pub fn new(angle: i32, travel: i32, microsteps: u8) -> StepRatio {
         let (Ok(angle), Ok(travel)) = (u32::try_from(angle), u32::try_from(travel)) else {
@@ -56,7 +56,7 @@ impl StepRatio {
         StepRatio { num: this.0, den: this.1 }
     }
 
-    /// How many times the steps of a unit have to be halved until they are one or less; 15 for more than 14.
+    /// Returns how often the steps of one unit have to be halved until they are one or less; 15 for more than 14.
     #[inline(never)]
     #[small]
     pub fn octaves(self) -> u8 {
@@ -68,8 +68,8 @@ impl StepRatio {
         octaves
     }
 
-    /// The length of `steps`, to the nearest, half away from zero; `None` for a motor that never
-    /// steps, or beyond the range.
+    /// Returns the length of `steps`, rounded half away from zero. `None` for a motor that never steps, or if the
+    /// length is out of range.
     ///
     /// About 1,100 cycles on AVR.
     pub fn length(self, steps: i32) -> Option<Length> {
@@ -82,7 +82,7 @@ impl StepRatio {
         Some(Length(if steps < 0 { -units } else { units }))
     }
 
-    /// Steps for `length`, to the nearest, half away from zero, saturating.
+    /// Returns the steps for `length`, rounded half away from zero, saturating.
     ///
     /// About 800 cycles on AVR while the product fits 32 bits, else 1,100.
     #[small]
@@ -101,7 +101,7 @@ impl StepRatio {
     }
 }
 
-/// `a / b`, if it fits 32 bits.
+/// Returns `a / b`; `None` if it does not fit 32 bits.
 fn wide(a: u64, b: u32) -> Option<u32> {
     (((a >> 32) as u32) < b).then(|| arithmetic::wide_quotient(a, b))
 }
@@ -112,7 +112,7 @@ mod tests {
     use proptest::prelude::*;
     use std::vec;
 
-    /// Steps from the definition in wide integers.
+    /// Computes the steps by the definition, in wide integers.
     fn oracle(angle: i32, travel: i32, microsteps: u8, length: i32) -> i128 {
         let num = 360_000_000 * i128::from(microsteps) * i128::from(length.unsigned_abs());
         let den = i128::from(angle) * i128::from(travel);

@@ -1,10 +1,10 @@
-//! What the rows of the interpreter's tables are called: `g54` to `g59`, `g591` to `g593` (G59.1 to G59.3), `g28`, `g30`,
-//! `tt1` to `tt10`; and their values: `g54x`, `tt10z`.
+//! Names of the rows of the interpreter's tables: `g54` to `g59`, `g591` to `g593` (G59.1 to G59.3), `g28`, `g30`,
+//! `tt1` to `tt10`. Names of their values: `g54x`, `tt10z`.
 
 use super::name::{Name, axis_letter};
 use crate::gcode::tables::{ROWS, STORED, SYSTEMS, TableRow};
 
-/// The name of a row. Spelled out, for text in a table would be in RAM.
+/// Returns the name of a row. Spelled out in code, because a table of text would be in RAM.
 pub fn row_name(row: TableRow) -> Name {
     const FIRST_TOOL: u8 = SYSTEMS + STORED;
     let named = |bytes: &[u8]| Name::new().with(bytes).unwrap_or_default();
@@ -19,13 +19,14 @@ pub fn row_name(row: TableRow) -> Name {
     }
 }
 
-/// The name of a value of a row.
+/// Returns the name of one value of a row.
 pub fn value_name(row: TableRow, axis: u8) -> Name {
     let name = row_name(row);
     name.with(&[axis_letter(axis)]).unwrap_or(name)
 }
 
-/// The row of that name. About 5,000 cycles on AVR for one that begins as they do.
+/// Returns the row of that name; `None` if there is none. About 5,000 cycles on AVR for a name that begins with `g`
+/// or `t`.
 #[small]
 pub fn find_row(name: &Name) -> Option<TableRow> {
     if !matches!(name.first(), b'g' | b't') {

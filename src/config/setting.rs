@@ -1,4 +1,4 @@
-//! A setting's handle: its row of the table and whose it is.
+//! [`Setting`], the handle of a setting: it gives the setting's owner and its row of the table.
 
 #[cfg(feature = "drivers")]
 use super::groups::driver;
@@ -15,7 +15,7 @@ use crate::progmem::Slice;
 use crate::units::{AXES, FIRST_ROTARY};
 
 const FIRST_MOTOR: u8 = system::COUNT as u8;
-/// What the group of the last motor is called.
+/// The digit that names the group of the last motor.
 const LAST_MOTOR: u8 = b'0' + MOTORS as u8;
 const FIRST_AXIS: u8 = FIRST_MOTOR + (MOTORS * motor::COUNT) as u8;
 const FIRST_PWM: u8 = FIRST_AXIS + (AXES * axis::COUNT) as u8;
@@ -28,35 +28,35 @@ const FIRST_DRIVER: u8 = FIRST_BED + BED;
 const FIRST_USER: u8 = FIRST_DRIVER + DRIVER;
 const FIRST_JOB: u8 = FIRST_USER + USERS * user::COUNT as u8;
 
-/// The rows of heaters: none in an image that cannot print.
+/// The number of rows for heaters: 0 in an image that cannot print.
 const HOT_END: u8 = if Capability::Printer.is_built_in() { hot_end::COUNT as u8 } else { 0 };
 const BED: u8 = if Capability::Printer.is_built_in() { bed::COUNT as u8 } else { 0 };
 
-/// The rows of drivers: none in an image that tells them nothing.
+/// The number of rows for motor drivers: 0 in an image without configurable drivers.
 #[cfg(feature = "drivers")]
 const DRIVER: u8 = driver::COUNT as u8;
 #[cfg(not(feature = "drivers"))]
 const DRIVER: u8 = 0;
 
-/// The groups of user data, `uda` to `udd`.
+/// The number of groups of user data, `uda` to `udd`.
 pub const USERS: u8 = 4;
 
-/// Whose a setting is.
+/// What a setting belongs to.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Owner {
-    /// The machine's.
+    /// The machine.
     System,
-    /// A motor's, 0 to 3.
+    /// A motor, from 0 on.
     Motor(u8),
-    /// An axis's, 0 to 5.
+    /// An axis, 0 to 5.
     Axis(u8),
-    /// The spindle's output.
+    /// The PWM output of the spindle.
     Pwm,
     /// The spindle.
     Spindle,
     /// The coolant.
     Coolant,
-    /// The second motor of an axis with two.
+    /// The second motor of an axis that two motors move.
     Squaring,
     /// The hot end.
     HotEnd,
@@ -65,15 +65,15 @@ pub enum Owner {
     /// The drivers of motors.
     #[cfg(feature = "drivers")]
     Drivers,
-    /// A sender's own, 0 to 3.
+    /// A group of user data for the sender's own use, 0 to 3.
     User(u8),
-    /// A job's.
+    /// The job that runs, as senders identify it.
     Job,
 }
 
 #[small]
 impl Owner {
-    /// Rows of the table that describe its settings.
+    /// Returns the number of table rows that describe the owner's settings.
     pub fn rows(self) -> u8 {
         match self {
             Owner::System => system::COUNT as u8,
@@ -92,7 +92,7 @@ impl Owner {
         }
     }
 
-    /// The group's name, which is the prefix of its settings' names; none for the system.
+    /// Returns the name of the owner's group, which is the prefix of its settings' names. Empty for the system.
     pub fn prefix(self) -> Name {
         match self {
             Owner::System => Name::new(),
@@ -111,7 +111,7 @@ impl Owner {
         }
     }
 
-    /// Whose prefix `name` begins with, but for the system's.
+    /// Returns the owner with whose prefix `name` begins; `None` for names of the system.
     pub fn of_name(name: &Name) -> Option<Owner> {
         match *name.bytes() {
             [motor @ b'1'..=LAST_MOTOR, ..] => Some(Owner::Motor(motor - b'1')),
@@ -130,12 +130,12 @@ impl Owner {
         }
     }
 
-    /// Whose prefix `name` is.
+    /// Returns the owner whose prefix `name` is.
     pub fn called(name: &Name) -> Option<Owner> {
         Owner::of_name(name).filter(|owner| owner.prefix() == *name)
     }
 
-    /// Whether it is an axis that turns.
+    /// Whether the owner is a rotary axis.
     pub fn is_rotary(self) -> bool {
         matches!(self, Owner::Axis(axis) if usize::from(axis) >= FIRST_ROTARY)
     }
@@ -148,7 +148,7 @@ impl Owner {
         }
     }
 
-    /// The table of the owner's settings.
+    /// Returns the table of the owner's settings.
     fn table(self) -> Option<Slice<SettingRow>> {
         Some(match self {
             Owner::System => system::ROWS.slice(),
@@ -168,7 +168,7 @@ impl Owner {
         })
     }
 
-    /// Motor or axis `number`, if it is one; else itself.
+    /// Returns motor or axis `number`, if this owner is a motor or an axis; else this owner.
     pub(super) fn numbered(self, number: u8) -> Owner {
         match self {
             Owner::Motor(_) => Owner::Motor(number),
@@ -177,7 +177,7 @@ impl Owner {
         }
     }
 
-    /// Where its setting of this row is kept.
+    /// Returns where the owner's setting of this row is kept.
     #[inline(never)]
     pub(super) fn place(self, row: &SettingRow) -> Place {
         let (small, large) = match self {
@@ -194,7 +194,7 @@ impl Owner {
         }
     }
 
-    /// What text mode calls its settings, by row.
+    /// Returns what text mode calls the owner's settings, by row.
     pub(super) fn words(self) -> Slice<Words> {
         match self {
             Owner::System => system::WORDS.slice(),
@@ -214,55 +214,55 @@ impl Owner {
         }
     }
 
-    /// Row `row` of its table, if it has that.
+    /// Returns a row of the owner's table; `None` if the owner lacks that setting.
     pub(super) fn load(self, row: u8) -> Option<SettingRow> {
         self.table()?.at(row.into()).filter(|row| self.has(row))
     }
 }
 
-/// By value, for a slice of a constant would have its place in RAM.
+/// Takes the token by value, because a slice of a constant would occupy RAM.
 #[inline(never)]
 #[small]
 fn named(token: [u8; 4]) -> Name {
     Name::new().with_token(token)
 }
 
-/// Where a setting's value is.
+/// Where the value of a setting is kept.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Place {
-    /// In the bytes.
+    /// In a byte of [`Settings`](super::Settings), at this index.
     Small(u8),
-    /// In the words.
+    /// In a 32-bit word of [`Settings`](super::Settings), at this index.
     Large(u8),
-    /// In the table, as its default.
+    /// In the table: its default is its value.
     Constant,
-    /// In EEPROM alone.
+    /// In EEPROM only.
     Log,
 }
 
-/// Bytes that the settings take.
+/// The number of bytes for settings in RAM.
 pub const SMALLS: usize = small_of(AXES as u8) as usize + system::SMALLS[0];
-/// Words that the settings take.
+/// The number of 32-bit words for settings in RAM.
 pub const LARGES: usize = large_of(AXES as u8) as usize + system::LARGES[0] + job::COUNT;
 
-/// What the axes before this one take, of which each takes `all` and those that home `homing` besides.
+/// The room of all axes before this one. Each axis takes `all`, and an axis that homes takes `homing` in addition.
 const fn base(axis: u8, [all, homing]: [usize; 2]) -> u8 {
     let homes = FIRST_ROTARY as u8 + 1;
     let homes = if axis < homes { axis } else { homes };
     axis * all as u8 + homes * homing as u8
 }
 
-/// The first byte of an axis; of the system for axis 6. Motors come first.
+/// Returns the index of the first byte of an axis; for axis 6, of the system. The bytes of motors come first.
 pub const fn small_of(axis: u8) -> u8 {
     (MOTORS * motor::SMALLS[0]) as u8 + base(axis, axis::SMALLS)
 }
 
-/// The first word of an axis; of the system for axis 6. Motors come first.
+/// Returns the index of the first word of an axis; for axis 6, of the system. The words of motors come first.
 pub const fn large_of(axis: u8) -> u8 {
     (MOTORS * motor::LARGES[0]) as u8 + base(axis, axis::LARGES)
 }
 
-/// In wide integers, where nothing wraps.
+/// The number of settings, as a `usize` so that the sum cannot wrap.
 const NUMBERS: usize = system::COUNT
     + MOTORS * motor::COUNT
     + AXES * axis::COUNT
@@ -296,17 +296,18 @@ pub struct Setting(u8);
 
 #[small]
 impl Setting {
-    /// Numbers below this may be settings.
+    /// Numbers below this may be settings. Some in that range are not.
     pub const NUMBERS: u8 = FIRST_JOB + job::COUNT as u8;
-    /// Numbers below this may be settings that are in RAM and are kept.
+    /// Numbers below this may be settings that are in RAM and kept.
     pub const WARM: u8 = FIRST_PWM;
-    /// From [`Self::WARM`] to before this are those that are in EEPROM alone.
+    /// Numbers from [`Self::WARM`] up to this one, exclusive, are settings that are in EEPROM only.
     pub const COLD: u8 = FIRST_JOB;
 
-    /// How many are kept, in RAM or in EEPROM alone; one or two of them are not.
+    /// An upper bound for the number of kept settings, in RAM or in EEPROM only. One or two of the counted ones are
+    /// not kept.
     pub const KEPT: u16 = (SMALLS + LARGES - job::COUNT) as u16 + (Self::COLD - Self::WARM) as u16;
 
-    /// The number of Kerf's version.
+    /// The number of the setting that holds Kerf's version.
     pub const VERSION: u8 = row_of(&system::LIST, "kerf");
 
     /// The number of the setting.
@@ -314,18 +315,18 @@ impl Setting {
         self.0
     }
 
-    /// The setting of that number, if there is one: an axis may lack some.
+    /// Returns the setting with that number; `None` if there is none. Some axes lack some settings.
     pub fn from_number(number: u8) -> Option<Setting> {
         let setting = Setting(number);
         setting.owner().load(setting.index()).map(|_| setting)
     }
 
-    /// The setting of a row's number among the entries of machines, which are checked when the image is built.
+    /// Returns the setting with a number from the entries of machines. The build checks that these numbers are valid.
     pub(super) const fn of_entry(number: u8) -> Setting {
         Setting(number)
     }
 
-    /// The setting of `owner` in `row` of its table, if it has that.
+    /// Returns the setting of `owner` in `row` of its table; `None` if the owner lacks that setting.
     pub fn of(owner: Owner, row: u8) -> Option<Setting> {
         let base = match owner {
             Owner::System => 0,
@@ -345,7 +346,7 @@ impl Setting {
         owner.load(row).map(|_| Setting(base + row))
     }
 
-    /// The setting called `name`. About 1,000 cycles on AVR.
+    /// Returns the setting called `name`; `None` if there is none. About 1,000 cycles on AVR.
     #[small]
     pub fn find(name: &Name) -> Option<Setting> {
         let search = |owner: Owner| {
@@ -356,73 +357,74 @@ impl Setting {
         owner.and_then(search).or_else(|| search(Owner::System))
     }
 
-    /// Whether it is the mode at power-up.
+    /// Whether this is `ej`, the mode at power-up.
     pub fn is_mode(self) -> bool {
         self.0 == const { row_of(&system::LIST, "ej") }
     }
 
-    /// Whether it is a motor's microsteps.
+    /// Whether this is `mi`, the microsteps of a motor.
     pub fn is_microsteps(self) -> bool {
         matches!(self.owner(), Owner::Motor(_))
             && self.index() == const { row_of(&motor::LIST, "mi") }
     }
 
-    /// Whether the drivers of the board can have it: microsteps are a power of two if drivers are told them.
+    /// Whether the board's drivers can have this value. Where drivers are configured by UART, microsteps must be a
+    /// power of two.
     pub(super) fn suits_driver(self, value: i32) -> bool {
         const TOLD: bool = ACTIVE.drivers.is_some() && Capability::Drivers.is_built_in();
         !TOLD || !self.is_microsteps() || value.count_ones() == 1
     }
 
-    /// Whether it is refused while anything moves: a step, or what becomes of one, would change its
-    /// meaning under way.
+    /// Whether the setting is refused while anything moves. A change in mid-motion would alter the meaning of steps
+    /// that are already planned.
     pub fn needs_rest(self) -> bool {
         matches!(self.owner(), Owner::Motor(_)) || self.row().is(IDLE)
     }
 
-    /// Whether it is the rate of the serial line.
+    /// Whether this is `baud`, the rate of the serial line.
     pub fn is_baud(self) -> bool {
         self.0 == const { row_of(&system::LIST, "baud") }
     }
 
-    /// Whether it is the dialect of the ports.
+    /// Whether this is `dia`, the dialect of the ports.
     pub fn is_dialect(self) -> bool {
         self.0 == const { row_of(&system::LIST, "dia") }
     }
 
-    /// Whether it is in EEPROM alone.
+    /// Whether the setting is in EEPROM only.
     pub fn is_cold(self) -> bool {
         (Self::WARM..Self::COLD).contains(&self.0)
     }
 
-    /// Whether it is written as hexadecimal.
+    /// Whether the setting is written as hexadecimal.
     pub fn is_data(self) -> bool {
         matches!(self.row().kind, Kind::Data | Kind::Job)
     }
 
-    /// Whether it is in RAM and is to survive a power cut: all but constants, and the rate of the line, which one
-    /// could be locked out with.
+    /// Whether the setting is in RAM and survives a power cut. All settings in RAM do, except the rate of the serial
+    /// line: a stored rate could lock the user out.
     pub fn is_kept(self) -> bool {
         matches!(self.row().kind, Kind::Small | Kind::Large) && !self.is_baud()
     }
 
-    /// Whether it can have this value, scaled as kept.
+    /// Whether the setting can have this value, scaled as kept.
     pub fn accepts(self, value: i32) -> bool {
         let row = self.row();
         let linear_mode = row.is(MODE) && !self.owner().is_rotary();
         (row.min..=row.max - i32::from(linear_mode)).contains(&value) && self.suits_driver(value)
     }
 
-    /// Whether it is the machine's profile.
+    /// Whether this is `mch`, the machine's profile.
     pub fn is_machine(self) -> bool {
         self.0 == machines::CHOICE
     }
 
-    /// Whether it is the width of step pulses.
+    /// Whether this is `spw`, the width of step pulses.
     pub fn is_pulse_width(self) -> bool {
         self.0 == const { row_of(&system::LIST, "spw") }
     }
 
-    /// Whose it is.
+    /// Returns the owner of the setting.
     pub fn owner(self) -> Owner {
         #[cfg(feature = "drivers")]
         if (FIRST_DRIVER..FIRST_USER).contains(&self.0) {
@@ -453,12 +455,12 @@ impl Setting {
         }
     }
 
-    /// The full name of the setting.
+    /// Returns the full name of the setting.
     pub fn name(self) -> Name {
         self.owner().prefix().with_token(self.row().token)
     }
 
-    /// The number of its row.
+    /// Returns the number of its row in the owner's table.
     pub fn index(self) -> u8 {
         match self.owner() {
             Owner::System => self.0,
@@ -477,13 +479,13 @@ impl Setting {
         }
     }
 
-    /// The row of the setting in its table.
+    /// Returns the row of the setting.
     pub fn row(self) -> SettingRow {
-        // A handle is only made of a number that has a row.
+        // Handles are only made for numbers that have a row.
         self.owner().load(self.index()).unwrap_or(SettingRow::NONE)
     }
 
-    /// The setting of the first motor or axis in this row, and this setting's motor or axis as a bit.
+    /// Returns this setting of the first motor or axis, and the bit of the motor or axis that owns this one.
     pub(super) fn first_of_row(self) -> (Setting, u8) {
         match self.owner() {
             Owner::Motor(motor) => (Setting(self.0 - motor * motor::COUNT as u8), 1 << motor),
@@ -492,7 +494,7 @@ impl Setting {
         }
     }
 
-    /// The default of the setting, scaled as kept.
+    /// Returns the default of the setting, scaled as kept.
     pub fn default_value(self) -> i32 {
         match machines::ACTIVE {
             0 => self.careful_value(),
@@ -500,7 +502,7 @@ impl Setting {
         }
     }
 
-    /// What it is on a machine of this number, scaled as kept. About 3,000 cycles on AVR.
+    /// Returns the value of the setting in the profile of a machine, scaled as kept. About 3,000 cycles on AVR.
     pub fn value_on(self, machine: u8) -> i32 {
         if self.is_machine() {
             return machine.into();
@@ -531,7 +533,7 @@ impl Setting {
         value.unwrap_or(0)
     }
 
-    /// Where its value is kept.
+    /// Returns where the value of the setting is kept.
     pub fn place(self) -> Place {
         self.owner().place(&self.row())
     }
@@ -576,7 +578,7 @@ mod tests {
                 Place::Log => assert!(setting.is_cold()),
             }
         }
-        // X Y Z do without a radius.
+        // X Y Z have no radius.
         assert_eq!(places.len(), SMALLS + LARGES - 3);
     }
 

@@ -1,4 +1,5 @@
-//! What a row of the settings is, and what rows are made of: the rows themselves are in [`groups`](super::groups).
+//! What a row of the settings table contains, and the constructors for rows. The rows themselves are in
+//! [`groups`](super::groups).
 //!
 //! A row takes 17 bytes of program memory, and a default four bytes for each motor or axis.
 
@@ -9,57 +10,58 @@ use crate::boards::{ACTIVE, MOTORS};
 use crate::units::AXES;
 use crate::{named, progmem};
 
-/// How a setting is kept.
+/// How the value of a setting is kept.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub enum Kind {
-    /// Nowhere: its default is its value.
+    /// Not kept: its default is its value.
     Constant,
-    /// In one byte; an integer.
+    /// In one byte of RAM; an integer.
     Small,
-    /// In 32 bits, fixed point.
+    /// In 32 bits of RAM, fixed point.
     Large,
-    /// Nowhere: it is the board's name.
+    /// Not kept: a fixed text, the name of the board or Kerf's version.
     Text,
-    /// In EEPROM alone, fixed point: seldom asked for.
+    /// In EEPROM only, fixed point. For settings that are rarely read.
     Cold,
-    /// In EEPROM alone; 32 bits, written as hexadecimal.
+    /// In EEPROM only; 32 bits, written as hexadecimal.
     Data,
-    /// In 32 bits until the next reset, written as hexadecimal.
+    /// In 32 bits of RAM until the next reset, written as hexadecimal.
     Job,
 }
 
-/// Converted from and to inches in G20 (on an axis that turns: never).
+/// A length, which is converted from and to inches with G20. Never on a rotary axis.
 pub const UNIT: u8 = 1;
-/// Out of limits is a range error, not a minimum or maximum.
+/// A value out of range is a range error, not a minimum or maximum error.
 pub const RANGE: u8 = 2;
-/// Out of limits is pulled to the limit.
+/// A value out of range is set to the nearest limit.
 pub const CLAMP: u8 = 4;
-/// In millions: a value over a million is divided by one.
+/// In millions: a value over a million is divided by a million.
 pub const JERK: u8 = 8;
-/// Only rotary axes have this setting; it is a length even there.
+/// Only rotary axes have this setting. It is a length even there.
 pub const RADIUS: u8 = 16;
 /// Only axes that home have this setting: X Y Z A.
 pub const HOMING: u8 = 32;
-/// The axis mode: a linear axis lacks the last one.
+/// The axis mode. A linear axis does not have the last value.
 pub const MODE: u8 = 64;
-/// Refused while anything moves, as all settings of motors are.
+/// The setting is refused while anything moves. This holds for all settings of motors as well.
 pub const IDLE: u8 = 128;
 
-/// A setting, or the same setting of every motor or axis.
+/// One setting, or the same setting of all motors or axes.
 #[derive(Clone, Copy)]
 pub struct SettingRow {
-    /// The name of the setting without the group, padded with zeros.
+    /// The name of the setting without its group, padded with zeros.
     pub token: [u8; 4],
-    /// The place of the setting among the small or large ones of the system, the motor, the axis; a setting that is not in RAM has its row here.
+    /// The index of the setting among the small or large ones of its owner (the system, a motor, an axis). For a
+    /// setting that is not in RAM: its row.
     pub slot: u8,
-    /// How it is kept.
+    /// How the value is kept.
     pub kind: Kind,
-    /// See the constants above.
+    /// Flags: see the constants above.
     pub flags: u8,
-    /// Decimals kept.
+    /// The number of decimals that are kept.
     pub stored: u8,
-    /// Decimals shown.
+    /// The number of decimals that are shown.
     pub shown: u8,
     /// Lower limit, scaled as kept.
     pub min: i32,
@@ -70,7 +72,7 @@ pub struct SettingRow {
 named! { SettingRow, 4 }
 
 impl SettingRow {
-    /// No setting's. All zeros, so that it needs no memory.
+    /// The row of no setting. All zeros, so that it needs no memory.
     pub const NONE: SettingRow = constant(0);
 
     pub(super) const fn with(mut self, flags: u8) -> SettingRow {
@@ -78,48 +80,48 @@ impl SettingRow {
         self
     }
 
-    /// Whether it has all of `flags`.
+    /// Whether the row has all of `flags`.
     pub const fn is(&self, flags: u8) -> bool {
         self.flags & flags == flags
     }
 
-    /// Whether it is the one with this slot among those of its kind; whose, it does not say.
+    /// Whether the row has this kind and slot. Owners share slot numbers, so the caller has to check the owner.
     pub(super) fn is_place(&self, kind: Kind, slot: u8) -> bool {
         self.kind == kind && self.slot == slot
     }
 }
 
-/// The lowest value of a setting that has no lower limit.
+/// The minimum of a setting without a lower limit.
 pub(super) const ANY: i32 = -i32::MAX;
-/// The lowest value of a setting that is above 0.
+/// The minimum of a setting that has to be above 0.
 pub(super) const POSITIVE: i32 = 1;
 
-/// An integer of one byte.
+/// A row for an integer of one byte.
 pub(super) const fn int(min: i32, max: i32) -> SettingRow {
     let (kind, flags, stored, shown) = (Kind::Small, RANGE, 0, 0);
     SettingRow { token: [0; 4], slot: 0, kind, flags, stored, shown, min, max }
 }
 
-/// A fixed-point number of `stored` decimals, of which `shown` are shown.
+/// A row for a fixed-point number of `stored` decimals, of which `shown` are shown.
 pub(super) const fn fixed(stored: u8, shown: u8, min: i32) -> SettingRow {
     let (kind, flags, max) = (Kind::Large, 0, i32::MAX);
     SettingRow { token: [0; 4], slot: 0, kind, flags, stored, shown, min, max }
 }
 
-/// A number from 0 on of which three decimals are kept, in EEPROM.
+/// A row for a number from 0 on with three decimals, in EEPROM only.
 pub(super) const fn cold(shown: u8) -> SettingRow {
     let (kind, flags, stored, min, max) = (Kind::Cold, 0, 3, 0, i32::MAX);
     SettingRow { token: [0; 4], slot: 0, kind, flags, stored, shown, min, max }
 }
 
-/// Seconds of which four decimals are kept, in EEPROM.
+/// A row for seconds with four decimals, in EEPROM only.
 pub(super) const fn seconds(most: i32) -> SettingRow {
     let mut row = up_to(cold(4), most).with(RANGE);
     row.stored = 4;
     row
 }
 
-/// The current of a driver, amperes of which three decimals are kept, in EEPROM.
+/// A row for the current of a driver, in amperes with three decimals, in EEPROM only.
 #[cfg(feature = "drivers")]
 pub(super) const fn current() -> SettingRow {
     let mut row = up_to(cold(3), 1_400).with(RANGE);
@@ -127,45 +129,46 @@ pub(super) const fn current() -> SettingRow {
     row
 }
 
-/// Yes or no, in EEPROM.
+/// A row for yes or no, in EEPROM only.
 pub(super) const fn choice() -> SettingRow {
     whole(cold(0), 1)
 }
 
-/// A whole number up to `max`.
+/// Makes `row` a whole number up to `max`.
 pub(super) const fn whole(row: SettingRow, max: i32) -> SettingRow {
     let mut row = up_to(row, max).with(RANGE);
     row.stored = 0;
     row
 }
 
-/// The sensor of a heater (0 hot end, 1 bed): a MAX6675 where the board has a pin to select it; on the host, where no board is, always.
+/// A row for the sensor of a heater (0 hot end, 1 bed). A MAX6675 is a choice if the board has a pin to select it,
+/// and always on the host, which has no board.
 pub(super) const fn sensor(heater: usize) -> SettingRow {
     let has_max6675 = cfg!(feature = "std") || ACTIVE.has_max6675(heater);
     whole(cold(0), if has_max6675 { 6 } else { 5 })
 }
 
-/// A length of either sign, in EEPROM.
+/// A row for a length of either sign, in EEPROM only.
 pub(super) const fn shift(most: i32) -> SettingRow {
     let mut row = up_to(cold(3), most).with(UNIT);
     (row.stored, row.min) = (4, -most);
     row
 }
 
-/// 32 bits.
+/// A row for 32 bits.
 pub(super) const fn bits(kind: Kind) -> SettingRow {
     let (flags, stored, shown, min, max) = (0, 0, 0, i32::MIN, i32::MAX);
     SettingRow { token: [0; 4], slot: 0, kind, flags, stored, shown, min, max }
 }
 
-/// A number that never changes.
+/// A row for a number that never changes.
 pub(super) const fn constant(decimals: u8) -> SettingRow {
     let (kind, flags) = (Kind::Constant, 0);
     let (stored, shown, min, max) = (decimals, decimals, 0, 0);
     SettingRow { token: [0; 4], slot: 0, kind, flags, stored, shown, min, max }
 }
 
-/// A fixed text: of dialects the name of the board, or Kerf's version, which has a maximum of 1.
+/// A row for a fixed text: the name of the board, or Kerf's version. The version is marked by a maximum of 1.
 pub(super) const fn fixed_text(is_version: bool) -> SettingRow {
     let mut row = constant(0);
     row.kind = Kind::Text;
@@ -178,13 +181,13 @@ pub(super) const fn up_to(mut row: SettingRow, max: i32) -> SettingRow {
     row
 }
 
-/// A row with its name.
+/// Gives a row its name.
 pub(super) const fn named(mut row: SettingRow, name: &str) -> SettingRow {
     row.token = token(name);
     row
 }
 
-/// Rows with their places. Those that not every owner has come last in RAM.
+/// Gives rows their slots. In RAM the settings that some owners lack come last.
 pub(super) const fn numbered<const N: usize>(mut rows: [SettingRow; N]) -> [SettingRow; N] {
     let mut row = 0;
     while row < N {
@@ -197,7 +200,7 @@ pub(super) const fn numbered<const N: usize>(mut rows: [SettingRow; N]) -> [Sett
     rows
 }
 
-/// How many rows of the same kind have their places before this one.
+/// Returns how many rows of the same kind have lower slots than this one.
 const fn rows_before(rows: &[SettingRow], row: usize) -> usize {
     let (this, mut before, mut other) = (&rows[row], 0, 0);
     while other < rows.len() {
@@ -213,7 +216,7 @@ const fn rows_before(rows: &[SettingRow], row: usize) -> usize {
     before
 }
 
-/// How many rows are of a kind: of those that every owner has, and of those with [`HOMING`].
+/// Returns how many rows are of a kind: those that every owner has, and those with [`HOMING`].
 pub(super) const fn count(rows: &[SettingRow], kind: Kind) -> [usize; 2] {
     let (mut counts, mut row) = ([0; 2], 0);
     while row < rows.len() {
@@ -225,14 +228,14 @@ pub(super) const fn count(rows: &[SettingRow], kind: Kind) -> [usize; 2] {
     counts
 }
 
-/// The place of the row of that name.
+/// Returns the slot of the row with that name.
 pub(super) const fn slot(rows: &[SettingRow], name: &str) -> u8 {
     rows[row_of(rows, name) as usize].slot
 }
 
-/// The number of the row of that name.
+/// Returns the number of the row with that name.
 ///
-/// Panics, so fails the build, if there is none.
+/// Panics, and so fails the build, if there is none.
 pub(super) const fn row_of(rows: &[SettingRow], name: &str) -> u8 {
     let mut row = 0;
     while !is_called(&rows[row].token, name.as_bytes()) {
@@ -261,13 +264,13 @@ pub(super) struct Values {
     pub(super) axis: [[i32; AXES]; axis::COUNT],
 }
 
-/// What TinyG has by default, and Kerf where no profile says otherwise.
+/// The values of TinyG's defaults, and Kerf's own where no profile says otherwise.
 const PLAIN: Values = Values { system: system::PLAIN, motor: motor::PLAIN, axis: axis::PLAIN };
 
-/// The careful machine's, from which the other profiles differ.
+/// The values of the careful machine, from which the other profiles differ.
 pub(super) const CAREFUL: Values = PLAIN.with(machines::CAREFUL.entries);
 
 progmem! {
-    /// What the constants at the head of the group `sys` are while the machine passes for a g2core.
+    /// The values of the constants at the head of the group `sys` while the machine passes for a g2core.
     pub static G2CORE: [i32; 4] = [10_103, 990, 3, 0];
 }

@@ -178,7 +178,7 @@ proptest! {
         let Some(setting) = setting else { return Ok(()) };
         let mut settings = Settings::new();
         let (row, mut buffer) = (setting.row(), Digits::default());
-        // Shown decimals only, so that nothing is lost.
+        // Renders with the decimals shown, so that reading the text back loses nothing.
         let text = Fixed { value, decimals: row.shown }.render(&mut buffer).to_vec();
         let number = Number::parse(&text).unwrap();
         let Ok(value) = settings.check(setting, number, inches) else { return Ok(()) };

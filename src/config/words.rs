@@ -4,16 +4,16 @@ use super::Setting;
 use crate::progmem::Text;
 use crate::text;
 
-/// What is shown of a setting beside its value.
+/// The words that text mode shows beside the value of a setting.
 #[derive(Clone, Copy)]
 pub struct Words {
-    /// What it is, behind whose it is.
+    /// The title of the setting, which follows the name of its owner.
     pub title: Text,
-    /// A length or an angle: its unit comes behind the value.
+    /// Whether the setting is a length or an angle, so that its unit follows the value.
     pub length: bool,
-    /// What comes behind that: the rest of the unit, or the choices.
+    /// The text at the end: the rest of the unit, or the choices.
     pub tail: Text,
-    /// Decimals, if text mode shows others than JSON.
+    /// The number of decimals, if it is not the same as in JSON.
     pub decimals: Option<u8>,
 }
 
@@ -56,7 +56,7 @@ pub(super) const SECONDS: Text = text!(" s");
 pub(super) const NONE: Text = text!("");
 
 impl Setting {
-    /// What text mode calls it.
+    /// Returns the words of the setting.
     pub fn words(self) -> Option<Words> {
         let index = usize::from(self.index());
         self.owner().words().at(index)

@@ -1,8 +1,8 @@
-//! What a dialect has to have, and which dialects there are.
+//! The interface of a dialect, and the table of dialects.
 //!
-//! A dialect is a folder beside this file with a type that implements [`Dialect`], and a row of `dialects!` below. The table makes an
-//! enum of each of its types, with a variant for each dialect that is built in. Of an image with one dialect the variants
-//! take neither room nor time.
+//! A dialect is a folder beside this file with a type that implements [`Dialect`], and a row of `dialects!` below.
+//! For each associated type of [`Dialect`] the macro makes an enum with one variant per dialect that is built in. In
+//! an image with a single dialect these enums cost neither memory nor time.
 
 use super::Rewritten;
 use super::line::{Ending, Next, Span};
@@ -13,44 +13,49 @@ use crate::config::Settings;
 use crate::machine::Alarm;
 use crate::status::Status;
 
-/// A way to speak to senders. All of it runs in thread mode; lines are without their ends.
+/// A way to speak to senders. All of it runs in thread mode. Lines are passed without their line ends.
 pub trait Dialect {
-    /// How a port is spoken to, if there are several ways; kept with the port. The default counts until settings have been read.
+    /// How a port is spoken to, where the dialect has several ways; kept per port. The default applies until the
+    /// settings have been read.
     type Speech: Copy + Default;
-    /// A line on its way to its answer.
+    /// A line that is being answered.
     type Request: Answers;
-    /// A notice on its way out.
+    /// A notice that is being sent.
     type Telling: Tells;
-    /// What is kept between reports.
+    /// What the dialect remembers from one report to the next.
     type Memory: Remembers;
 
-    /// Whether lines are answered in their order, empty ones too, and `?` and bytes above 0x7F are taken out of lines wherever they stand.
+    /// Whether lines, empty ones included, are answered in the order in which they arrive. In such a dialect `?` and
+    /// bytes above 0x7F are taken out of lines wherever they stand.
     const IN_ORDER: bool = false;
 
-    /// Whether a printing host speaks so: `!`, `~`, `%` and bytes above 0x7F are text wherever they stand, blocks are [rewritten](Dialect::rewrite), and only
-    /// lines that are control lines in this dialect overtake.
+    /// Whether this is the dialect of a printing host. In such a dialect `!`, `~`, `%` and bytes above 0x7F are plain
+    /// text, blocks are [rewritten](Dialect::rewrite), and only lines that are control lines in this dialect overtake
+    /// others.
     const IS_PLAIN: bool = false;
 
-    /// Whether the settings have a port begin in this dialect. If no dialect is chosen they begin in the first of the table.
+    /// Whether the settings select this dialect for a port. If no dialect is selected, the port starts in the first
+    /// dialect of the table.
     fn is_chosen(settings: &Settings, port: u8) -> bool {
         let _ = (settings, port);
         false
     }
 
-    /// Whether a line is said in this dialect alone, so that it decides for a port that waits for that.
+    /// Whether a line is valid in this dialect alone. Such a line decides the dialect of a port that is still
+    /// undecided.
     fn is_decided_by(line: &[u8]) -> bool;
 
-    /// The words of a jog, if a block is one: G-code that moves and changes no mode.
+    /// Returns the words of a jog (G-code that moves and changes no mode); `None` if the block is not a jog.
     fn jog(block: &[u8]) -> Option<&[u8]> {
         let _ = block;
         None
     }
 
-    /// How ports are spoken to after a start.
+    /// Returns how ports are spoken to after a start.
     fn speech(settings: &Settings) -> Self::Speech;
 
-    /// Begins with a line, of which the sender counts `length` bytes. `None` if there is nothing to answer. The line decides how the
-    /// port is spoken to from now on.
+    /// Starts to answer a line, which the sender counts as `length` bytes. `None` if there is nothing to answer. The
+    /// line may change `speech`, and so how the port is spoken to from now on.
     fn begin(
         line: &[u8],
         length: u16,
@@ -58,12 +63,12 @@ pub trait Dialect {
         settings: &Settings,
     ) -> Option<Self::Request>;
 
-    /// The answer to a `?` alone, where such bytes are taken out of lines: a status report.
+    /// Returns the request for a single `?`: a status report. `None` in dialects that do not take `?` out of lines.
     fn question() -> Option<Self::Request> {
         None
     }
 
-    /// Answers a line that could not be kept with a status; `line` is what is left of it.
+    /// Answers a line that could not be kept with a status. `line` is what is left of the line.
     fn refuse(
         status: Status,
         line: &[u8],
@@ -72,118 +77,129 @@ pub trait Dialect {
         settings: &Settings,
     ) -> Self::Request;
 
-    /// A block of a [plain](Dialect::IS_PLAIN) dialect in the words of the interpreter.
+    /// Translates a block of a [plain](Dialect::IS_PLAIN) dialect into the words of the interpreter.
     fn rewrite<'a>(block: &[u8], out: &'a mut Rewritten) -> Result<&'a [u8], Status> {
         out.clear();
         out.extend_from_slice(block).map_err(|_| Status::InputTooLong)?;
         Ok(out)
     }
 
-    /// A count of the lines that have been begun, if a line that takes long is told so: [`Notice::Busy`].
+    /// Returns the number of lines begun so far, if the dialect reports that a line takes long ([`Notice::Busy`]);
+    /// else `None`.
     fn activity(speech: Self::Speech) -> Option<u8> {
         let _ = speech;
         None
     }
 
-    /// Seconds from one [`Notice::Temperatures`] to the next; 0 for none.
+    /// Returns the seconds from one [`Notice::Temperatures`] to the next; 0 for none.
     fn interval_s(memory: &Self::Memory) -> u8 {
         let _ = memory;
         0
     }
 
-    /// Begins to tell what is so by now.
+    /// Starts to send a notice about the present state of the machine.
     fn tell(notice: Notice, speech: Self::Speech, machine: &mut impl Machine) -> Self::Telling;
 
-    /// Whether blocks of G-code that are carried out, and have no comment, are answered by [`Dialect::put_brief`]: `Some(true)` all,
-    /// `Some(false)` those without a line number, `None` none. Asked before each line: a few cycles.
+    /// Returns which blocks [`Dialect::put_brief`] answers, among the blocks of G-code that run and have no comment:
+    /// `Some(true)` all of them, `Some(false)` those without a line number, `None` none. Called before each line: a
+    /// few cycles.
     fn brief(speech: Self::Speech, settings: &Settings) -> Option<bool>;
 
-    /// The block of a line that is as most lines of a [plain](Dialect::IS_PLAIN) dialect are, and takes its place in the order. `None`, and nothing done,
-    /// for one that has to be looked at closer. If the block is a usual move, it is answered by [`Dialect::put_brief`].
+    /// Takes the block of a line in the usual form of a [plain](Dialect::IS_PLAIN) dialect, and counts the line.
+    /// `None` if the line needs the full parser; nothing is changed then. If the block is a usual move,
+    /// [`Dialect::put_brief`] answers it.
     #[inline(always)]
     fn fast_path(line: &[u8], speech: &mut Self::Speech) -> Option<Span> {
         let _ = (line, speech);
         None
     }
 
-    /// Puts the whole answer to such a block. Called for each usual move: part of its budget.
+    /// Writes the whole answer to a block that [`Dialect::brief`] or [`Dialect::fast_path`] selects. Called for each
+    /// usual move, so its cost is part of the budget of a move.
     fn put_brief(settings: &Settings, ending: Ending, out: &mut impl Out);
 
-    /// Puts the end of a line.
+    /// Writes the line end.
     fn put_line_end(settings: &Settings, out: &mut impl Out);
 
     /// Whether empty lines are answered.
     fn answers_empty(speech: Self::Speech) -> bool;
 
-    /// Whether a [control line](Dialect::is_control) may begin so.
+    /// Whether a [control line](Dialect::is_control) may begin with this byte.
     fn may_be_control(first: u8) -> bool;
 
-    /// Whether a line is a control line, which overtakes G-code that waits.
+    /// Whether a line is a control line: one that overtakes waiting G-code.
     fn is_control(line: &[u8]) -> bool;
 
-    /// The alarm that a line of at most [`STOP_MAX`](super::STOP_MAX) bytes begins when it arrives, before it is answered.
+    /// Returns the alarm that a line raises on arrival, before the line is answered; `None` for most lines. The line
+    /// has at most [`STOP_MAX`](super::STOP_MAX) bytes.
     fn asks_alarm(line: &[u8]) -> Option<Alarm>;
 }
 
-/// A line that is being answered. No answer begins before the G-code of its line has run.
+/// A line that is being answered. The answer starts only after the G-code of the line has run.
 pub trait Answers {
-    /// The G-code that the next step would ask for with [`Next::Gcode`], if that is so already.
+    /// Returns the G-code that the next step would request with [`Next::Gcode`], if that is known already.
     fn gcode(&self) -> Option<Span>;
 
-    /// Takes the status with which that G-code has run, and whether it may have a `comment`.
+    /// Takes the status with which that G-code has run. `comment`: whether the G-code may contain a comment.
     fn ran(&mut self, status: Status, comment: bool);
 
-    /// Does the next bit of work and puts at most [`CHUNK`](super::CHUNK) bytes. The line is handed in anew each time.
+    /// Does the next part of the work and writes at most [`CHUNK`](super::CHUNK) bytes. The caller passes the line
+    /// anew each time.
     fn step(&mut self, line: &[u8], machine: &mut impl Machine, out: &mut impl Out) -> Next;
 
-    /// Whether something of the answer has been put.
+    /// Whether a part of the answer has been written.
     fn has_begun(&self) -> bool;
 
-    /// A status report comes before what is next, if no line of the answer is open. Whether it does.
+    /// Puts a status report in front of the rest of the answer, unless the answer is in the middle of a line. Returns
+    /// whether the report is sent.
     fn interject(&mut self) -> bool {
         false
     }
 
-    /// Nothing more is put than what the line tells: it comes from a file, whose sender waits for no answer.
+    /// Drops all output except what the line itself asks to be reported. For lines from a file: no sender waits for
+    /// an answer.
     fn silence(&mut self) {}
 
-    /// Whether the answer is a list, in which a `?` is not to wait for what has been put.
+    /// Whether the answer is a list. The caller then keeps little output queued, so that a `?` is answered soon.
     fn is_list(&self) -> bool {
         false
     }
 
-    /// Whether what is next is done at rest. Until then the line waits as G-code does, and others overtake it.
+    /// Whether the next step needs the machine at rest. Until then the line waits as G-code does, and other lines
+    /// overtake it.
     fn awaits_rest(&self) -> bool {
         false
     }
 }
 
-/// A notice that is being told.
+/// A notice that is being sent.
 pub trait Tells {
-    /// Puts the next part, at most [`CHUNK`](super::CHUNK) bytes. Whether there is more.
+    /// Writes the next part, at most [`CHUNK`](super::CHUNK) bytes. Returns whether there is more.
     fn step(&mut self, machine: &mut impl Machine, out: &mut impl Out) -> bool;
 
-    /// Ends the line here, so that an answer can be sent: the rest follows in a line of its own. False if a line of it can't end here.
+    /// Ends the output line here, so that an answer can be sent in between. The rest follows in a line of its own.
+    /// Returns `false` if the output cannot be divided here.
     fn split(&mut self, out: &mut impl Out) -> bool {
         let _ = out;
         false
     }
 
-    /// How many free blocks a queue report has told.
+    /// Returns the number of free blocks that a queue report has told.
     fn blocks_free(&self) -> usize {
         0
     }
 }
 
-/// What is kept between reports.
+/// What dialects remember from one report to the next.
 pub trait Remembers {
-    /// At first. [`Remembers::restore`] comes when it is in its place, for there is little stack where it is made.
+    /// Makes an empty value. The caller calls [`Remembers::restore`] once the value is in its place, because the
+    /// stack is small where the value is made.
     fn new() -> Self;
 
-    /// Settings have their defaults, and so has what reports hold.
+    /// Restores the defaults, after the settings have got their defaults.
     fn restore(&mut self);
 
-    /// The next report tells everything, for its reader has been told nothing so far.
+    /// Makes the next report complete, because its reader has been told nothing so far.
     fn refresh(&mut self);
 }
 
@@ -192,29 +208,29 @@ macro_rules! dialects {
         #[cfg(not(any($(feature = $feature),+)))]
         compile_error!("an image needs a dialect: one of the features `dialect-...`");
 
-        /// How a port is spoken to: in which dialect, and what that keeps.
+        /// How a port is spoken to: the dialect, and what the dialect keeps per port.
         #[derive(Clone, Copy)]
         pub enum Speech {
             $($(#[$what])* #[cfg(feature = $feature)] $name(<$dialect as Dialect>::Speech),)+
         }
 
-        /// A line on its way to its answer.
+        /// A line that is being answered.
         pub enum Request {
             $($(#[$what])* #[cfg(feature = $feature)] $name(<$dialect as Dialect>::Request),)+
         }
 
-        /// A notice on its way out.
+        /// A notice that is being sent.
         pub enum Telling {
             $($(#[$what])* #[cfg(feature = $feature)] $name(<$dialect as Dialect>::Telling),)+
         }
 
-        /// What the dialects keep between reports.
+        /// What the dialects remember from one report to the next.
         pub struct Memory {
             $($(#[$what])* #[cfg(feature = $feature)] pub $field: <$dialect as Dialect>::Memory,)+
         }
 
         impl Default for Speech {
-            /// In the first dialect of the table that is built in.
+            /// The first dialect of the table that is built in.
             #[allow(unreachable_code)]
             fn default() -> Self {
                 $(#[cfg(feature = $feature)]
@@ -223,10 +239,11 @@ macro_rules! dialects {
         }
 
         impl Speech {
-            /// Whether the image has several dialects, of which a sender may choose.
+            /// Whether the image has several dialects, so that a sender may choose.
             pub const IS_CHOSEN: bool = 1 < 0 $(+ cfg!(feature = $feature) as usize)+;
 
-            /// How a port is spoken to after a start: in the dialect that is chosen, else in the first of the table that is built in.
+            /// Returns how a port is spoken to after a start: in the dialect that the settings select, else in the
+            /// first one of the table that is built in.
             #[allow(unreachable_code)]
             #[inline(always)]
             pub fn at_start(settings: &Settings, port: u8) -> Self {
@@ -238,7 +255,7 @@ macro_rules! dialects {
                 { return Self::$name(<$dialect>::speech(settings)); })+
             }
 
-            /// The dialect that a line decides for, if it is said in one alone; see [`Dialect::is_decided_by`].
+            /// Returns the dialect in which alone a line is valid, if there is one: see [`Dialect::is_decided_by`].
             #[small]
             pub fn decided_by(line: &[u8], settings: &Settings) -> Option<Self> {
                 $(#[cfg(feature = $feature)]
@@ -248,7 +265,7 @@ macro_rules! dialects {
                 None
             }
 
-            /// The dialect whose senders ask by a `?` alone, if it is built in.
+            /// Returns the dialect whose senders ask with a single `?`, if it is built in.
             #[small]
             pub fn of_question(settings: &Settings) -> Option<Self> {
                 $(#[cfg(feature = $feature)]
@@ -258,8 +275,8 @@ macro_rules! dialects {
                 None
             }
 
-            /// The greeting that an undecided port tells beside that of its dialect: of the dialect whose senders ask by a `?`, else of
-            /// printing hosts.
+            /// Returns the dialect of the second greeting that an undecided port sends, beside its own: the dialect
+            /// whose senders ask with a single `?`, else that of printing hosts.
             #[small]
             pub fn of_other_greeting(settings: &Settings) -> Option<Self> {
                 let mut other = Self::of_question(settings);
@@ -270,7 +287,7 @@ macro_rules! dialects {
                 other
             }
 
-            /// Whether an image has a dialect whose senders ask by a `?` alone.
+            /// Whether the image has a dialect whose senders ask with a single `?`.
             pub const HAS_QUESTION: bool = {
                 let mut has = false;
                 $(#[cfg(feature = $feature)]
@@ -278,7 +295,7 @@ macro_rules! dialects {
                 has
             };
 
-            /// Whether an image has a dialect that is [plain](Dialect::IS_PLAIN).
+            /// Whether the image has a [plain](Dialect::IS_PLAIN) dialect.
             pub const HAS_PLAIN: bool = {
                 let mut has = false;
                 $(#[cfg(feature = $feature)]
@@ -286,7 +303,7 @@ macro_rules! dialects {
                 has
             };
 
-            /// In the same dialect, as after a start.
+            /// Returns the same dialect in the state that it has after a start.
             #[cfg(feature = "sd")]
             pub fn fresh(self, settings: &Settings) -> Self {
                 match self {
@@ -550,7 +567,7 @@ macro_rules! dialects {
             }
         }
 
-        /// See [`Dialect::jog`]: in any dialect that is built in.
+        /// See [`Dialect::jog`]. Tries all dialects that are built in.
         #[inline(always)]
         pub fn jog(block: &[u8]) -> Option<&[u8]> {
             let mut words = None;
@@ -559,7 +576,7 @@ macro_rules! dialects {
             words
         }
 
-        /// See [`Dialect::may_be_control`]: in any dialect that is built in.
+        /// See [`Dialect::may_be_control`]. Tries all dialects that are built in.
         #[inline(always)]
         pub fn may_be_control(first: u8) -> bool {
             let mut may = false;
@@ -568,7 +585,8 @@ macro_rules! dialects {
             may
         }
 
-        /// See [`Dialect::is_control`]: in any dialect that is built in and is `plain`, or is not.
+        /// See [`Dialect::is_control`]. Tries the dialects that are built in and whose [`Dialect::IS_PLAIN`] equals
+        /// `plain`.
         #[inline(always)]
         pub fn is_control(line: &[u8], plain: bool) -> bool {
             let mut is = false;
@@ -577,7 +595,8 @@ macro_rules! dialects {
             is
         }
 
-        /// See [`Dialect::asks_alarm`]: in any dialect that is built in and is `plain`, or is not.
+        /// See [`Dialect::asks_alarm`]. Tries the dialects that are built in and whose [`Dialect::IS_PLAIN`] equals
+        /// `plain`.
         #[inline(always)]
         pub fn asks_alarm(line: &[u8], plain: bool) -> Option<Alarm> {
             let mut alarm = None;

@@ -1,17 +1,17 @@
-//! Lines: what comes in, and what is done with one.
+//! Parts of a received line, and what the caller does next with it.
 
 /// A part of a line.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Span {
     /// The first byte of the part.
     pub start: u8,
-    /// The byte behind the last one.
+    /// The position behind the last byte of the part.
     pub end: u8,
 }
 
 #[small]
 impl Span {
-    /// The bytes of the part.
+    /// Returns the bytes of the part.
     #[inline(never)]
     pub fn of(self, line: &[u8]) -> &[u8] {
         line.get(usize::from(self.start)..usize::from(self.end)).unwrap_or(&[])
@@ -25,22 +25,22 @@ pub enum Next {
     More,
     /// Run this part of the line as G-code, call [`Answers::ran`](super::Answers::ran), and step again.
     Gcode {
-        /// The first byte of that part.
+        /// The first byte of the part.
         start: u8,
-        /// The byte behind the last one.
+        /// The position behind the last byte of the part.
         end: u8,
     },
-    /// What is to be changed is still on its way to memory: step again later.
+    /// The value to be changed is still being written to memory: step again later.
     Wait,
     /// The answer is complete.
     Done(crate::status::Status),
 }
 
-/// What an answer may say beside the status.
+/// What an answer may tell beside the status.
 #[derive(Clone, Copy, Default)]
 pub struct Ending {
-    /// Free line slots.
+    /// The number of free line slots.
     pub free: u8,
-    /// Length in bytes of the line that is answered, its line end included; 0 if the response answers no line.
+    /// Length in bytes of the answered line, line end included; 0 if the response answers no line.
     pub length: u16,
 }

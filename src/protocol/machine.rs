@@ -14,87 +14,88 @@ use crate::motion::snapshot::Program;
 use crate::status::Status;
 use crate::units::Length;
 
-/// What storing a setting has brought about besides.
+/// A side effect of storing a setting, which the sender is told.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Warning {
-    /// Nothing besides.
+    /// No side effect.
     #[default]
     None,
     /// The velocity limits of an axis were lowered to what its motors can follow.
     Velocity,
-    /// A jerk limit of an axis is not in force beside its acceleration limit.
+    /// A jerk limit of an axis has no effect because of its acceleration limit.
     Jerk,
     /// An axis searches for its homing switch at its traverse velocity, which is below its search velocity.
     Search,
 }
 
-/// How far a hold has come.
+/// The state of a hold.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Hold {
-    /// There is none, or none that anybody is to see.
+    /// No hold, or a hold that is not shown to senders.
     #[default]
     None,
-    /// The machine slows down, or goes on again.
+    /// The machine slows down for the hold, or starts again after it.
     Slows,
     /// The machine stands still.
     Rests,
 }
 
-/// How long a line may be that is carried out after a start.
+/// The longest line, in bytes, that can be run at each start.
 pub const STARTUP_MAX: usize = 40;
 
-/// What is done to the program that is kept.
+/// An operation on the stored program.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Store<'a> {
-    /// A new one begins; the old one is gone.
+    /// Starts a new program. The old one is lost.
     Begin,
-    /// A line of it.
+    /// Appends a line to the program.
     Line(&'a [u8]),
-    /// The program is complete.
+    /// Completes the program.
     End,
-    /// A line that is carried out after a start: which of the two, and its text.
+    /// Stores a line that runs at each start: its index (0 or 1) and its text.
     Startup(u8, &'a [u8]),
 }
 
-/// What becomes of a printer's extruder, which is the A axis.
+/// An operation on a printer's extruder, which is the A axis.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Extruder {
-    /// The extruder's words are relative to where it is, whatever the others are relative to; or no longer.
+    /// Whether the extruder's words are relative, regardless of the mode of the other axes.
     Relative(bool),
-    /// The extruder moves this many thousandths of what its words say.
+    /// Sets the flow: the extruder moves this many thousandths of what its words say.
     Flow(u16),
-    /// M900 K, 0.1 ms: how far it is ahead in the lines that follow.
+    /// Sets the pressure advance, M900 K: how far the extruder is ahead in the lines that follow, in 0.1 ms.
     Advance(u16),
-    /// The next line does not move it; its words count as if it did.
+    /// Makes the next line leave the extruder where it is. Its words count as if it had moved.
     LeaveOut,
-    /// The extruder moves by itself, and the origin of its words moves along with it.
+    /// Moves the extruder alone. The origin of its words moves along.
     Move {
-        /// How far.
+        /// The distance.
         by: Length,
-        /// mm/min.
+        /// The feed rate, mm/min.
         feed: i32,
     },
 }
 
-/// What becomes of the temperature below which filament is not moved, until the next start.
+/// A change of the temperature below which filament is not moved. The change lasts until the next start.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Cold {
-    /// The temperature is only asked for.
+    /// No change: the temperature is only asked for.
     Asked,
-    /// Filament may be moved at any temperature, or no longer.
+    /// Whether filament may be moved at any temperature.
     Allowed(bool),
-    /// The temperature is set to this, degrees.
+    /// Sets the temperature, in degrees.
     Least(i16),
 }
 
-/// What G29 and M420 ask for, at rest.
+/// An operation that G29 and M420 ask for while the machine is at rest.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Level {
-    /// Moves follow the plane of the bed from now on, if it is known, or do not.
+    /// Whether moves follow the plane of the bed from now on. They only follow a plane that is known.
     Follow(bool),
-    /// A traverse to there, X Y Z of machine coordinates.
+    /// Traverses to a point, X Y Z in machine coordinates.
     Go(Point),
-    /// There, at the speed at which Z leaves its homing switch, until the probe touches; an alarm if it does not.
+    /// Moves to a point until the probe touches, at the speed at which Z leaves its homing switch. No contact is an
+    /// alarm.
     Probe(Point),
 }
 
@@ -102,140 +103,147 @@ pub enum Level {
 pub trait Machine {
     /// The settings in force.
     fn settings(&self) -> &Settings;
-    /// The value of a setting that is in EEPROM alone: up to 2 ms.
+    /// Returns the value of a setting that is kept in EEPROM alone. Takes up to 2 ms.
     fn cold(&mut self, setting: Setting) -> i32;
-    /// The value of any setting.
+    /// Returns the value of any setting.
     fn setting(&mut self, setting: Setting) -> i32 {
         if setting.is_cold() { self.cold(setting) } else { self.settings().get(setting) }
     }
-    /// Stores a value that [`Settings::check`] returned and lets it take effect, or refuses it. [`Status::Again`] as of
-    /// [`Self::set_row`].
+    /// Stores a value that [`Settings::check`] returned and lets it take effect, or refuses the value.
+    /// [`Status::Again`] means what it means for [`Self::set_row`].
     fn set(&mut self, setting: Setting, value: i32) -> Result<Warning, Status>;
-    /// Sets a value of the interpreter's tables. [`Status::Again`]: nothing is done, and it is to be tried again when
-    /// the tables are ready.
+    /// Sets a value of the interpreter's tables. [`Status::Again`]: nothing is changed; try again when the tables are
+    /// ready.
     fn set_row(&mut self, row: TableRow, axis: u8, value: Length) -> Result<(), Status>;
     /// Sets the tool length on one axis, as G43.1 does.
     fn set_tool_length(&mut self, axis: u8, length: Length) -> Result<(), Status>;
-    /// A value now, in the unit that [`Value`] states.
+    /// Returns the current value, in the unit that [`Value`] states.
     fn value(&mut self, value: Value) -> i32;
-    /// All steps of a report or group tell of one moment: that of the first step, from the `first` one on, that tells of motion.
+    /// Makes all steps of one report or group describe the same moment: that of the first step that reads motion.
+    /// `first`: whether this step begins the report or group.
     fn moment(&mut self, first: bool);
-    /// What the dialects keep of their reports.
+    /// Returns what the dialects remember of their reports.
     fn memory(&mut self) -> &mut Memory;
-    /// What the machine is doing.
+    /// Returns what the machine is doing.
     fn doing(&mut self) -> Doing;
-    /// What it is about as a whole, held or not.
+    /// Returns the cycle that the machine is in, held or not.
     fn cycle(&mut self) -> Cycle;
-    /// How far a hold has come.
+    /// Returns the state of the hold.
     fn hold(&mut self) -> Hold;
-    /// While the machine rests, what the program has come to.
+    /// Returns the state of the program. Has a meaning only while the machine rests.
     fn rest(&mut self) -> Program;
-    /// Restores the defaults of all settings and of what dialects remember, or refuses to: 10 ms on AVR.
+    /// Restores the defaults of all settings and of what dialects remember, or refuses to. Takes 10 ms on AVR.
     fn restore(&mut self) -> Status;
-    /// Begins an alarm, if there is none as bad.
+    /// Raises an alarm, unless one at least as severe is on.
     fn alarm(&mut self, alarm: Alarm);
-    /// Ends the alarm, if there is one, or refuses to. [`Status::Again`]: not yet.
+    /// Ends the alarm, if one is on, or refuses to. [`Status::Again`]: not yet possible.
     fn clear(&mut self) -> Status;
     /// Drops what is queued, or refuses to.
     fn flush(&mut self) -> Status;
-    /// Starts a built-in job, or ends the one that runs: 0.
+    /// Starts a built-in job. Number 0 ends the running one.
     fn start_job(&mut self, number: u8) -> Status;
-    /// Homes those of these axes, as bits, that have a switch for it, or refuses to.
+    /// Homes the given axes (as bits) that have a homing switch, or refuses to.
     fn home(&mut self, axes: u8) -> Status;
-    /// From now on lines of G-code are checked only, or carried out again; or refuses to.
+    /// Turns check mode on or off, or refuses to. In check mode lines of G-code are checked but not run.
     fn check(&mut self, on: bool) -> Status;
-    /// Holds motion as after a feedhold, at rest too, until somebody lets it go on.
+    /// Holds motion as a feedhold does, also at rest, until a sender resumes it.
     fn hold_back(&mut self);
-    /// Resets the machine when what is being put has been put: drops what has come, and greets.
+    /// Resets the machine once the pending output has been written: drops what has been received, and sends the
+    /// greeting.
     fn start_over(&mut self);
-    /// Begins to move an axis to a place in machine coordinates, or refuses to.
+    /// Starts to move an axis to a position in machine coordinates, or refuses to.
     fn jog(&mut self, axis: u8, place: Length) -> Status;
-    /// Does something to the program that is kept. [`Status::Again`]: it is not done yet, and is to be asked for again.
+    /// Performs an operation on the stored program. [`Status::Again`]: it is not complete; call again.
     fn store(&mut self, what: Store<'_>) -> Result<(), Status>;
-    /// A byte of the program that is kept.
+    /// Returns a byte of the stored program; `None` past its end, or without a program.
     fn program(&mut self, at: u16) -> Option<u8>;
-    /// A byte of a line that is carried out after a start; `None` behind the line's end.
+    /// Returns a byte of a line that runs at each start; `None` past the end of the line.
     fn startup(&mut self, line: u8, at: u8) -> Option<u8>;
-    /// Starts the machine anew when the response has left, in its boot loader if `boot`, for which it has to be at
-    /// rest. [`Status::Again`] while settings are on their way to memory.
+    /// Restarts the machine once the response has left. With `boot` it restarts into the boot loader, for which the
+    /// machine has to be at rest. [`Status::Again`] while settings are still being written to memory.
     fn restart(&mut self, boot: bool) -> Status;
-    /// Changes the overrides at once.
+    /// Changes the overrides immediately.
     fn change_override(&mut self, change: Change);
-    /// Powers a motor, or takes its power; all of them for `None`.
+    /// Turns the power of a motor on or off; of all motors for `None`.
     fn energize(&mut self, motor: Option<u8>, on: bool) -> Status;
 
-    /// How a heater stands: 0 the hot end, 1 the bed. `None` in an image without [`Capability::Printer`](crate::capability::Capability).
+    /// Returns the state of a heater: 0 the hot end, 1 the bed. `None` in an image without
+    /// [`Capability::Printer`](crate::capability::Capability).
     fn heater(&mut self, heater: u8) -> Option<Standing>;
     /// Whether a line waits for a temperature (M109, M190, M116).
     fn waits_for_heat(&mut self) -> bool;
-    /// Ends that wait (M108): the lines behind it are carried out.
+    /// Ends the wait for a temperature (M108), so that the lines after it are run.
     fn skip_wait(&mut self);
-    /// Heaters that a fault has locked may be switched on again (M999). The alarm is [cleared](Self::clear) by itself.
+    /// Unlocks the heaters that a fault has locked (M999). Does not end the alarm: see [`Self::clear`].
     fn unlock_heaters(&mut self);
 
-    /// Changes how the extruder moves, or moves it. [`Status::Again`]: nothing is done, and it is to be tried again when the planner is free.
+    /// Changes how the extruder moves, or moves it. [`Status::Again`]: nothing is changed; try again when the planner
+    /// is free.
     fn extruder(&mut self, what: Extruder) -> Status {
         let _ = what;
         Status::NotBuiltIn
     }
 
-    /// Begins to tune a heater, 0 the hot end, 1 the bed, at so many eighths of a degree, in so many cycles; it has what is found then if it `uses` it.
-    /// [`Status::Again`] as of [`Self::extruder`].
+    /// Starts to tune a heater (0 the hot end, 1 the bed) at `to` eighths of a degree, in `cycles` cycles. `uses`:
+    /// whether the heater takes over the result. [`Status::Again`] means what it means for [`Self::extruder`].
     fn tune(&mut self, heater: u8, to: u16, cycles: u8, uses: bool) -> Status {
         let _ = (heater, to, cycles, uses);
         Status::NotBuiltIn
     }
 
-    /// The autotune that is under way, or was last.
+    /// Returns the autotune that is running, or the last one.
     fn tuned(&mut self) -> Tune {
         Tune::IDLE
     }
 
-    /// How cold filament may be moved: how hot it must be, degrees, and whether it may be colder all the same.
+    /// Changes the limit for moving cold filament. Returns the temperature that filament must have, in degrees, and
+    /// whether it may be moved colder than that.
     fn extrude_cold(&mut self, change: Cold) -> (i16, bool) {
         let _ = change;
         (0, true)
     }
 
-    /// Asks something of the SD card.
+    /// Performs an operation on the SD card.
     fn card(&mut self, what: Op<'_>) -> Status {
         let _ = what;
         Status::NotBuiltIn
     }
 
-    /// The next byte of the file that is chosen on the SD card, and how many it has.
+    /// Returns the position in the selected file of the SD card, and the length of the file, in bytes. `None` without
+    /// a file.
     fn card_progress(&mut self) -> Option<(u32, u32)> {
         None
     }
 
-    /// Whether lines of that file are taken.
+    /// Whether lines of the selected file are being run.
     fn card_prints(&mut self) -> bool {
         false
     }
 
-    /// The file of that number on the SD card. `Err`: it cannot be read.
+    /// Returns the file with that number on the SD card; `None` if there is none. `Err`: the card cannot be read.
     fn card_entry(&mut self, number: u8) -> Result<Option<Entry>, Status> {
         let _ = number;
         Err(Status::NotBuiltIn)
     }
 
-    /// The points of the bed, in an image with [`Capability::BedPlane`](crate::capability::Capability).
+    /// Returns the points of the bed; `None` in an image without
+    /// [`Capability::BedPlane`](crate::capability::Capability).
     fn bed(&mut self) -> Option<&mut Bed> {
         None
     }
 
-    /// Begins with something. [`Status::Again`] as of [`Self::extruder`].
+    /// Starts an operation on the bed. [`Status::Again`] means what it means for [`Self::extruder`].
     fn level(&mut self, what: Level) -> Status {
         let _ = what;
         Status::NotBuiltIn
     }
 
-    /// The origin of these axes, as bits, is no more where G92 has put it: it is where homing has.
+    /// Drops the G92 shift of the given axes (as bits): their origin is again the one that homing has set.
     fn clear_shift(&mut self, axes: u8) {
         let _ = axes;
     }
 
-    /// What is held, or stopped by a program, goes on.
+    /// Resumes what is held, or stopped by a program.
     fn go_on(&mut self) {}
 
     /// Whether lengths are in inches.

@@ -1,22 +1,24 @@
-//! How senders are spoken to: the interface that tasks know, and the dialects behind it.
+//! The protocol layer: the interface that tasks use to talk to senders, and the dialects behind it.
 //!
-//! A line that has come becomes a [`Request`], which the parser task steps until it is answered. What the machine tells
-//! unasked is a [`Notice`]: it becomes a [`Telling`], which is stepped alike. Both ask the [`Machine`] and write to an [`Out`]. No
-//! step waits, keeps a reference, allocates or recurses, and none puts more than [`CHUNK`] bytes.
+//! A received line becomes a [`Request`]. The parser task steps the request until the line is answered. What the
+//! machine reports without being asked is a [`Notice`]; a notice becomes a [`Telling`], which is stepped in the same
+//! way. Requests and tellings query the [`Machine`] and write to an [`Out`]. No step waits, keeps a reference,
+//! allocates or recurses. No step writes more than [`CHUNK`] bytes.
 //!
-//! | module | what it has |
+//! | module | contents |
 //! |---|---|
-//! | [`dialect`] | [`Dialect`], what a dialect has to have, and the table of dialects |
-//! | [`line`](mod@line) | what comes in: parts of lines, what is to be done next with one |
+//! | [`dialect`] | [`Dialect`], the interface of a dialect, and the table of dialects |
+//! | [`line`](mod@line) | parts of a received line, and what the caller does next with it |
 //! | [`machine`], [`value`] | what dialects ask of the machine |
-//! | [`notice`] | what is told unasked |
+//! | [`notice`] | what the machine reports without being asked |
 //! | [`out`] | where dialects write to |
-//! | [`tinyg`], [`grbl`], `reprap` | TinyG's dialect, grbl's, and that of printing hosts |
-//! | `write`, `steps` | what grbl's dialect and that of printing hosts share: numbers and texts, steps per millimetre |
+//! | [`tinyg`], [`grbl`], `reprap` | the dialects of TinyG, of grbl, and of printing hosts |
+//! | `write`, `steps` | shared by grbl's dialect and that of printing hosts: numbers and texts, steps per millimetre |
 //!
-//! A dialect spells what is neutral here: the numbers and texts of a [`Status`](crate::status::Status), names of settings and values, what
-//! the machine is [doing](crate::machine::Doing). Which dialects an image has is a Cargo feature each; where there is one, nothing is left
-//! to choose at run time, and the choice costs nothing.
+//! Everything outside the dialects is neutral: the [`Status`](crate::status::Status), the names of settings and
+//! values, and what the machine is [doing](crate::machine::Doing). A dialect spells them out for its senders. Each
+//! dialect is a Cargo feature. In an image with a single dialect nothing is chosen at run time, and the choice costs
+//! nothing.
 
 pub mod checksum;
 pub mod dialect;
@@ -47,11 +49,11 @@ pub use notice::{Notice, Occasion};
 pub use out::Out;
 pub use value::{Value, thousandths};
 
-/// Bytes that one step puts at most.
+/// The most bytes that one step writes.
 pub const CHUNK: usize = 64;
 
-/// A block that a dialect has [rewritten](Dialect::rewrite).
+/// A block after [`Dialect::rewrite`].
 pub type Rewritten = heapless::Vec<u8, 96>;
 
-/// Longest line that may begin an alarm when it arrives: see [`asks_alarm`].
+/// The longest line that may raise an alarm on arrival: see [`asks_alarm`].
 pub const STOP_MAX: usize = 32;

@@ -1,45 +1,45 @@
-//! What the machine tells unasked.
+//! What the machine reports without being asked.
 
 use crate::status::Status;
 
-/// Something to tell.
+/// Something to report.
 #[derive(Clone, Copy)]
 pub enum Notice {
-    /// Who the machine is.
+    /// The greeting: what the machine is.
     Greeting(Occasion),
-    /// Somebody is there: the answer to ENQ.
+    /// The answer to ENQ: the machine is there.
     Enquiry,
-    /// Something has gone wrong.
+    /// An exception: something has gone wrong.
     Exception(Status),
-    /// What probing has found.
+    /// The result of a probing.
     Probing,
-    /// What has become of a line that is carried out after a start.
+    /// The result of a line that runs at each start: its number, and its status.
     Startup(u8, Status),
-    /// How the machine stands: a status report.
+    /// A status report.
     Status,
-    /// A jog has ended, or the queue has been flushed, or both.
+    /// A jog has ended, the queue has been flushed, or both.
     End {
-        /// The first.
+        /// Whether a jog has ended.
         jogged: bool,
-        /// The second.
+        /// Whether the queue has been flushed.
         flushed: bool,
     },
-    /// How far the axes are ahead of the spindle in a pass, at an index.
+    /// How far the axes are ahead of the spindle in a synchronized pass, measured at an index pulse.
     SyncError,
     /// A line has been waiting for two seconds.
     Busy,
-    /// Temperatures, which the sender wants to be told of again and again.
+    /// The temperatures, which the sender has asked to get periodically.
     Temperatures,
-    /// How far an autotune is.
+    /// The progress of an autotune.
     Tuning,
-    /// How many blocks are free: a queue report.
+    /// A queue report: the number of free blocks.
     Queue,
 }
 
-/// Why the machine says who it is.
+/// Why the machine sends its greeting.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Occasion {
-    /// Nobody can read its memory of settings: it has taken the defaults.
+    /// The memory of settings cannot be read, and the machine has taken the defaults.
     Defaults,
     /// The machine is ready.
     Ready,

@@ -2,25 +2,26 @@
 
 use crate::progmem::Plain;
 
-/// Where output goes. One step of a [`Request`](super::Request) or a report puts at most
+/// The destination of output. One step of a [`Request`](super::Request) or a report writes at most
 /// [`CHUNK`](super::CHUNK) bytes.
 pub trait Out {
-    /// Takes one byte.
+    /// Writes one byte.
     fn put(&mut self, byte: u8);
 
-    /// Takes bytes out of program memory.
+    /// Writes bytes out of program memory.
     fn put_plain(&mut self, bytes: Plain) {
         self.put_all(bytes.bytes());
     }
 
-    /// Takes several.
+    /// Writes several bytes.
     fn put_all(&mut self, bytes: impl Iterator<Item = u8>) {
         bytes.for_each(|byte| self.put(byte));
     }
 
-    /// Begins to sum up what is put from here on.
+    /// Starts a checksum over the bytes that are written from here on.
     fn begin_sum(&mut self);
 
-    /// The [`Checksum`](super::Checksum) of what has been put since, and the end of it.
+    /// Ends the checksum and returns the [`Checksum`](super::Checksum) of the bytes written since
+    /// [`Self::begin_sum`].
     fn take_sum(&mut self) -> u16;
 }

@@ -1,21 +1,23 @@
-//! Settings by owner and name, and steps per millimetre, which Kerf keeps as a step angle, microsteps and the travel in a turn.
+//! Settings by owner and name, and steps per millimetre. Kerf keeps a step angle, microsteps and the travel per turn
+//! instead.
 
 use super::Machine;
 use crate::config::name::token;
 use crate::config::{Owner, Setting};
 
-/// Steps per millimetre in thousandths, times what `sa` and `tr` are kept as, for one microstep: 360 degrees, 10^4, 10^6 and 10^3.
+/// The product of `sa` and `tr` (both scaled as kept) with the steps per millimetre (in thousandths), for one
+/// microstep: 360 degrees times 10^4, 10^6 and 10^3.
 const STEPS: u64 = 360 * 10_000_000_000_000;
 
-/// The setting of an owner with this name.
+/// Returns the setting of an owner with this name; `None` if there is none.
 #[inline(never)]
 #[small]
 pub fn named(owner: Owner, token: [u8; 4]) -> Option<Setting> {
     Setting::find(&owner.prefix().with_token(token)).filter(|found| found.owner() == owner)
 }
 
-/// The steps per millimetre of a motor in thousandths, if the travel in a turn is `by` as it is kept; or that travel, if there are `by` steps
-/// per millimetre, in thousandths.
+/// Returns the steps per millimetre of a motor, in thousandths, if `by` is the travel per turn, scaled as kept. Works
+/// both ways: if `by` is the steps per millimetre, in thousandths, returns the travel per turn.
 #[small]
 pub fn turned(machine: &mut impl Machine, motor: u8, by: i32) -> i32 {
     let mut read = |token| {

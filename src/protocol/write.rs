@@ -1,17 +1,17 @@
-//! Numbers and texts of dialects that are not JSON.
+//! Numbers and texts, for the dialects that are not JSON.
 
 use crate::config::{Digits, Fixed};
 use crate::progmem::Text;
 use crate::protocol::Out;
 
-/// A text.
+/// Writes a text.
 #[inline(never)]
 #[small]
 pub fn text(out: &mut impl Out, text: Text) {
     text.bytes().for_each(|byte| out.put(byte));
 }
 
-/// A number, all its decimals.
+/// Writes a number with all its decimals.
 #[inline(never)]
 #[small]
 pub fn fixed(out: &mut impl Out, fixed: Fixed) {
@@ -19,7 +19,7 @@ pub fn fixed(out: &mut impl Out, fixed: Fixed) {
     out.put_all(fixed.render(&mut digits).iter().copied());
 }
 
-/// An integer.
+/// Writes an integer.
 pub fn int(out: &mut impl Out, value: i32) {
     fixed(out, Fixed::int(value));
 }

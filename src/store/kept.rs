@@ -1,6 +1,8 @@
-//! Which settings are kept: all but constants, the rate of the line, and what senders say of their job.
+//! Which settings are kept: all but constants, the rate of the serial line, and what senders say of their job.
 //!
-//! Most are in RAM, too; the rest, which are seldom asked for, are found here ([`value`]). An [`Item`] is one of them. In memory its name stands for it; the numbers of items are of this firmware alone.
+//! Most kept settings are in RAM as well; each of them is an [`Item`]. The rest are rarely read and are found here
+//! ([`value`]). In memory an item is identified by its name, because the numbers of items differ between firmware
+//! versions.
 
 use super::{Log, Memory, record};
 use crate::config::{Setting, Settings};
@@ -11,28 +13,28 @@ use crate::units::AXES;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Item(Setting);
 
-/// How many numbers there are; some settings have no item.
+/// The range of item numbers. Some numbers in it have no item.
 pub const ITEMS: u8 = Setting::WARM;
 
 #[small]
 impl Item {
-    /// The item of that number, if there is one.
+    /// Returns the item with that number; `None` if there is none.
     pub fn from_number(number: u8) -> Option<Self> {
         Setting::from_number(number).filter(|setting| setting.is_kept()).map(Item)
     }
 
-    /// The key of its records.
+    /// Returns the key of the item's records.
     #[inline(never)]
     pub fn key(self) -> u16 {
         key(self.0)
     }
 
-    /// What it is now, and what it is if it was never put away.
+    /// Returns the item's value and its default.
     pub fn value(self, settings: &Settings) -> (i32, i32) {
         (settings.get(self.0), self.0.default_value())
     }
 
-    /// Takes a value over; not one that the setting could not have.
+    /// Sets the item's value, unless the setting cannot have it.
     fn set(self, settings: &mut Settings, value: i32) {
         if self.0.accepts(value) {
             settings.store(self.0, value);
@@ -40,13 +42,14 @@ impl Item {
     }
 }
 
-/// The key of a setting's records.
+/// Returns the key of a setting's records.
 #[small]
 pub fn key(setting: Setting) -> u16 {
     record::key(setting.name().bytes())
 }
 
-/// The value of a setting that is here alone: that which was put away, unless it could not have it; or its default.
+/// Returns the value of a setting that is in EEPROM only: the newest stored value, or the default if nothing was
+/// stored or the setting cannot have that value.
 #[inline(never)]
 #[small]
 pub fn value<M: Memory>(log: &Log, memory: &M, setting: Setting) -> i32 {
@@ -54,13 +57,14 @@ pub fn value<M: Memory>(log: &Log, memory: &M, setting: Setting) -> i32 {
     kept.unwrap_or_else(|| setting.default_value())
 }
 
-/// Keys that the log may have to hold: of every setting that is kept, and of every value of the tables.
+/// The number of keys that the log may have to hold: one per kept setting, one per value of the tables.
 pub const KEYS: u16 = Setting::KEPT + ROWS as u16 * AXES as u16;
 
-/// What stands for no item among the keys.
+/// The key of a number without an item.
 const NO_KEY: u16 = u16::MAX;
 
-/// Takes over whatever memory holds of them. At start-up: 10 ms on AVR, and up to 70 more with a full log; 600 bytes of stack.
+/// Copies the stored values of all items into `settings`. At start-up: 10 ms on AVR, and up to 70 more with a full
+/// log; 600 bytes of stack.
 #[inline(never)]
 #[small]
 pub fn load<M: Memory>(log: &Log, memory: &M, settings: &mut Settings) {

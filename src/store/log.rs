@@ -1,46 +1,47 @@
-//! The ring of records.
+//! The ring buffer of records.
 //!
-//! Between writes one invariant holds: the slot behind the newest record, the gap, holds nothing of worth. A record
-//! goes into the gap. Before that the slot behind the gap, which becomes the next gap, is cleared: if
-//! its record is the newest of its item, it is written anew, into the gap. So each write of an item takes one
-//! record and as many others as have to make room: one and a half on average while half of the slots count.
+//! Invariant between writes: the slot behind the newest record, the gap, holds nothing that is needed. A new record
+//! goes into the gap. Before that, the slot behind the gap is cleared, because it becomes the next gap: if its record
+//! is the newest of its item, a copy of the record is written into the gap first. So each write of an item costs one
+//! record plus the copies that make room: one and a half records on average while half of the slots hold valid
+//! records.
 //!
-//! Cost on AVR: 70 cycles for each slot that was ever used, of 290: up to 26,000 for the newest records of a row of the
-//! tables (`tests/sim/tests/interpreter.rs`).
+//! Cost on AVR: 70 cycles for each slot that was ever used, of 290. Finding the newest records of a row of the tables
+//! takes up to 26,000 cycles (`tests/sim/tests/interpreter.rs`).
 
 use super::Memory;
 use super::record::{self, BEGUN, Record, SIZE};
 
-/// Where the next record goes.
+/// The position of the next record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Log {
-    /// The gap.
+    /// The slot that the next record goes into.
     gap: u16,
     /// The number of the next record.
     next: u16,
-    /// Slots that were ever used: those before this one.
+    /// All slots that were ever used are below this one.
     used: u16,
-    /// The log has all of the memory.
+    /// Whether the log has all of the memory.
     wide: bool,
 }
 
-/// A record on its way to memory.
+/// A record that is being written to memory.
 #[derive(Clone, Copy, Debug)]
 pub struct Write {
     slot: u16,
     bytes: [u8; SIZE as usize],
-    /// Bytes written, with that which clears the mark.
+    /// Bytes written so far. The first one clears the mark of the old record.
     done: u8,
 }
 
-/// What is needed to put an item away.
+/// The next step of storing an item.
 #[derive(Clone, Copy, Debug)]
 pub enum Put {
-    /// This record makes room: write it, and ask again.
+    /// Write this copy of an older record, which makes room, and ask again.
     Room(Write),
-    /// This record is that of the item: write it.
+    /// Write this record, which is that of the item.
     Last(Write),
-    /// Every slot has been moved, so each holds the newest record of some item.
+    /// There is no room: every slot has been copied, so each holds the newest record of some item.
     Full,
 }
 
@@ -64,19 +65,19 @@ impl Log {
         log
     }
 
-    /// Whether memory holds something, but no record: another program's data, or rubbish. Cost on AVR: up to
-    /// 100,000 cycles, if it holds nothing.
+    /// Whether memory is not empty but holds no record: another program's data, or random bytes. Cost on AVR: up to
+    /// 100,000 cycles, if the memory is empty.
     pub fn is_rubbish<M: Memory>(&self, memory: &M) -> bool {
         self.is_empty() && (0..M::SIZE).any(|at| memory.read(at) != 0xFF)
     }
 
-    /// The value of an item, if it was ever put away.
+    /// Returns the value of an item; `None` if it was never stored.
     pub fn newest<M: Memory>(&self, memory: &M, key: u16) -> Option<i32> {
         let [value] = self.find(memory, &[key]);
         value
     }
 
-    /// The values of items that were ever put away, in one go.
+    /// Returns the values of several items in one search; `None` for an item that was never stored.
     pub fn find<M: Memory, const N: usize>(&self, memory: &M, keys: &[u16; N]) -> [Option<i32>; N] {
         let mut values = [None; N];
         let mut missing = N;
@@ -97,14 +98,14 @@ impl Log {
         values
     }
 
-    /// Whether nothing was ever put away.
+    /// Whether nothing was ever stored.
     pub fn is_empty(&self) -> bool {
         self.used == 0
     }
 
-    /// All records from the oldest to the newest.
+    /// Calls `each` for all records, from the oldest to the newest.
     pub fn replay<M: Memory>(&self, memory: &M, mut each: impl FnMut(&Record)) {
-        // What the gap holds is older than all others.
+        // The record in the gap, if any, is the oldest.
         let mut slot = self.gap;
         for _ in 0..self.slots::<M>() {
             if let Some(record) = read(memory, slot) {
@@ -114,7 +115,7 @@ impl Log {
         }
     }
 
-    /// What to write next to put an item away, after `moved` records have been written to make room for it.
+    /// Returns what to write next to store an item. `moved` counts the records copied so far to make room for it.
     pub fn put<M: Memory>(&mut self, memory: &M, key: u16, value: i32, moved: u16) -> Put {
         let next_gap = self.behind::<M>(self.gap);
         let last = Record { key, number: self.next, value };
@@ -129,7 +130,8 @@ impl Log {
         }
     }
 
-    /// Whether it has all of the memory: that of firmware without programs that has come so far.
+    /// Whether the log has all of the memory. This is so if earlier firmware, which stored no programs, has written
+    /// records beyond [`Memory::LOG`].
     pub fn is_wide(&self) -> bool {
         self.wide
     }
@@ -153,7 +155,7 @@ impl Log {
     /// Whether the record in a slot is the newest of its item.
     fn counts<M: Memory>(&self, memory: &M, slot: u16, key: u16) -> bool {
         let mut at = self.behind::<M>(slot);
-        // Up to the gap are the newer ones.
+        // The newer records are in the slots from here up to the gap.
         while at != self.gap {
             if at >= self.used {
                 at = 0;
@@ -170,7 +172,7 @@ impl Log {
 
 #[small]
 impl Write {
-    /// Where the next byte belongs, and the byte; `None` if there is none left.
+    /// Returns the address of the next byte, and the byte; `None` after the last one.
     #[inline(always)]
     fn next(&self) -> Option<(u16, u8)> {
         let start = self.slot * SIZE;
@@ -184,7 +186,7 @@ impl Write {
         })
     }
 
-    /// Whether memory does not take the next byte yet; behind the last one, whether it is busy.
+    /// Whether the memory cannot take the next byte yet; after the last byte, whether the memory is busy.
     #[inline(always)]
     pub fn waits<M: Memory>(&self, memory: &M) -> bool {
         match self.next() {
@@ -193,11 +195,11 @@ impl Write {
         }
     }
 
-    /// Begins to write the next byte; false if there is none left. Not while it [`waits`](Self::waits).
+    /// Begins to write the next byte; `false` if all bytes are written. Not while the write [`waits`](Self::waits).
     pub fn step<M: Memory>(&mut self, memory: &mut M) -> bool {
         let Some((at, byte)) = self.next() else { return false };
         self.done += 1;
-        // A byte that is right already is spared.
+        // A byte that already has its value is not written, which saves time and wear.
         if memory.read(at) != byte {
             memory.write(at, byte);
         }
@@ -205,24 +207,26 @@ impl Write {
     }
 }
 
-/// A walk over the slots that were used, from the newest. By addresses, which saves a product for each.
+/// A walk over the used slots from the newest to the oldest. It counts in addresses, which saves a multiplication per
+/// slot.
 struct Backwards {
-    /// Where the slot before begins.
+    /// The start of the slot visited last.
     at: u16,
     left: u16,
-    /// Where the last one that was used ends.
+    /// The end of the last used slot.
     end: u16,
 }
 
 #[small]
 impl Backwards {
-    /// Where the next slot begins whose key may be one of those sought, and that key.
+    /// Returns the start of the next slot whose key may be one of the wanted keys, and that key; `None` at the end of
+    /// the walk.
     #[inline(never)]
     fn next<M: Memory>(&mut self, memory: &M, sought: Common) -> Option<(u16, u16)> {
         let (mut at, mut left) = (self.at, self.left);
         while left > 0 {
             left -= 1;
-            // Behind the first slot are the last ones that were used.
+            // The slot before the first one is the last used one.
             at = if at == 0 { self.end } else { at } - SIZE;
             let key = key_at(memory, at);
             if sought.may_have(key) {
@@ -235,7 +239,7 @@ impl Backwards {
     }
 }
 
-/// The bits that keys have in common: one look tells that most others are none of them.
+/// The bits that all wanted keys have in common. Comparing them rules out most other keys at once.
 #[derive(Clone, Copy)]
 struct Common {
     mask: u16,
@@ -255,13 +259,13 @@ impl Common {
     }
 }
 
-/// Whether one number was given after another, less than 32,768 records apart.
+/// Whether one record number is newer than another. Holds for numbers less than 32,768 records apart.
 #[small]
 fn is_after(number: u16, other: u16) -> bool {
     number.wrapping_sub(other) as i16 > 0
 }
 
-/// The key in the slot that begins there, be it that of a record or not.
+/// Returns the key in the slot that begins there. The slot need not hold a valid record.
 #[inline(always)]
 #[small]
 fn key_at<M: Memory>(memory: &M, start: u16) -> u16 {

@@ -1,4 +1,4 @@
-//! What survives a power cut: settings, coordinate systems, stored positions and tools, in EEPROM.
+//! What survives a power cut, in EEPROM: settings, coordinate systems, stored positions and tools.
 //!
 //! ```text
 //! a setting is stored -> Storage (which items to look at) -> storage task
@@ -7,18 +7,19 @@
 //! reset -> Log::open -> kept::load -> Settings
 //! a line that asks for a row -> Storage, else tables::row -> Log::find
 //! ```
-//! Most settings are in RAM, too; the others (PWM, user data) and the tables of the interpreter are here alone.
+//! Most settings are in RAM as well. The others (PWM, user data) and the tables of the interpreter are in EEPROM
+//! only.
 //!
-//! The EEPROM is a ring of records, each of which says what one item is ([`record`]); the newest record of an
-//! item counts. A new record goes into a slot that holds nothing of worth, and counts only when its last byte has
-//! been written: whenever power fails, an item is what it was or what it was to be. Writing goes round
-//! the ring, so that all cells wear alike; records that still count are moved out of the way.
+//! The EEPROM is a ring of records. Each record holds the value of one item ([`record`]), and the newest record of an
+//! item is the valid one. A new record goes into a slot whose content is no longer needed, and becomes valid with its
+//! last byte. So at any power failure an item has either its old or its new value. Writing goes round the ring, so
+//! that all cells wear alike. Records that are still valid are copied to another slot before their own slot is overwritten.
 //!
-//! Behind the log is a program of the user's ([`program`]).
+//! Behind the log is a program of the user ([`program`]).
 //!
-//! Items are known by their names, not by their places in a table: firmware with more settings, or others,
-//! finds those that it knows and takes its defaults for the rest. An item that has its default and never had
-//! another takes no room. Values are checked when they are read, as if they had been sent.
+//! Items are known by their names, not by their places in a table. Firmware with more settings, or with other
+//! settings, finds those that it knows and takes its defaults for the rest. An item that has always had its default
+//! takes no room. Values are checked when they are read, as if they had been sent.
 
 pub mod kept;
 pub mod log;
@@ -28,26 +29,27 @@ pub mod tables;
 
 pub use log::Log;
 
-/// A memory of bytes that keeps them without power, slowly written.
+/// A non-volatile memory of bytes, which is slow to write.
 pub trait Memory {
-    /// How many bytes it has.
+    /// The size of the memory, in bytes.
     const SIZE: u16;
-    /// How many of them, from the first, are the log's; the rest is for a program.
+    /// The size of the log, in bytes, from the start of the memory. The rest is for a program.
     const LOG: u16 = Self::SIZE;
-    /// The byte at an address; waits for a write under way.
+    /// Returns the byte at an address. Waits for a write that is in progress.
     fn read(&self, at: u16) -> u8;
-    /// As [`Memory::read`], without a call: where all slots are looked through.
+    /// As [`Memory::read`], but inlined: for loops over all slots.
     #[inline(always)]
     fn read_here(&self, at: u16) -> u8 {
         self.read(at)
     }
     /// Whether a byte is being written.
     fn is_busy(&self) -> bool;
-    /// Whether a byte may be written to an address at once: not while busy, unless the memory keeps it together with the one that is being written.
+    /// Whether a byte may be written to an address at once. While the memory is busy this is `true` only if the
+    /// memory can combine the byte with the one that is being written.
     #[inline(always)]
     fn takes(&self, _at: u16) -> bool {
         !self.is_busy()
     }
-    /// Begins to write a byte, which it [`takes`](Memory::takes).
+    /// Begins to write a byte. Requires [`takes`](Memory::takes).
     fn write(&mut self, at: u16, byte: u8);
 }

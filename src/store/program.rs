@@ -1,52 +1,53 @@
-//! A program of G-code that a user keeps in EEPROM, behind the log: 874 bytes (698 in an image that can print), and the last 86 of them are two lines for the start.
+//! A program of G-code that a user keeps in EEPROM, behind the log. The area has 874 bytes (698 in an image that can
+//! print). Its last 86 bytes are two start-up lines, which run at each start.
 //!
 //! ```text
-//! byte 0      VALID, written last; anything else: there is none
-//! 1, 2        bytes of the text
+//! byte 0      VALID, written last; any other value: there is no program
+//! 1, 2        length of the text in bytes
 //! 3, 4        checksum of the text
 //! 5 ...       the text; each line ends in a line feed
 //! ```
-//! It is written line by line, a byte at a call: whoever stores a line calls again until that says that it is there, so that
-//! nothing of it is in RAM. What is there already is not written again. [`begin`] makes the old program invalid, [`end`] the
-//! new one valid: when power fails, there is the old one, the new one or none. It is checked when it is started,
-//! 10 ms on AVR, and then read in place.
+//! The program is written line by line, one byte per call: the caller that stores a line repeats the call until the
+//! line is stored, so nothing is buffered in RAM. A byte that is already right is not written again. [`begin`] makes
+//! the old program invalid, [`end`] makes the new one valid. So after a power failure there is the old program, the
+//! new one or none. The program is checked when it is started, which takes 10 ms on AVR, and is then read in place.
 //!
-//! A line for the start has 43 bytes: its length, a checksum of two bytes, and at most 40 of text. One that is cut off by a loss of power is none.
+//! A start-up line takes 43 bytes: its length, a checksum of two bytes, and at most 40 of text. A line that was cut
+//! off by a power failure counts as none.
 //!
-//! A log of earlier firmware that has come as far as this area keeps it ([`Log::is_wide`](super::Log::is_wide)); then no program
-//! can be stored.
+//! If the log of earlier firmware has reached this area, the log keeps it ([`Log::is_wide`](super::Log::is_wide)). No
+//! program can be stored then.
 
 use crc::{CRC_16_XMODEM, Crc, NoTable};
 
 use super::Memory;
 use crate::capability::Capability;
 
-/// Bytes that it takes, with its head.
-/// The settings of a printer take the room of 16 records.
+/// Bytes of the area. In a printer's image it is smaller by the room of 16 records, for the printer's settings.
 pub const AREA: u16 = if Capability::Printer.is_built_in() { 698 } else { 874 };
-/// What byte 0 is. Not what a record begins with.
+/// The value of byte 0 of a valid program. A record begins with another value.
 const VALID: u8 = 0x50;
 const ERASED: u8 = 0xFF;
 const HEAD: u16 = 5;
-/// Lines that are carried out after a start.
+/// The number of start-up lines.
 pub const STARTUPS: u8 = 2;
-/// How long each may be.
+/// The longest start-up line.
 pub const STARTUP_MAX: u8 = 40;
-/// What one takes.
+/// Bytes of a start-up line, with its head.
 const STARTUP: u16 = 3 + STARTUP_MAX as u16;
-/// What the program has.
+/// Bytes of the program, with its head.
 const PROGRAM: u16 = AREA - STARTUP * STARTUPS as u16;
 
 const CRC: Crc<u16, NoTable> = Crc::<u16, NoTable>::new(&CRC_16_XMODEM);
 
-/// How far a step of storing has come.
+/// The result of one call that stores something.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Stored {
-    /// To be called again.
+    /// Not complete: call again.
     Again,
     /// There is no room.
     Full,
-    /// The line is stored; the text is this long now.
+    /// Complete. The text has this length now.
     Done(u16),
 }
 
@@ -55,13 +56,13 @@ fn base<M: Memory>() -> u16 {
     M::SIZE - AREA
 }
 
-/// The byte of the text at a place; none behind `len`.
+/// Returns the byte of the text at a place; `None` from `len` on.
 #[small]
 pub fn byte<M: Memory>(memory: &M, len: u16, at: u16) -> Option<u8> {
     (at < len).then(|| memory.read(base::<M>() + HEAD + at))
 }
 
-/// The length of the program, if there is one: as its head says.
+/// Returns the length of the program that its head states; `None` if there is no program.
 #[small]
 pub fn len<M: Memory>(memory: &M) -> Option<u16> {
     let head = |at| memory.read(base::<M>() + at);
@@ -69,7 +70,7 @@ pub fn len<M: Memory>(memory: &M) -> Option<u16> {
     (head(0) == VALID && len <= PROGRAM - HEAD).then_some(len)
 }
 
-/// The length of the program, if there is one and its text is still what was stored.
+/// Returns the length of the program; `None` if there is none or its checksum does not match.
 #[inline(never)]
 #[small]
 pub fn check<M: Memory>(memory: &M) -> Option<u16> {
@@ -86,13 +87,13 @@ fn sum<M: Memory>(memory: &M, len: u16) -> u16 {
     digest.finalize()
 }
 
-/// There is no program any more, and a new one is empty.
+/// Deletes the old program and starts an empty one.
 #[small]
 pub fn begin<M: Memory>(memory: &mut M) -> Stored {
     if put(memory, [(0, ERASED)].into_iter()) { Stored::Done(0) } else { Stored::Again }
 }
 
-/// Puts a line behind the first `len` bytes of the new program.
+/// Appends a line to the first `len` bytes of the new program.
 #[inline(never)]
 #[small]
 pub fn line<M: Memory>(memory: &mut M, len: u16, text: &[u8]) -> Stored {
@@ -107,7 +108,7 @@ pub fn line<M: Memory>(memory: &mut M, len: u16, text: &[u8]) -> Stored {
     }
 }
 
-/// The new program of `len` bytes is the program.
+/// Makes the new program of `len` bytes valid.
 #[inline(never)]
 #[small]
 pub fn end<M: Memory>(memory: &mut M, len: u16) -> Stored {
@@ -120,13 +121,13 @@ pub fn end<M: Memory>(memory: &mut M, len: u16) -> Stored {
     if put(memory, head.into_iter()) { Stored::Done(len) } else { Stored::Again }
 }
 
-/// Where a line for the start is, from [`base`] on.
+/// Returns the offset of a start-up line from [`base`].
 #[small]
 fn startup(n: u8) -> u16 {
     PROGRAM + STARTUP * u16::from(n)
 }
 
-/// How long a line for the start is: 0 if there is none. 2,000 cycles for 10 bytes.
+/// Returns the length of a start-up line: 0 if there is none. 2,000 cycles for 10 bytes.
 #[inline(never)]
 #[small]
 pub fn startup_len<M: Memory>(memory: &M, n: u8) -> u8 {
@@ -144,13 +145,13 @@ pub fn startup_len<M: Memory>(memory: &M, n: u8) -> u8 {
     if sum == digest.finalize() { len } else { 0 }
 }
 
-/// A byte of one.
+/// Returns a byte of the text of a start-up line.
 #[small]
 pub fn startup_byte<M: Memory>(memory: &M, n: u8, at: u8) -> u8 {
     memory.read(base::<M>() + startup(n) + 3 + u16::from(at))
 }
 
-/// Keeps a line for the start: without blanks, in upper case. An empty one is none.
+/// Stores a start-up line, without blanks and in upper case. An empty text deletes the line.
 #[inline(never)]
 #[small]
 pub fn put_startup<M: Memory>(memory: &mut M, n: u8, text: &[u8]) -> Stored {
@@ -170,7 +171,8 @@ pub fn put_startup<M: Memory>(memory: &mut M, n: u8, text: &[u8]) -> Stored {
     }
 }
 
-/// Writes the first byte that is not as it is to be. Whether there is none, and nothing is being written.
+/// Writes the first byte that differs from its wanted value. Returns whether all bytes are right and no write is in
+/// progress.
 #[small]
 fn put<M: Memory>(memory: &mut M, bytes: impl Iterator<Item = (u16, u8)>) -> bool {
     if memory.is_busy() {
@@ -194,7 +196,7 @@ mod tests {
 
     const SIZE: usize = 1_000;
 
-    /// A memory that loses power after so many bytes; the last one is then `torn`.
+    /// A memory that loses power after a number of bytes. The last byte is then `torn`.
     #[derive(Clone)]
     struct Cells {
         bytes: Vec<u8>,
@@ -221,7 +223,7 @@ mod tests {
         }
     }
 
-    /// Calls until something is stored or power is gone.
+    /// Repeats the call until it is complete or the power is gone.
     fn wait(cells: &mut Cells, mut step: impl FnMut(&mut Cells) -> Stored) -> Stored {
         loop {
             match step(cells) {

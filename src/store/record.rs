@@ -2,40 +2,40 @@
 //!
 //! | bytes | |
 //! |---|---|
-//! | 0 | [`VALID`], written last; anything else: no record |
+//! | 0 | [`VALID`], written last; any other value: no record |
 //! | 1, 2 | key: the checksum of the item's name |
 //! | 3, 4 | number of the record, modulo 65,536 |
 //! | 5 to 8 | value |
 //! | 9, 10 | checksum of bytes 1 to 8 |
 //!
-//! All little-endian. Checksums are CRC-16/XMODEM. While a record is written over another, byte 0 is
-//! [`BEGUN`]. If power fails while a byte is written, that byte may be anything: then byte 0 or the checksum
-//! tells.
+//! All values are little-endian. Checksums are CRC-16/XMODEM. While a new record overwrites an old one, byte 0 is
+//! [`BEGUN`]. If power fails while a byte is written, that byte may have any value. Byte 0 or the checksum reveals
+//! this.
 
 use crc::{CRC_16_XMODEM, Crc, NoTable};
 
 /// Bytes of a record.
 pub const SIZE: u16 = 11;
-/// What byte 0 of a record is. Another layout of records takes another number.
+/// Byte 0 of a valid record. Another layout of records would get another value.
 pub const VALID: u8 = 0x4B;
-/// What byte 0 is while the others are written.
+/// Byte 0 while the other bytes are written.
 pub const BEGUN: u8 = 0xFF;
 
-/// A table would be in RAM.
+/// Computed without a table, which would be in RAM.
 const CRC: Crc<u16, NoTable> = Crc::<u16, NoTable>::new(&CRC_16_XMODEM);
 
-/// What an item is.
+/// The value of one item.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Record {
-    /// Which item.
+    /// The key of the item.
     pub key: u16,
-    /// The how manieth record of the log it is, modulo 65,536.
+    /// The sequence number of the record in the log, modulo 65,536.
     pub number: u16,
-    /// What the item is.
+    /// The value.
     pub value: i32,
 }
 
-/// The key of an item, from its name.
+/// Returns the key of an item, from its name.
 #[small]
 pub fn key(name: &[u8]) -> u16 {
     CRC.checksum(name)
@@ -43,7 +43,7 @@ pub fn key(name: &[u8]) -> u16 {
 
 #[small]
 impl Record {
-    /// The bytes of the record; byte 0 is the one that makes it valid.
+    /// Returns the bytes of the record. Byte 0 makes it valid and has to be written last.
     pub fn bytes(&self) -> [u8; SIZE as usize] {
         let mut bytes = [VALID; SIZE as usize];
         bytes[1..3].copy_from_slice(&self.key.to_le_bytes());
@@ -54,7 +54,7 @@ impl Record {
         bytes
     }
 
-    /// The record that is these bytes, if they are one.
+    /// Returns the record in these bytes; `None` if the mark or the checksum is wrong.
     pub fn of(bytes: &[u8; SIZE as usize]) -> Option<Self> {
         let [mark, key0, key1, number0, number1, value @ .., sum0, sum1] = *bytes;
         let sum = u16::from_le_bytes([sum0, sum1]);

@@ -1,12 +1,12 @@
-//! The tables of the interpreter in the log: each value of a row is an item. One that is 0 and was never anything
-//! else takes no room.
+//! The tables of the interpreter in the log. Each value of a row is an item. A value that has always been 0 takes no
+//! room.
 
 use super::{Log, Memory, record};
 use crate::config::rows::value_name;
 use crate::gcode::tables::TableRow;
 use crate::units::{AXES, Length, PerAxis};
 
-/// What a row is. Cost on AVR: see [`Log::find`].
+/// Returns the values of a row; 0 for one that was never stored. Cost on AVR: see [`Log::find`].
 #[inline(never)]
 #[small]
 pub fn row<M: Memory>(log: &Log, memory: &M, row: TableRow) -> PerAxis<Length> {
@@ -23,21 +23,21 @@ fn find<M: Memory>(log: &Log, memory: &M, row: TableRow) -> [Option<i32>; AXES] 
     log.find(memory, &keys)
 }
 
-/// A value of a row.
+/// Returns one value of a row; 0 if it was never stored.
 #[inline(never)]
 #[small]
 pub fn value<M: Memory>(log: &Log, memory: &M, row: TableRow, axis: u8) -> Length {
     Length(log.newest(memory, key(row, axis)).unwrap_or(0))
 }
 
-/// Whether a row was ever put away.
+/// Whether any value of a row was ever stored.
 #[inline(never)]
 #[small]
 pub fn is_stored<M: Memory>(log: &Log, memory: &M, row: TableRow) -> bool {
     find(log, memory, row).iter().any(Option::is_some)
 }
 
-/// The key of a value of a row.
+/// Returns the key of one value of a row.
 #[inline(never)]
 #[small]
 pub fn key(row: TableRow, axis: u8) -> u16 {

@@ -1,4 +1,4 @@
-//! `docs/settings.md`, from the tables of settings and what is said of each.
+//! Makes `docs/settings.md` from the tables of settings and their meanings.
 
 use std::format;
 use std::string::{String, ToString};
@@ -88,7 +88,7 @@ is written at rest (else 106). 34 means that it has no room. Like a built-in job
 refused. A line is looked at when it is carried out, not before.
 ";
 
-/// All of it.
+/// Returns the whole text of `docs/settings.md`.
 pub fn markdown() -> String {
     let groups: [(&str, &str, &[Owner], &[Meaning]); 11 + cfg!(feature = "drivers") as usize] = [
         (
@@ -169,7 +169,7 @@ the spindle is off, S24000 is 10 V. A spindle of 12,000 RPM wants `{p1:{csh:1200
     text + MACHINES + &machine_table() + PLACES
 }
 
-/// The machines, with what says most about them.
+/// Returns the table of machines with their most characteristic settings.
 fn machine_table() -> String {
     let mut text =
         "| `mch` | Name | What | Motors 1 to 4 move | `tr` | `vm` | `ac` | `jm` | Travel |\n"
@@ -203,13 +203,13 @@ fn machine_table() -> String {
     text + "\n"
 }
 
-/// What a setting is on a machine.
+/// Returns the value of a setting in the profile of a machine, as text.
 fn value_on(machine: u8, name: &str) -> String {
     let setting = Name::new().with(name.as_bytes()).and_then(|name| Setting::find(&name));
     setting.map_or_else(String::new, |s| number(s.value_on(machine), s.row().stored))
 }
 
-/// The line of a setting in a table of settings, for all its owners.
+/// Returns the table line of a setting, for all its owners.
 fn line(owners: &[Owner], row: u8, meaning: &Meaning) -> String {
     let settings: Vec<_> = owners.iter().filter_map(|o| Setting::of(*o, row)).collect();
     let Some(first) = settings.first() else { return String::new() };
@@ -240,7 +240,7 @@ fn string(text: Text) -> String {
     text.bytes().map(char::from).collect()
 }
 
-/// What comes behind the value in text mode, in two: the unit, and the choices in brackets.
+/// Returns what follows the value in text mode, in two parts: the unit, and the choices in brackets.
 fn tail(words: &Words) -> (String, String) {
     let tail = string(words.tail);
     let split = tail.find(" [").or(tail.find(" (")).unwrap_or(tail.len());
@@ -248,7 +248,7 @@ fn tail(words: &Words) -> (String, String) {
 }
 
 fn unit(owners: &[Owner], row: &SettingRow, words: &Words) -> String {
-    // Text mode shows them as TinyG does.
+    // Text mode shows the units of these two as TinyG does.
     if row.is(RADIUS) {
         return "mm".to_string();
     }
@@ -264,7 +264,7 @@ fn unit(owners: &[Owner], row: &SettingRow, words: &Words) -> String {
     format!("{length}{}", unit.trim())
 }
 
-/// The choices of a number, as text mode lists them.
+/// Returns the choices of a numeric setting, as text mode lists them.
 fn choices(words: &Words) -> String {
     let choices = tail(words).1;
     let inner = choices.strip_prefix(" [").and_then(|rest| rest.strip_suffix(']'));
@@ -276,7 +276,7 @@ fn choices(words: &Words) -> String {
     }
 }
 
-/// What holds beside the range.
+/// Returns the remarks on a setting beside its range.
 fn remarks(row: &SettingRow) -> String {
     let mut text = String::new();
     for (flag, remark) in [
@@ -292,7 +292,7 @@ fn remarks(row: &SettingRow) -> String {
     text
 }
 
-/// A value as it is kept, without zeros at its end.
+/// Returns a value as it is kept, without trailing zeros.
 fn number(value: i32, decimals: u8) -> String {
     let mut digits = Digits::default();
     let text = Fixed { value, decimals }.render(&mut digits);
@@ -312,7 +312,7 @@ fn range(setting: Setting, row: &SettingRow) -> String {
     }
 }
 
-/// The defaults of all that have the setting, those that are alike together.
+/// Returns the defaults of all owners of the setting. Owners with the same default are grouped.
 fn defaults(settings: &[Setting]) -> String {
     let shown = |setting: Setting| {
         let row = setting.row();
@@ -345,7 +345,7 @@ mod tests {
 
     fn names(owner: Owner) -> Vec<String> {
         let owners = match owner {
-            // One of each has all rows between them.
+            // These owners together have all rows.
             Owner::Axis(_) => [Owner::Axis(0), Owner::Axis(3)],
             _ => [owner, owner],
         };

@@ -1,9 +1,9 @@
-//! The settings of drivers that take them by UART: of boards that have such drivers.
+//! The settings of motor drivers that are configured by UART, for boards with such drivers.
 
 use super::group;
 
 group! {
-    /// The group `dr`: a row for each motor, since settings that are in EEPROM alone have one value a row.
+    /// The group `dr`. It has a row for each motor, because a setting that is in EEPROM only has one value per row.
     driver: i32, PLAIN => {
         R1 "r1": current(), 580,
             words(text!("run current m1"), AMPERES),

@@ -1,4 +1,4 @@
-//! The settings of heaters: of images that can print.
+//! The settings of heaters, for images that can print.
 
 use super::group;
 

@@ -1,6 +1,6 @@
-//! The settings: a row each, from which all else follows.
+//! The rows of the settings table, one per setting. Everything else is derived from them.
 //!
-//! A row says what a setting is called, what it may be, what it is at first, what text mode calls it, and what it means:
+//! A row states the setting's name, its range, its default, what text mode calls it, and what it means:
 //!
 //! ```text
 //! SL "sl": int(0, 1), 0,
@@ -8,12 +8,14 @@
 //!     "Moves of homed axes beyond `tn` and `tm` are refused (220).";
 //! ```
 //!
-//! Its place in RAM, the tables in program memory and the table in `docs/settings.md` are made of it when Kerf is built; in EEPROM its
-//! name stands for it, so that rows may be moved. A motor or axis setting has one row for all motors or axes. Rows stand in the order
-//! that groups are listed in: TinyG's settings come first in each group, then those of Kerf alone. The constructors of rows are in
-//! [`table`](super::table), those of words in [`words`](super::words).
+//! When Kerf is built, the setting's place in RAM, the tables in program memory and the table in `docs/settings.md`
+//! are made from its row. In EEPROM a setting is identified by its name, so rows may be moved. A setting of motors or
+//! axes has one row for all of them. Rows are in the order in which senders list a group: TinyG's settings first,
+//! then those that only Kerf has. The constructors of rows are in [`table`](super::table), those of words in
+//! [`words`](super::words).
 //!
-//! To add a setting, add its row, and a getter in `getters.rs`. A machine that wants another default has it in its file under `machines/`.
+//! To add a setting, add its row, and a getter in `getters.rs`. Other defaults of a machine belong in its file under
+//! `machines/`.
 
 mod axes;
 #[cfg(feature = "drivers")]
@@ -33,15 +35,15 @@ pub use motors::{motor, squaring};
 pub use outputs::{coolant, pwm, spindle};
 pub use sender::{job, user};
 
-/// What a setting is called without its group, and what it means.
+/// The name of a setting without its group, and its meaning.
 #[cfg(feature = "std")]
 pub type Meaning = (&'static str, &'static str);
 
-/// Makes a group's module of its rows: its tables, and a constant for each row by which getters find the setting.
+/// Makes the module of a group from its rows: its tables, and a constant per row by which getters find the setting.
 ///
-/// `group! { module: type of a value, table of defaults => { CONSTANT "name": row, default, words, meaning; .. } }`. The table of
-/// defaults is `PLAIN`, which has them as the rows say, or what the profile of the careful machine makes of them. A default is scaled
-/// as kept.
+/// `group! { module: type of a value, table of defaults => { CONSTANT "name": row, default, words, meaning; .. } }`.
+/// The table of defaults is either `PLAIN`, the defaults in the rows, or the result of applying the careful machine's
+/// profile to them. A default is scaled as kept.
 macro_rules! group {
     ($(#[$doc:meta])* $module:ident: $value:ty, $defaults:expr => {
         $($place:ident $name:literal: $row:expr, $default:expr, $words:expr, $meaning:literal;)*
@@ -51,18 +53,18 @@ macro_rules! group {
             #[allow(unused_imports, clippy::wildcard_imports)]
             use crate::config::groups::names::*;
 
-            /// How many rows there are.
+            /// The number of rows.
             pub const COUNT: usize = [$($name),*].len();
             /// The rows.
             pub const LIST: [SettingRow; COUNT] = numbered([$(named($row, $name)),*]);
-            /// Their defaults, scaled as kept, where no profile says otherwise.
+            /// The defaults in the rows, scaled as kept.
             pub const PLAIN: [$value; COUNT] = [$($default),*];
-            /// What they mean.
+            /// The meanings of the settings.
             #[cfg(feature = "std")]
             pub const MEANINGS: [crate::config::groups::Meaning; COUNT] = [$(($name, $meaning)),*];
-            /// Bytes that the settings take which every owner has, and those with [`HOMING`] besides.
+            /// The number of bytes: for the settings that every owner has, and for those with [`HOMING`].
             pub const SMALLS: [usize; 2] = count(&LIST, Kind::Small);
-            /// Words that they take, likewise.
+            /// The number of 32-bit words, in the same way.
             pub const LARGES: [usize; 2] = count(&LIST, Kind::Large);
 
             $(
@@ -74,10 +76,10 @@ macro_rules! group {
                 /// The rows.
                 pub static ROWS: [SettingRow; COUNT] = LIST;
 
-                /// Their defaults, scaled as kept.
+                /// The defaults in force in this image, scaled as kept.
                 pub static DEFAULTS: [$value; COUNT] = $defaults;
 
-                /// What text mode calls them.
+                /// What text mode calls the settings.
                 pub static WORDS: [Words; COUNT] = [$($words),*];
             }
         }
@@ -86,7 +88,7 @@ macro_rules! group {
 
 use group;
 
-/// What rows are written with.
+/// The names that rows use.
 mod names {
     pub use crate::boards::{ACTIVE, MOTORS, SHORTEST_PULSE_US, inputs};
     pub use crate::config::machines;

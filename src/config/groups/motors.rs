@@ -3,7 +3,7 @@
 use super::group;
 use crate::boards::MOTORS;
 
-/// Values of the first four motors, and of the fifth and sixth where a board has them.
+/// Combines the values of the first four motors with those of a fifth and sixth, if the board has them.
 const fn motors(first: [i32; 4], more: [i32; 2]) -> [i32; MOTORS] {
     let mut values = [0; MOTORS];
     let mut m = 0;
@@ -15,7 +15,7 @@ const fn motors(first: [i32; 4], more: [i32; 2]) -> [i32; MOTORS] {
 }
 
 group! {
-    /// The groups `1` to `4`; with a board of more motors one for each.
+    /// The groups `1` to `4`, and `5` and `6` on a board with more motors.
     motor: [i32; MOTORS], CAREFUL.motor => {
         MA "ma": int(0, 255), super::motors([0, 1, 2, 3], [4, 5]),
             words(text!("map to axis"), text!(" [0=X,1=Y,2=Z...]")),

@@ -1,4 +1,4 @@
-//! What senders keep with the machine.
+//! Data that senders keep with the machine.
 
 use super::group;
 

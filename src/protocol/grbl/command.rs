@@ -1,15 +1,15 @@
-//! Which command a line is.
+//! Recognizes which command a line is.
 
 use crate::units::AXES;
 
-/// What a line asks for.
+/// The command of a line.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Command {
     /// A block of G-code, or `$J=`.
     Gcode,
-    /// No command: an empty line.
+    /// An empty line, which has no command.
     Nothing,
-    /// No line, but a `?`.
+    /// A `?`, which is not a line.
     Question,
     /// `$`.
     Help,
@@ -23,9 +23,9 @@ pub enum Command {
     Build,
     /// `$N`.
     Startup,
-    /// `$N0=`, `$N1=`: which line; its text is [behind](behind_equals) the sign.
+    /// `$N0=`, `$N1=`, with the number of the start-up line. Its text is [behind](behind_equals) the `=`.
     StoreStartup(u8),
-    /// `$H`, of all axes, or of one.
+    /// `$H` for all axes, or for one.
     Home(u8),
     /// `$X`.
     Unlock,
@@ -35,20 +35,21 @@ pub enum Command {
     Sleep,
     /// `$RST=`, with its letter: `$`, `#` or `*`.
     Restore(u8),
-    /// `$x=v`: the number of the setting; its value begins with this byte behind the `$`.
+    /// `$x=v`: the number of the setting, and the offset of the value behind the `$`.
     Set(u8, u8),
-    /// `$name`, `$name=v`: a setting by Kerf's own name; its value begins with this byte behind the `$`, 0 if it is asked for.
+    /// `$name`, `$name=v`: a setting by Kerf's own name, and the offset of the value behind the `$`; 0 if the setting
+    /// is only read.
     Named(u8),
-    /// `$J=` with a word that is not allowed there, or without one that has to be.
+    /// `$J=` with a word that is not allowed in a jog, or without a required word.
     BadJog,
-    /// A `$` with anything else behind it.
+    /// A `$` with any other text behind it.
     Unknown,
 }
 
-/// All axes, of [`Command::Home`].
+/// Stands for all axes in [`Command::Home`].
 pub const ALL: u8 = u8::MAX;
 
-/// The command of a line.
+/// Returns the command of a line.
 #[inline(never)]
 #[small]
 pub fn of(line: &[u8]) -> Command {
@@ -60,7 +61,7 @@ pub fn of(line: &[u8]) -> Command {
     }
 }
 
-/// The command of a line behind its `$`. Comments and blanks mean nothing.
+/// Returns the command of the text behind a `$`. Comments and blanks are ignored.
 #[small]
 fn system(rest: &[u8]) -> Command {
     let words = without_comment(rest);
@@ -101,25 +102,25 @@ fn is_blank(byte: u8) -> bool {
     byte == b' ' || byte == b'\t'
 }
 
-/// Up to a comment, without blanks at its ends.
+/// Returns the text up to a comment, without blanks at its ends.
 #[small]
 fn without_comment(text: &[u8]) -> &[u8] {
     let end = text.iter().position(|byte| matches!(byte, b'(' | b';'));
     trim(text.get(..end.unwrap_or(text.len())).unwrap_or(&[]))
 }
 
-/// What is behind the first `=`.
+/// Returns the text behind the first `=`; empty if there is none.
 #[small]
 pub fn behind_equals(text: &[u8]) -> &[u8] {
     let equals = text.iter().position(|byte| *byte == b'=');
     equals.and_then(|equals| text.get(equals + 1..)).unwrap_or(&[])
 }
 
-/// `x=v`.
+/// Parses `x=v`. `None` if `x` is not a number up to 255.
 #[small]
 fn setting(rest: &[u8]) -> Option<Command> {
     let equals = rest.iter().position(|byte| *byte == b'=')?;
-    // In 16 bits: on AVR a checked product of 8 bits does not tell of its overflow.
+    // In 16 bits, because on AVR a checked 8-bit product does not detect its overflow.
     let mut number = 0u16;
     for digit in rest.get(..equals)?.iter().filter(|byte| !is_blank(**byte)) {
         let digit = digit.wrapping_sub(b'0');
@@ -134,7 +135,7 @@ fn setting(rest: &[u8]) -> Option<Command> {
     Some(Command::Set(number as u8, equals as u8 + 1))
 }
 
-/// `name`, `name=v`.
+/// Parses `name` or `name=v`. `None` if there is no name.
 #[small]
 fn named(rest: &[u8]) -> Option<Command> {
     let equals = rest.iter().position(|byte| *byte == b'=');
@@ -143,7 +144,7 @@ fn named(rest: &[u8]) -> Option<Command> {
     is_name.then_some(Command::Named(equals.map_or(0, |equals| equals as u8 + 1)))
 }
 
-/// The axis of a letter in upper case.
+/// Returns the axis of an upper-case letter; `None` if there is no such axis.
 #[small]
 fn axis(letter: u8) -> Option<u8> {
     let axis = match letter {
@@ -154,7 +155,8 @@ fn axis(letter: u8) -> Option<u8> {
     (usize::from(axis) < AXES).then_some(axis)
 }
 
-/// Whether these words are a jog: axis words and F, and besides of G only G20, G21, G53, G90, G91, and N.
+/// Whether these words are a valid jog: axis words and F are required; N and, of G, only G20, G21, G53, G90 and G91
+/// are allowed.
 #[small]
 fn is_jog(words: &[u8]) -> bool {
     let (mut moves, mut feeds) = (false, false);
@@ -188,13 +190,14 @@ fn is_jog(words: &[u8]) -> bool {
     moves && feeds
 }
 
-/// Whether a line of G-code has the word of an axis, and is no jog; a comment may seem to be one.
+/// Whether a line of G-code has an axis word and is not a jog. A letter in a comment may be mistaken for an axis
+/// word.
 #[small]
 pub fn moves(line: &[u8]) -> bool {
     line.iter().any(|byte| axis(byte.to_ascii_uppercase()).is_some()) && jog(line).is_none()
 }
 
-/// The words of a jog.
+/// Returns the words of a jog; `None` if the block is not a jog.
 #[inline(never)]
 #[small]
 pub fn jog(block: &[u8]) -> Option<&[u8]> {
@@ -204,7 +207,8 @@ pub fn jog(block: &[u8]) -> Option<&[u8]> {
     is_jog.then(|| behind_equals(block))
 }
 
-/// Whether a line is said in this dialect alone. `$H`, `$X` and `$x=v` are not: TinyG's text mode answers them by a hint.
+/// Whether a line is valid in this dialect alone. Not `$H`, `$X` and `$x=v`, which TinyG's text mode answers with a
+/// hint.
 #[inline(never)]
 #[small]
 pub fn is_own(line: &[u8]) -> bool {
@@ -217,7 +221,7 @@ pub fn is_own(line: &[u8]) -> bool {
         | Command::Sleep
         | Command::Restore(_)
         | Command::BadJog => true,
-        // In small letters they are TinyG's.
+        // In lower case these are commands of TinyG.
         Command::Modes | Command::Check => {
             without_comment(line).last().is_some_and(u8::is_ascii_uppercase)
         }
@@ -226,14 +230,14 @@ pub fn is_own(line: &[u8]) -> bool {
     }
 }
 
-/// The name of [`Command::Named`].
+/// Returns the name in a [`Command::Named`].
 pub fn name(line: &[u8], from: u8) -> &[u8] {
     let words = behind_dollar(line);
     let end = if from == 0 { words.len() } else { usize::from(from) - 1 };
     trim(words.get(..end).unwrap_or(&[]))
 }
 
-/// The value of [`Command::Set`] and [`Command::Named`].
+/// Returns the value in a [`Command::Set`] or [`Command::Named`].
 pub fn value(line: &[u8], from: u8) -> &[u8] {
     trim(behind_dollar(line).get(from.into()..).unwrap_or(&[]))
 }
@@ -242,7 +246,7 @@ fn behind_dollar(line: &[u8]) -> &[u8] {
     without_comment(trim(line).get(1..).unwrap_or(&[]))
 }
 
-/// Without blanks at its ends.
+/// Returns the line without blanks at its ends.
 pub fn trim(line: &[u8]) -> &[u8] {
     line.trim_ascii()
 }

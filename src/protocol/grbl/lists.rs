@@ -1,6 +1,6 @@
-//! `$#`, `$G`, `$I`, `$N`: what there is beside settings.
+//! The lists `$#`, `$G`, `$I`, `$N`.
 //!
-//! Each has parts, of at most a coordinate or a few words, that are put one after the other.
+//! Each list is written in parts. A part is at most one coordinate or a few words.
 
 use super::settings;
 use super::write::{close, int, length, line_end, message, text};
@@ -11,22 +11,22 @@ use crate::progmem::Text;
 use crate::protocol::{Machine, Out, Value};
 use crate::text;
 
-/// The rows of `$#`.
+/// The number of rows of `$#`.
 const ROWS: u8 = 11;
-/// The last of them: the tool length, and what probing has found.
+/// The last two rows: the tool length, and the result of probing.
 const TOOL: u8 = 9;
 /// See [`TOOL`].
 pub const PROBED: u8 = 10;
 
 progmem! {
-    /// Their names.
+    /// The names of the rows of `$#`.
     static NAMES: [Text; ROWS as usize] = [
         text!("[G54:"), text!("[G55:"), text!("[G56:"), text!("[G57:"), text!("[G58:"), text!("[G59:"),
         text!("[G28:"), text!("[G30:"), text!("[G92:"), text!("[TLO:"), text!("[PRB:"),
     ];
 }
 
-/// The value of a row of `$#` on an axis.
+/// Returns the value of a row of `$#` on an axis.
 #[small]
 fn offset(row: u8, axis: u8) -> Value {
     match row {
@@ -38,7 +38,7 @@ fn offset(row: u8, axis: u8) -> Value {
     }
 }
 
-/// Puts part `at` of `$#` from row `from` on: an axis of a row. Returns the next part, `None` behind the last.
+/// Writes part `at` of `$#`, which encodes a row and an axis. Returns the next part; `None` after the last.
 #[inline(never)]
 #[small]
 pub fn offsets(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Option<u8> {
@@ -63,7 +63,7 @@ pub fn offsets(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Option
     (row + 1 < ROWS).then_some((row + 1) << 3)
 }
 
-/// The part of [`offsets`] that `[PRB:]` begins with.
+/// The part of [`offsets`] with which `[PRB:]` begins.
 pub const PROBING: u8 = PROBED << 3;
 
 progmem! {
@@ -74,14 +74,14 @@ progmem! {
         text!("G38.3"), text!("G38.4"), text!("G38.5"), text!("G33"), text!("G76"), text!("G33.1"),
     ];
 
-    /// The coordinate systems, from 1.
+    /// The coordinate systems, numbered from 1.
     static SYSTEMS: [Text; 9] = [
         text!(" G54"), text!(" G55"), text!(" G56"), text!(" G57"), text!(" G58"), text!(" G59"),
         text!(" G59.1"), text!(" G59.2"), text!(" G59.3"),
     ];
 }
 
-/// Puts part `at` of `$G`. Returns the next part, `None` behind the last.
+/// Writes part `at` of `$G`. Returns the next part; `None` after the last.
 #[inline(never)]
 #[small]
 pub fn modes(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Option<u8> {
@@ -131,8 +131,9 @@ pub fn modes(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Option<u
     None
 }
 
-/// Puts `$I`: who the machine is. The letters say that there are a variable spindle, line numbers, mist, single axes to home, a lathe's codes (X1),
-/// and overrides in probing; then the blocks and the bytes that are free.
+/// Writes part `at` of `$I`, the identity of the machine. The option letters stand for a variable spindle, line
+/// numbers, mist, homing of single axes, a lathe's codes (X1), and overrides in probing. The free blocks and bytes
+/// follow. Returns the next part; `None` after the last.
 #[inline(never)]
 #[small]
 pub fn build(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Option<u8> {
@@ -166,7 +167,7 @@ pub fn build(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Option<u
     None
 }
 
-/// Puts a line that is carried out after a start, `$N0=G54`. Returns the next part, `None` behind the last.
+/// Writes a start-up line, such as `$N0=G54`. Returns the next part; `None` after the last.
 #[small]
 pub fn startup(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Option<u8> {
     text(out, text!("$N"));
@@ -177,7 +178,7 @@ pub fn startup(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Option
     (at == 0).then_some(1)
 }
 
-/// Puts the text of a startup line.
+/// Writes the text of a start-up line.
 #[inline(never)]
 #[small]
 pub fn startup_text(line: u8, machine: &mut impl Machine, out: &mut impl Out) {

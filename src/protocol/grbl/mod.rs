@@ -1,21 +1,22 @@
-//! grbl's dialect, version 1.1: lines that are answered by `ok` or `error:N`, status reports on request, settings by number.
+//! grbl's dialect, version 1.1: responses `ok` and `error:N`, status reports on request, settings by number.
 //!
-//! Pure and synchronous, in thread mode, as every dialect. A line becomes a [`Request`], what the machine tells a [`Telling`]. Nothing
-//! is kept here but [`Reports`]: settings are views of Kerf's own ([`settings`]), in grbl's units.
+//! Pure and synchronous, in thread mode, as every dialect. A line becomes a [`Request`], a notice of the machine a
+//! [`Telling`]. Only [`Reports`] is state. The settings are views of Kerf's own ([`settings`]), in grbl's units.
 //!
-//! | module | what it has |
+//! | module | contents |
 //! |---|---|
-//! | [`command`] | which command a line is |
-//! | [`request`] | a line on its way to its answer |
+//! | [`command`] | recognizes which command a line is |
+//! | [`request`] | answers a line |
 //! | [`settings`] | `$$` and `$x=v` |
 //! | [`lists`] | `$#`, `$G`, `$I`, `$N` |
 //! | [`report`] | the status report, `<Idle|MPos:..>` |
 //! | [`status`] | the numbers of errors and alarms |
-//! | [`telling`] | the greeting, alarms, what probing has found |
+//! | [`telling`] | the greeting, alarms, results of probing |
 //! | [`write`](mod@write) | numbers and texts |
 //!
-//! Lines are answered in their order, control lines too: senders that count characters go by it. Lines end in CR LF. A step costs at most
-//! 15,000 cycles, with a setting that is in EEPROM 3 ms. What is rubbish is answered by an error; nothing can be full.
+//! Lines are answered in the order in which they arrive, control lines included, because senders that count
+//! characters rely on it. Output lines end in CR LF. A step costs at most 15,000 cycles, or 3 ms with a setting that
+//! is in EEPROM. Malformed lines are answered with an error. No buffer here can overflow.
 
 mod command;
 mod lists;
@@ -37,7 +38,7 @@ pub use request::Request;
 pub use status::{alarm_number, error_number};
 pub use telling::Telling;
 
-/// The value of the setting `dia` that has every port begin in this dialect.
+/// The value of the setting `dia` with which every port begins in this dialect.
 const CHOSEN: u8 = 3;
 
 /// The dialect.
@@ -49,7 +50,7 @@ impl Dialect for Grbl {
     type Telling = Telling;
     type Memory = Reports;
 
-    /// Real-time bytes are taken wherever they stand, and lines are answered in their order.
+    /// Real-time bytes are taken out of lines wherever they stand, and lines are answered in order.
     const IN_ORDER: bool = true;
 
     fn speech(_settings: &Settings) {}
@@ -81,7 +82,8 @@ impl Dialect for Grbl {
         _speech: &mut (),
         _settings: &Settings,
     ) -> Request {
-        // Of a jog that never begins grbl's senders are told that it is over, and so of an empty line; of a line of G-code that it is refused.
+        // A dropped jog, or a dropped empty line, is answered with `ok`, as grbl's senders expect. A dropped line of
+        // G-code is answered with an error.
         let is_gcode = !line.is_empty() && command::jog(line).is_none();
         let drops_gcode = is_gcode && status == Status::Terminated;
         Request::refused(if drops_gcode { Status::Alarmed } else { status })
@@ -112,7 +114,7 @@ impl Dialect for Grbl {
         true
     }
 
-    /// No line may overtake: all lines are answered in their order.
+    /// No line may overtake another, because all lines are answered in order.
     #[inline(always)]
     fn may_be_control(_first: u8) -> bool {
         false

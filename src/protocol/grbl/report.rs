@@ -1,7 +1,9 @@
 //! The status report: `<Run|MPos:1.000,0.000,0.000|Bf:60,255|FS:800,0|WCO:0.000,0.000,0.000>`.
 //!
-//! The answer to `?`, a field or an axis a step. `WCO` comes at once after a change, else with every 10th report, with
-//! every 30th while the machine moves; `Ov` in one of those in between, likewise, with `A` for what turns and flows. In the first report after a greeting there is `WCO`, in the second `Ov`.
+//! The answer to `?`. A step writes one field, or one axis of a field. `WCO` comes at once after a change, otherwise
+//! in every 10th report, or every 30th while the machine is not at rest. `Ov` comes at once after a change, otherwise
+//! in every 10th report, or every 20th, and never together with `WCO`. `A`, the running spindle and coolant, comes
+//! with `Ov`. The first report after a greeting has `WCO`, the second has `Ov`.
 
 use super::settings;
 use super::write::{int, length, speed, text};
@@ -14,33 +16,33 @@ use crate::progmem::Text;
 use crate::protocol::{Hold, Machine, Out, Remembers, Value};
 use crate::text;
 
-/// Reports from one `WCO` or `Ov` to the next, at rest.
+/// The number of reports from one `WCO` or `Ov` to the next, at rest.
 const AT_REST: u8 = 10;
-/// Reports from one `WCO` to the next while the machine moves, and from one `Ov` to the next.
+/// The number of reports from one `WCO` to the next, and from one `Ov` to the next, while the machine is not at rest.
 const OFFSETS: u8 = 30;
 const OVERRIDES: u8 = 20;
 
-/// What is kept between reports, of all ports together.
+/// What is kept between reports. All ports share it.
 pub struct Reports {
-    /// How many reports there are until the next `WCO` and `Ov`.
+    /// The number of reports until the next `WCO`, and until the next `Ov`.
     offsets: u8,
     overrides: u8,
-    /// What the offsets were that have been told last.
+    /// A checksum of the offsets that were reported last.
     told: u16,
-    /// What the overrides and accessories were, likewise.
+    /// A checksum of the overrides and accessories that were reported last.
     shown: u8,
     /// [`SLEEPS`] and [`LOWERED`], as bits.
     flags: u8,
 }
 
-/// A bit of [`Reports::flags`]: `$SLP` has come.
+/// A bit of [`Reports::flags`]: `$SLP` has put the machine to sleep.
 pub(super) const SLEEPS: u8 = 1;
-/// A bit of [`Reports::flags`]: a setting has lowered the top speed of an axis.
+/// A bit of [`Reports::flags`]: a setting has lowered the maximum velocity of an axis.
 pub(super) const LOWERED: u8 = 2;
 
 #[small]
 impl Reports {
-    /// Sets a flag, or takes it back. Whether it was set.
+    /// Sets or clears a flag. Returns whether it was set before.
     pub(super) fn note(&mut self, flag: u8, on: bool) -> bool {
         let before = self.flags & flag != 0;
         self.flags = if on { self.flags | flag } else { self.flags & !flag };
@@ -62,14 +64,14 @@ impl Remembers for Reports {
     }
 }
 
-/// A report under way; by default, one that has not begun.
+/// A report that is being written. The default has not begun.
 #[derive(Default)]
 pub struct Report {
     field: Field,
     axis: u8,
     axes: u8,
     inches: bool,
-    /// Whether `WCO` comes, and whether `Ov` does.
+    /// Whether the report has `WCO`, and whether it has `Ov`.
     with: (bool, bool),
 }
 
@@ -90,7 +92,7 @@ enum Field {
 
 #[small]
 impl Report {
-    /// Begins: what is told is what is so by now.
+    /// Starts a report on the present state of the machine.
     #[inline(never)]
     fn begin(machine: &mut impl Machine) -> Self {
         let axes = settings::axes(machine);
@@ -117,7 +119,7 @@ impl Report {
         Self { field: Field::State, axis: 0, axes, inches, with }
     }
 
-    /// Puts the next part. Whether there is more.
+    /// Writes the next part. Returns whether there is more.
     #[inline(never)]
     pub fn step(&mut self, machine: &mut impl Machine, out: &mut impl Out) -> bool {
         machine.moment(self.field == Field::State);
@@ -153,7 +155,7 @@ impl Report {
                 text(out, text!("|FS:"));
                 speed(out, machine.value(Value::Velocity), self.inches);
                 out.put(b',');
-                // An encoder tells how fast it turns, whatever has been programmed.
+                // The measured speed of an encoder counts, even while the spindle is not programmed to turn.
                 let measures =
                     Capability::Lathe.is_built_in() && machine.value(Value::PulsesPerTurn) != 0;
                 let on = i32::from(measures || machine.value(Value::SpindleOn) != 0);
@@ -195,7 +197,7 @@ impl Report {
         self.field != Field::Done
     }
 
-    /// Puts one axis of a vector, with its name before the first.
+    /// Writes one axis of a vector, and the name of the field before the first axis.
     #[inline(never)]
     fn coordinate(
         &mut self,
@@ -218,16 +220,17 @@ impl Report {
     }
 }
 
-/// How far the axes are ahead of the spindle in a pass, at the last index.
+/// Writes how far the axes of a pass are ahead of the spindle, measured at the last index pulse.
 #[inline(never)]
 #[small]
 pub(super) fn sync_error(machine: &mut impl Machine, out: &mut impl Out) {
     let inches = settings::inches(machine);
-    // From um to what a length is kept in.
+    // From um to the unit of a `Length`.
     length(out, machine.value(Value::SyncError) * 10, inches);
 }
 
-/// How far the axes of a thread are ahead of the spindle. `0.00` between passes, and where reports are not to tell it.
+/// Writes how far the axes of a thread are ahead of the spindle. `0.00` between passes, and if the report mask does
+/// not enable it.
 #[inline(never)]
 #[small]
 fn reported_error(machine: &mut impl Machine, out: &mut impl Out) {
@@ -239,13 +242,13 @@ fn reported_error(machine: &mut impl Machine, out: &mut impl Out) {
     }
 }
 
-/// The speed of the spindle, turns a minute.
+/// Returns the speed of the spindle, in turns per minute.
 #[small]
 pub(super) fn rpm(machine: &mut impl Machine) -> i32 {
     (machine.value(Value::SpindleSpeed).abs() + 500) / 1_000
 }
 
-/// A number that changes when an offset does.
+/// Returns a checksum of the offsets, which changes with them.
 #[small]
 fn offsets(machine: &mut impl Machine, axes: u8) -> u16 {
     let mut sum = 1u16;
@@ -256,7 +259,7 @@ fn offsets(machine: &mut impl Machine, axes: u8) -> u16 {
     sum
 }
 
-/// A number that changes when an override does, or the spindle or coolant.
+/// Returns a checksum of the overrides, the spindle and the coolant, which changes with them.
 #[inline(never)]
 #[small]
 fn accessories_sum(machine: &mut impl Machine) -> u8 {
@@ -275,10 +278,10 @@ fn accessories_sum(machine: &mut impl Machine) -> u8 {
     sum
 }
 
-/// The [`Value::Door`] of a machine that goes on.
+/// The [`Value::Door`] of a machine that resumes after a door.
 const RESUMES: i32 = 2;
 
-/// What the machine is doing, in grbl's words.
+/// Writes the state of the machine, in grbl's words.
 #[inline(never)]
 #[small]
 fn state(machine: &mut impl Machine, out: &mut impl Out) {
@@ -299,7 +302,7 @@ fn state(machine: &mut impl Machine, out: &mut impl Out) {
             Doing::Holds if door != 0 => text!("Door:2"),
             Doing::Holds if rests => text!("Hold:0"),
             Doing::Holds => text!("Hold:1"),
-            // A program stop waits for cycle start.
+            // A program stop waits for cycle start, so it is shown as a hold.
             _ if stopped => text!("Hold:0"),
             Doing::Homes => text!("Home"),
             Doing::Jogs => text!("Jog"),
@@ -321,7 +324,7 @@ fn overrides(machine: &mut impl Machine, out: &mut impl Out) {
     factor(text!(","), Override::Spindle);
 }
 
-/// What turns and flows, if anything does.
+/// Writes the running accessories, if there are any.
 #[small]
 fn accessories(machine: &mut impl Machine, out: &mut impl Out) {
     let mut begun = false;
@@ -338,7 +341,7 @@ fn accessories(machine: &mut impl Machine, out: &mut impl Out) {
 }
 
 progmem! {
-    /// The inputs in the order of grbl's letters, and these.
+    /// The inputs, and grbl's letters for them in the order of the report.
     static PINS: [(u8, u8); 11] = [
         (inputs::PROBE as u8, b'P'),
         (inputs::X_MIN as u8, b'X'), (inputs::X_MAX as u8, b'X'),
@@ -349,7 +352,7 @@ progmem! {
     ];
 }
 
-/// The switches that are worked, if any is.
+/// Writes the actuated switches, if there are any.
 #[small]
 fn pins(machine: &mut impl Machine, out: &mut impl Out) {
     let (mut begun, mut last) = (false, 0);
@@ -363,7 +366,7 @@ fn pins(machine: &mut impl Machine, out: &mut impl Out) {
     }
 }
 
-/// A letter, with the name of its field before the first.
+/// Writes a letter, and the name of the field before the first one.
 #[inline(never)]
 fn letter(name: Text, begun: &mut bool, letter: u8, out: &mut impl Out) {
     if !core::mem::replace(begun, true) {

@@ -1,7 +1,8 @@
-//! A line on its way to its answer.
+//! Answers a line.
 //!
-//! What is listed comes before `ok`, a part each step. A setting is answered when it is in memory, homing when the machine has homed,
-//! a probing when it is over: until then the step says [`Next::Wait`], which costs 2,000 cycles each millisecond.
+//! A list is written before the `ok`, one part per step. A setting is answered when it is in memory, homing when the
+//! machine is homed, a probing when it is over. Until then the step returns [`Next::Wait`]; this polling costs 2,000
+//! cycles each millisecond.
 
 use super::command::{self, ALL, Command};
 use super::report::{LOWERED, Report, SLEEPS};
@@ -19,39 +20,39 @@ use crate::status::Status;
 use crate::units::{AXES, Length};
 use crate::{plain, text};
 
-/// A line.
+/// A line that is being answered.
 pub struct Request {
     command: Command,
-    /// How far it has come; what it says depends on the command.
+    /// The progress of the command. Its meaning depends on the command.
     at: u8,
     /// The status with which G-code has run.
     status: Status,
-    /// G-code that has not run yet.
+    /// The G-code that has not run yet.
     block: Option<Span>,
     begun: bool,
-    /// The status report that comes before what is next.
+    /// The status report that comes before the rest of the answer.
     report: Option<Report>,
 }
 
-/// Behind the last part of a list.
+/// The position after the last part of a list.
 const END: u8 = u8::MAX;
-/// A setting, or all of them, are on their way to memory.
+/// A setting, or all settings, are being written to memory.
 const STORES: u8 = 1;
 
-/// How far a command has come.
+/// The progress of a command.
 enum Step {
-    /// The command goes on with this part.
+    /// Continue with this part at once.
     At(u8),
-    /// The command goes on with this part, later.
+    /// Continue with this part later.
     Later(u8),
-    /// `ok`.
+    /// Answer `ok`.
     Done,
-    /// An error of this number.
+    /// Answer with the error of this number.
     Error(u8),
 }
 
 impl Request {
-    /// Begins with a line.
+    /// Starts to answer a line.
     #[inline(never)]
     pub(super) fn begin(line: &[u8]) -> Self {
         let command = command::of(line);
@@ -60,12 +61,12 @@ impl Request {
         Self { command, at: 0, status: Status::Ok, block, begun: false, report: None }
     }
 
-    /// A line that could not be kept.
+    /// Starts to answer a line that could not be kept.
     pub(super) fn refused(status: Status) -> Self {
         Self { command: Command::Gcode, at: 1, status, block: None, begun: false, report: None }
     }
 
-    /// A `?` alone.
+    /// Starts to answer a single `?`.
     pub(super) fn question() -> Self {
         let (command, report) = (Command::Question, Some(Report::default()));
         Self { command, at: 0, status: Status::Ok, block: None, begun: false, report }
@@ -129,7 +130,7 @@ impl Answers for Request {
     fn interject(&mut self) -> bool {
         let ended = match self.command {
             Command::Settings | Command::Startup => true,
-            // The places of an axis each are parts of one.
+            // The axes of a row are parts of one output line.
             Command::Offsets => self.at & 7 == 0,
             _ => !self.begun,
         };
@@ -171,7 +172,7 @@ impl Request {
             Command::Named(from) if settings::by_name(command::name(line, from)).is_none() => {
                 Step::Error(UNSUPPORTED)
             }
-            // Only at rest, or in an alarm, from here on.
+            // The commands from here on need the machine at rest or in an alarm.
             _ if at == 0 && self.command != Command::Unlock && !may_change(machine) => {
                 Step::Error(BUSY)
             }
@@ -202,7 +203,7 @@ impl Request {
         }
     }
 
-    /// `$N0=`. The line is carried out first, and kept if it is not refused.
+    /// `$N0=`. The line is run first, and stored if it is not refused.
     fn store_startup(&mut self, n: u8, line: &[u8], machine: &mut impl Machine) -> Step {
         const RUNS: u8 = 1;
         let text = command::behind_equals(line);
@@ -231,8 +232,8 @@ impl Request {
         }
     }
 
-    /// What G-code has come to. A probing is waited for, so that its `[PRB:]` comes before `ok`, and so is the end of a program. A target beyond the travel is an alarm,
-    /// but in a jog and in check mode.
+    /// Ends the answer to a line of G-code. A probing is waited for, so that its `[PRB:]` comes before `ok`. The end
+    /// of a program is waited for too. A target beyond the travel raises an alarm, except in a jog and in check mode.
     fn gcode_done(&mut self, line: &[u8], machine: &mut impl Machine, out: &mut impl Out) -> Step {
         let is_beyond = self.status == Status::SoftLimit && command::jog(line).is_none();
         if is_beyond && machine.value(Value::Check) == 0 {
@@ -255,7 +256,7 @@ impl Request {
         if Capability::Lathe.is_built_in() && is_threading(machine.value(Value::MotionMode)) {
             return begins(machine);
         }
-        // A mode that is still in force without a move of this line is none of it.
+        // A probing mode that an earlier line has left does not count: this line has to move.
         let probes =
             self.at == 0 && command::moves(line) && is_probing(machine.value(Value::MotionMode));
         let mut is = |value| machine.value(value) != 0;
@@ -266,7 +267,8 @@ impl Request {
     }
 }
 
-/// A line has been refused: what is behind it waits for the sender, if that is wanted.
+/// Holds the machine after a refused line, if the settings ask for it, so that the lines after it wait for the
+/// sender.
 #[inline(never)]
 #[small]
 fn hold_back(machine: &mut impl Machine) {
@@ -289,7 +291,7 @@ fn is_threading(mode: i32) -> bool {
     (MotionMode::Thread as i32..=MotionMode::RigidTap as i32).contains(&mode)
 }
 
-/// Whether the pass of a thread has begun: until then its line is not answered, so that it can be refused.
+/// Waits until the pass of a thread has begun. Only then the line is answered, because until then it can be refused.
 #[inline(never)]
 #[small]
 fn begins(machine: &mut impl Machine) -> Step {
@@ -305,14 +307,14 @@ fn begins(machine: &mut impl Machine) -> Step {
     if waits { Step::Later(0) } else { Step::Done }
 }
 
-/// Whether settings may be asked for and changed: at rest, in check mode too, and in an alarm.
+/// Whether settings may be read and changed: at rest, in check mode too, and in an alarm.
 #[small]
 fn may_change(machine: &mut impl Machine) -> bool {
     let stopped = machine.cycle() == Cycle::Stopped;
     matches!(machine.doing(), Doing::Rests | Doing::Alarm(_)) && !stopped
 }
 
-/// A row of `$$`.
+/// Writes a row of `$$`.
 #[inline(never)]
 #[small]
 fn list_setting(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Step {
@@ -326,7 +328,7 @@ fn list_setting(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Step 
     Step::At(at + 1)
 }
 
-/// Ends a line with a value.
+/// Ends a line with `=` and a value.
 #[small]
 fn equals(value: Fixed, out: &mut impl Out) {
     out.put(b'=');
@@ -334,7 +336,7 @@ fn equals(value: Fixed, out: &mut impl Out) {
     line_end(out);
 }
 
-/// `$name`, `$name=v`.
+/// `$name` reads a setting, `$name=v` sets it.
 #[inline(never)]
 #[small]
 fn named(at: u8, line: &[u8], from: u8, machine: &mut impl Machine, out: &mut impl Out) -> Step {
@@ -350,7 +352,7 @@ fn named(at: u8, line: &[u8], from: u8, machine: &mut impl Machine, out: &mut im
     Step::Done
 }
 
-/// `$x=v`, `$name=v`, set by `set`. Answered when it is in memory.
+/// `$x=v` or `$name=v`, stored by `set`. Answered when the value is in memory.
 #[inline(never)]
 #[small]
 fn set<M: Machine>(
@@ -371,13 +373,13 @@ fn set<M: Machine>(
     match set(machine) {
         Ok(()) => Step::Later(STORES),
         Err(Status::Again) => Step::Later(0),
-        // What the setting cannot have: no rate and no target is meant.
+        // grbl's errors 33 and 12 speak of a target and a rate, so they do not fit a bad value.
         Err(Status::OutOfRange | Status::AboveMaximum) => Step::Error(UNSUPPORTED),
         Err(status) => Step::Error(error_number(status)),
     }
 }
 
-/// `$H`: ends the alarm, homes, and waits for the end of that.
+/// `$H`: ends the alarm, homes, and waits until homing is over.
 #[inline(never)]
 #[small]
 fn home(at: u8, axis: u8, machine: &mut impl Machine) -> Step {
@@ -398,11 +400,11 @@ fn home(at: u8, axis: u8, machine: &mut impl Machine) -> Step {
         return Step::Later(FAILED);
     }
     if at >= FAILED {
-        // The reporter tells why, first.
+        // Gives the reporter time to send the cause first.
         if at < TOLD {
             return Step::Later(at + 1);
         }
-        // Nobody knows where the machine is.
+        // After a failed homing the position is unknown.
         machine.alarm(Alarm::Alarm);
         return Step::Error(LOCKED);
     }
@@ -420,7 +422,7 @@ fn home(at: u8, axis: u8, machine: &mut impl Machine) -> Step {
     }
 }
 
-/// `$X`.
+/// `$X`: ends an alarm.
 #[inline(never)]
 #[small]
 fn unlock(machine: &mut impl Machine, out: &mut impl Out) -> Step {
@@ -438,7 +440,7 @@ fn unlock(machine: &mut impl Machine, out: &mut impl Out) -> Step {
     }
 }
 
-/// `$C`. A reset ends check mode.
+/// `$C`: toggles check mode. Leaving it resets the machine.
 #[inline(never)]
 #[small]
 fn check(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Step {
@@ -457,7 +459,7 @@ fn check(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Step {
     }
 }
 
-/// `$SLP`: motors off, and nothing moves until a reset or `$X`.
+/// `$SLP`: turns the motors off. Nothing moves until a reset or `$X`.
 #[inline(never)]
 #[small]
 fn sleep(machine: &mut impl Machine, out: &mut impl Out) -> Step {
@@ -473,13 +475,13 @@ fn sleep(machine: &mut impl Machine, out: &mut impl Out) -> Step {
     Step::Done
 }
 
-/// `$RST=`: settings, offsets, or both. Answered when they are in memory.
+/// `$RST=`: restores settings, offsets, or both. Answered when they are in memory.
 #[inline(never)]
 #[small]
 fn restore(at: u8, letter: u8, machine: &mut impl Machine, out: &mut impl Out) -> Step {
     const SETTINGS: u8 = 2;
     const TOLD: u8 = 3;
-    /// The first of the coordinates that are cleared: each is a part.
+    /// The first value of the coordinate systems to be cleared. Each value is a part.
     const ROWS: u8 = 8;
     match at {
         0 if letter == b'$' => Step::Later(SETTINGS),

@@ -1,7 +1,7 @@
 //! `$$` and `$x=v`: Kerf's settings under grbl's numbers and in its units.
 //!
-//! Nothing is kept here. A number that stands for several settings reads the first of them and sets all. What Kerf has no setting for
-//! is shown as it is, and takes that value alone.
+//! Nothing is kept here. A number that stands for several settings reads the first of them and sets all. A number
+//! without a setting in Kerf is shown with a fixed value, and accepts only that value.
 
 use super::report::LOWERED;
 use crate::boards::MOTORS;
@@ -16,7 +16,7 @@ use crate::status::Status;
 use crate::units::AXES;
 
 progmem! {
-    /// The numbers below 100 that there are.
+    /// The numbers below 100 that exist.
     static NUMBERS: [u8; BASE as usize] = {
         let all = [0, 1, 2, 3, 4, 5, 6, 10, 11, 12, 13, 20, 21, 22, 23, 24, 25, 26, 27, 30, 31, 32, 40, 41];
         let (mut some, mut row) = ([0; BASE as usize], 0);
@@ -27,25 +27,26 @@ progmem! {
         some
     };
 }
-/// How many: those of a lathe are the last two.
+/// How many of them an image has. The last two are those of a lathe.
 const BASE: u8 = if Capability::Lathe.is_built_in() { 24 } else { 22 };
 
-/// Axes that may home.
+/// The number of axes that can home.
 const HOMING: u8 = 4;
-/// `$26`, which is fixed, ms.
+/// The fixed value of `$26`, in ms.
 const DEBOUNCE_MS: i32 = 10;
-/// Bits of `grm` that are the lower two of `$10`, the one that is `$13`, and the two that are the next of `$10`.
+/// Bits of `grm`: those that are the lowest two bits of `$10`, the one that is `$13`, and those that are the next two
+/// of `$10`.
 const REPORT: i32 = 3;
 const INCHES: i32 = 4;
 const SYNC: i32 = 48;
-/// From those to their place in `$10`.
+/// The shift from `SYNC` to its bits in `$10`.
 const SYNC_SHIFT: u8 = 2;
-/// Microseconds of `$41`'s unit.
+/// The unit of `$41`, in microseconds.
 const DEBOUNCE_US: i32 = 4;
-/// `$1` that keeps the motors on.
+/// The value of `$1` that keeps the motors on.
 const ALWAYS: i32 = 255;
 
-/// The number of row `row` of the list, of a machine with so many axes.
+/// Returns the setting number in row `row` of the list, on a machine with `axes` axes; `None` past the end.
 #[small]
 pub fn number(row: u8, axes: u8) -> Option<u8> {
     match row.checked_sub(BASE) {
@@ -55,7 +56,7 @@ pub fn number(row: u8, axes: u8) -> Option<u8> {
     }
 }
 
-/// How many axes are shown: up to the last that is not disabled, and three at least.
+/// Returns how many axes are shown: up to the last one that is not disabled, and at least three.
 #[inline(never)]
 #[small]
 pub fn axes(machine: &mut impl Machine) -> u8 {
@@ -92,7 +93,7 @@ fn read(machine: &mut impl Machine, setting: Option<Setting>) -> i32 {
     setting.map_or(0, |setting| machine.setting(setting))
 }
 
-/// A setting with at most so many decimals, and at least as many.
+/// Returns a setting with exactly `decimals` decimals.
 #[inline(never)]
 #[small]
 fn shown(machine: &mut impl Machine, setting: Option<Setting>, decimals: u8) -> Fixed {
@@ -101,7 +102,8 @@ fn shown(machine: &mut impl Machine, setting: Option<Setting>, decimals: u8) -> 
     value.rounded(decimals).padded(decimals)
 }
 
-/// The axes of whose switches a mode has one of these bits, as bits; at the lower ends alone, or at any.
+/// Returns, as bits, the axes with a switch whose mode has one of `bits`. With `lower` only switches at lower ends
+/// count.
 #[inline(never)]
 #[small]
 fn switches(machine: &mut impl Machine, bits: i32, lower: bool) -> i32 {
@@ -116,7 +118,7 @@ fn switches(machine: &mut impl Machine, bits: i32, lower: bool) -> i32 {
     axes
 }
 
-/// A bit for each axis whose motor has a setting that is not 0.
+/// Returns a bit for each axis with a motor whose setting is not 0.
 #[inline(never)]
 #[small]
 fn mask(machine: &mut impl Machine, token: [u8; 4]) -> i32 {
@@ -129,7 +131,7 @@ fn mask(machine: &mut impl Machine, token: [u8; 4]) -> i32 {
     bits
 }
 
-/// The first motor of an axis.
+/// Returns the first motor of an axis.
 #[small]
 fn motor_of(machine: &mut impl Machine, axis: u8) -> Option<u8> {
     (0..MOTORS as u8).find(|motor| moves(machine, *motor, axis))
@@ -140,14 +142,14 @@ fn moves(machine: &mut impl Machine, motor: u8, axis: u8) -> bool {
     kinematics::stands_for(drives) == axis
 }
 
-/// A hundred and more: of which axis it is, and which of its four.
+/// Splits a number from 100 on: which of the four settings of an axis, and which axis.
 #[small]
 fn split(number: u8) -> Option<(u8, u8)> {
     let number = number.checked_sub(100)?;
     (number < 40 && usize::from(number % 10) < AXES).then_some((number / 10, number % 10))
 }
 
-/// The value of a number.
+/// Returns the value of a numbered setting; `None` if there is none.
 #[inline(never)]
 #[small]
 pub fn value(number: u8, machine: &mut impl Machine) -> Option<Fixed> {
@@ -206,7 +208,7 @@ fn travel(axis: u8, machine: &mut impl Machine) -> (i32, i32) {
     (low, read(machine, of_axis(axis, token("tm"))))
 }
 
-/// Steps per millimetre, in thousandths.
+/// Returns the steps per millimetre of an axis, in thousandths.
 #[small]
 fn steps(axis: u8, machine: &mut impl Machine) -> i32 {
     let Some(motor) = motor_of(machine, axis) else { return 0 };
@@ -214,7 +216,8 @@ fn steps(axis: u8, machine: &mut impl Machine) -> i32 {
     turned(machine, motor, turn)
 }
 
-/// Sets a number to what `text` says. [`Status::Again`] as of `Machine::set_row`: all of it is to be done again.
+/// Sets a numbered setting to the value in `text`. [`Status::Again`] as of `Machine::set_row`: the whole call has to
+/// be repeated.
 #[inline(never)]
 #[small]
 pub fn set(number: u8, text: &[u8], machine: &mut impl Machine) -> Result<(), Status> {
@@ -232,7 +235,7 @@ pub fn set(number: u8, text: &[u8], machine: &mut impl Machine) -> Result<(), St
         2 => set_mask(machine, token("sp"), whole()?),
         3 => set_mask(machine, token("po"), whole()?),
         5 => put(machine, of_system(token("st")), to),
-        // The whole of a byte is accepted: what it asks for beside is not known here.
+        // Any value is accepted. Bits without a meaning here are ignored.
         10 => {
             let bits = whole()?;
             let bits = bits & REPORT | bits << SYNC_SHIFT & SYNC;
@@ -256,7 +259,7 @@ pub fn set(number: u8, text: &[u8], machine: &mut impl Machine) -> Result<(), St
             let counts = whole()?.min(i32::MAX / DEBOUNCE_US);
             put_value(machine, of_spindle(token("b")), counts * DEBOUNCE_US)
         }
-        // What is fixed may be said again.
+        // A fixed value may be set to itself.
         _ => match value(number, machine) {
             Some(fixed) if fixed.decimals == 0 && fixed.value == whole()? => Ok(()),
             Some(_) => Err(Status::ReadOnly),
@@ -265,33 +268,33 @@ pub fn set(number: u8, text: &[u8], machine: &mut impl Machine) -> Result<(), St
     }
 }
 
-/// The setting with a name of its own.
+/// Returns the setting with one of Kerf's own names; `None` if there is none.
 #[inline(never)]
 #[small]
 pub fn by_name(name: &[u8]) -> Option<Setting> {
     Setting::find(&Name::new().with(name)?)
 }
 
-/// The value of a setting, in the unit of TinyG's dialect.
+/// Returns the value of a setting, in the unit of TinyG's dialect.
 #[small]
 pub fn value_of(setting: Setting, machine: &mut impl Machine) -> Fixed {
     Fixed { value: machine.setting(setting), decimals: setting.row().stored }
 }
 
-/// Sets it to what `text` says. [`Status::Again`] as of [`set`].
+/// Sets a setting to the value in `text`. [`Status::Again`] as of [`set`].
 #[inline(never)]
 #[small]
 pub fn set_named(setting: Setting, text: &[u8], machine: &mut impl Machine) -> Result<(), Status> {
     put(machine, Some(setting), parse(text)?)
 }
 
-/// A number. A comma is no part of it here: 1,5 is not 15.
+/// Parses a number. Commas are refused, so that 1,5 is not taken for 15.
 #[small]
 fn parse(text: &[u8]) -> Result<Number, Status> {
     Number::parse(text).filter(|_| !text.contains(&b',')).ok_or(Status::BadNumber)
 }
 
-/// Sets some bits of `grm`, and keeps others.
+/// Sets bits of `grm`, and keeps the bits in `kept`.
 #[small]
 fn set_report(bits: i32, kept: i32, machine: &mut impl Machine) -> Result<(), Status> {
     let mask = of_system(token("grm"));
@@ -299,20 +302,20 @@ fn set_report(bits: i32, kept: i32, machine: &mut impl Machine) -> Result<(), St
     put_value(machine, mask, bits)
 }
 
-/// Sets a setting to what has been said.
+/// Checks a number and stores it.
 #[inline(never)]
 #[small]
 fn put(machine: &mut impl Machine, setting: Option<Setting>, to: Number) -> Result<(), Status> {
     let setting = setting.ok_or(Status::UnrecognizedName)?;
     let value = machine.settings().check(setting, to, false).map_err(|status| match status {
-        // Error 4 is said of negative values alone.
+        // Error 4 is for negative values only.
         Status::BelowMinimum => Status::OutOfRange,
         other => other,
     })?;
     put_value(machine, Some(setting), value)
 }
 
-/// Sets a setting to a value as it is kept.
+/// Stores a value that is scaled as kept.
 #[inline(never)]
 #[small]
 fn put_value(
@@ -352,7 +355,7 @@ fn set_mask(machine: &mut impl Machine, token: [u8; 4], bits: i32) -> Result<(),
     })
 }
 
-/// `$1`, ms.
+/// `$1`, in ms.
 #[small]
 fn set_idle(ms: i32, machine: &mut impl Machine) -> Result<(), Status> {
     let mode = if ms == ALWAYS { 1 } else { 2 };
@@ -361,18 +364,18 @@ fn set_idle(ms: i32, machine: &mut impl Machine) -> Result<(), Status> {
     if ms == ALWAYS {
         return Ok(());
     }
-    // Not less than a tenth of a second.
+    // At least a tenth of a second.
     put_value(machine, of_system(token("mt")), (ms / 10).max(10))
 }
 
-/// Gives a bit to the mode of every switch that there is, or takes it from all.
+/// Sets a bit in the modes of all switches that are on, or clears it in all.
 #[small]
 fn set_switches(machine: &mut impl Machine, bit: i32, on: bool) -> Result<(), Status> {
     (0..2 * HOMING).try_for_each(|end| {
         let token = if end & 1 == 0 { token("sn") } else { token("sx") };
         let setting = of_axis(end / 2, token);
         let mode = read(machine, setting);
-        // One that is off belongs to no axis.
+        // A switch that is off stays off.
         let with = if on && mode != 0 {
             mode | bit
         } else if on {
@@ -384,7 +387,7 @@ fn set_switches(machine: &mut impl Machine, bit: i32, on: bool) -> Result<(), St
     })
 }
 
-/// `$22=1`: the switches are those for homing that are so by default, if there is none.
+/// `$22=1`: makes those switches homing switches that are so by default, unless there are homing switches already.
 #[small]
 fn home_again(machine: &mut impl Machine) -> Result<(), Status> {
     if switches(machine, 1, false) != 0 {
@@ -399,7 +402,7 @@ fn home_again(machine: &mut impl Machine) -> Result<(), Status> {
     })
 }
 
-/// `$23`: which axes home at their lower ends.
+/// `$23`: selects the axes that home at their lower ends.
 #[small]
 fn set_homing(bits: i32, machine: &mut impl Machine) -> Result<(), Status> {
     let homes = switches(machine, 1, false);
@@ -407,7 +410,7 @@ fn set_homing(bits: i32, machine: &mut impl Machine) -> Result<(), Status> {
         let lower = bits >> axis & 1;
         let (sn, sx) = (of_axis(axis, token("sn")), of_axis(axis, token("sx")));
         let modes = [read(machine, sn), read(machine, sx)];
-        // A limit goes with the switch.
+        // The limit function moves along with the homing switch.
         let limits = (modes[0] | modes[1]) & 2;
         put_value(machine, sn, if lower != 0 { 1 | limits } else { modes[0] & !1 })?;
         put_value(machine, sx, if lower != 0 { modes[1] & !1 } else { 1 | limits })
@@ -425,7 +428,7 @@ fn set_axis(what: u8, axis: u8, to: Number, machine: &mut impl Machine) -> Resul
         2 => put(machine, of_axis(axis, token("ac")), to),
         _ => {
             let length = to.fixed(4, false).ok_or(Status::OutOfRange)?;
-            // An axis whose zero is at its top keeps it there.
+            // On an axis whose zero is at the upper end the lower end moves.
             let (low, high) = travel(axis, machine);
             if high == 0 && low <= 0 {
                 put_value(machine, of_axis(axis, token("tn")), -length)
@@ -437,7 +440,7 @@ fn set_axis(what: u8, axis: u8, to: Number, machine: &mut impl Machine) -> Resul
     }
 }
 
-/// Steps per millimetre become the travel in a turn of each motor of the axis.
+/// Sets the steps per millimetre of an axis, by the travel per turn of each of its motors.
 #[small]
 fn set_steps(axis: u8, to: Number, machine: &mut impl Machine) -> Result<(), Status> {
     let to = to.fixed(3, false).filter(|to| *to > 0).ok_or(Status::OutOfRange)?;

@@ -3,36 +3,36 @@
 use crate::progmem;
 use crate::status::Status;
 
-/// The number of an error that is no [`Status`]: a `$` command that there is not.
+/// The error of an unknown `$` command. The errors of these constants do not come from a [`Status`].
 pub const UNSUPPORTED: u8 = 3;
-/// The machine is not at rest.
+/// The error of a command that needs the machine at rest.
 pub const BUSY: u8 = 8;
-/// G-code is locked out.
+/// The error of G-code that is locked out.
 pub const LOCKED: u8 = 9;
-/// `$N0=` with a line that is too long.
+/// The error of `$N0=` with a line that is too long.
 pub const TOO_LONG: u8 = 14;
-/// `$J=` with other words than it may have.
+/// The error of `$J=` with words that a jog may not have.
 pub const BAD_JOG: u8 = 16;
 
-/// The alarm of a probe that is as it is to become before anything moves.
+/// The alarm of a probing whose probe is in its final state before anything moves.
 pub const PROBE_CLOSED: u8 = 4;
 
-/// The number of the error that a status is; 0 for none.
+/// Returns the number of the error for a status; 0 for none.
 #[inline(never)]
 #[small]
 pub fn error_number(status: Status) -> u8 {
     ERRORS.at(status as usize).unwrap_or(1)
 }
 
-/// The alarm that an exception is; `None` for one that is none.
+/// Returns the number of the alarm for an exception; `None` if the exception is not an alarm.
 #[small]
 pub fn alarm_number(status: Status) -> Option<u8> {
     Some(match status {
         Status::LimitHit => 1,
-        // Steps were stopped at once, or the machine has started as nobody wanted.
+        // Steps were stopped abruptly, or the machine has restarted unexpectedly.
         Status::ShutDown | Status::Panicked | Status::HardReset => 3,
         Status::ProbeFailed => 5,
-        // Homing was interrupted by a reset.
+        // A reset has interrupted homing.
         Status::Terminated => 6,
         Status::HomingClosed => 8,
         Status::HomingFailed => 9,

@@ -1,6 +1,6 @@
-//! A notice on its way out: the greeting, alarms and messages, what probing has found.
+//! Sends a notice: the greeting, alarms and messages, results of probing.
 //!
-//! What TinyG's senders are told unasked, of the queue and how the machine stands, grbl's ask for.
+//! Queue and status reports are not sent here, because grbl's senders ask for them.
 
 use super::lists;
 use super::report::{SLEEPS, sync_error};
@@ -15,17 +15,17 @@ use crate::protocol::{Machine, Notice, Occasion, Out, Tells, Value};
 use crate::status::Status;
 use crate::text;
 
-/// What is being told, and how far.
+/// What is being sent, and how far.
 pub enum Telling {
-    /// Nothing is being told.
+    /// Nothing.
     Nothing,
-    /// The greeting; whether its first line has been put.
+    /// The greeting, and whether its first line has been written.
     Greeting(bool),
     /// An alarm, or a message.
     Exception(Status),
     /// `[PRB:]`, from this part on.
     Probing(u8),
-    /// What has become of a line that is carried out after a start.
+    /// The result of a start-up line.
     Startup(u8, Status),
     /// `[Se:]`.
     SyncError,
@@ -33,7 +33,7 @@ pub enum Telling {
 
 #[small]
 impl Telling {
-    /// Begins. What is told is what is so by now.
+    /// Starts to send a notice about the present state of the machine.
     #[inline(never)]
     pub(super) fn begin(notice: Notice, machine: &mut impl Machine) -> Self {
         match notice {
@@ -93,7 +93,7 @@ impl Tells for Telling {
     }
 }
 
-/// `>G54:ok`: in one line, so that it is nobody's answer.
+/// Writes `>G54:ok`. All on one line, so that no sender takes the `ok` for an answer.
 #[inline(never)]
 #[small]
 fn started(line: u8, status: Status, machine: &mut impl Machine, out: &mut impl Out) {
@@ -107,7 +107,7 @@ fn started(line: u8, status: Status, machine: &mut impl Machine, out: &mut impl 
     line_end(out);
 }
 
-/// `ALARM:N`, or what people are to know.
+/// Writes `ALARM:N`, or a message for the user.
 #[inline(never)]
 #[small]
 fn exception(status: Status, machine: &mut impl Machine, out: &mut impl Out) {
@@ -133,7 +133,7 @@ fn exception(status: Status, machine: &mut impl Machine, out: &mut impl Out) {
     }
 }
 
-/// What has become of a thread.
+/// Writes a message about a thread.
 #[inline(never)]
 #[small]
 fn spindle(status: Status, out: &mut impl Out) {
@@ -148,7 +148,7 @@ fn spindle(status: Status, out: &mut impl Out) {
     }
 }
 
-/// Whether the probe is as the probing waits for it to become: it has been so from the beginning.
+/// Whether the probe is in the state that the probing waits for.
 #[small]
 fn is_contact(machine: &mut impl Machine) -> bool {
     let leaves = machine.value(Value::MotionMode) == MotionMode::ProbeAway as i32;

@@ -1,4 +1,4 @@
-//! Numbers and texts of this dialect.
+//! Numbers and texts of grbl's dialect.
 
 use crate::config::Fixed;
 use crate::plain;
@@ -7,10 +7,10 @@ use crate::protocol::Out;
 
 pub use crate::protocol::write::{fixed, int, text};
 
-/// Decimals in which a `Length` is kept.
+/// The number of decimals of a `Length`.
 const KEPT: u8 = 4;
 
-/// A length in units of a `Length`, in millimetres with three decimals or in inches with four.
+/// Writes a length given in units of a `Length`: in millimetres with three decimals, or in inches with four.
 #[inline(never)]
 #[small]
 pub fn length(out: &mut impl Out, units: i32, inches: bool) {
@@ -18,7 +18,7 @@ pub fn length(out: &mut impl Out, units: i32, inches: bool) {
     fixed(out, if inches { value.inches(KEPT) } else { value.rounded(3) });
 }
 
-/// A speed in thousandths of mm/min: without decimals, or in inches with one.
+/// Writes a speed given in thousandths of mm/min: in mm/min without decimals, or in inches/min with one.
 #[inline(never)]
 #[small]
 pub fn speed(out: &mut impl Out, thousandths: i32, inches: bool) {
@@ -26,17 +26,17 @@ pub fn speed(out: &mut impl Out, thousandths: i32, inches: bool) {
     fixed(out, if inches { value.inches(1) } else { value.rounded(0) });
 }
 
-/// The end of a line.
+/// Writes a line end.
 pub fn line_end(out: &mut impl Out) {
     out.put_plain(plain!("\r\n"));
 }
 
-/// The end of a line in brackets.
+/// Closes a bracketed line.
 pub fn close(out: &mut impl Out) {
     out.put_plain(plain!("]\r\n"));
 }
 
-/// A line in brackets: `[MSG:text]`.
+/// Writes a bracketed line: `[MSG:text]`.
 #[inline(never)]
 #[small]
 pub fn message(out: &mut impl Out, what: Text) {

@@ -1,15 +1,15 @@
 //! G29 and M420: the bed of a printer as a plane through three points, which moves follow.
 //!
-//! | code | does |
+//! | code | action |
 //! |---|---|
-//! | G29 L R F B Z | probes three points that reach from L to R and from F to B; then moves follow the plane, and the points are told |
-//! | G29 S0 | tells the points |
-//! | G29 S1 X Y Z | adds a point: where the machine is, but for what is named; with the third moves follow the plane |
-//! | G29 S5 | forgets them |
+//! | G29 L R F B Z | probes three points between L and R and between F and B; then moves follow the plane, and the points are listed |
+//! | G29 S0 | lists the points |
+//! | G29 S1 X Y Z | adds a point: the position of the machine, with the named coordinates replaced; with the third point moves follow the plane |
+//! | G29 S5 | forgets the points |
 //! | M420 S1, S0 | moves follow the plane, or do not; without S as G29 S0 |
 //!
-//! All is done at rest, one thing at a time: while the machine moves the line waits. Words are lengths of machine coordinates. A move that somebody else
-//! ends, and an alarm, end the code; then no plane is known.
+//! Everything is done at rest, one operation at a time; while the machine moves the line waits. Words are lengths in
+//! machine coordinates. An alarm, or a move that is interrupted, ends the code. No plane is known then.
 
 use super::command::{has, number, value};
 use super::host::Step;
@@ -24,30 +24,31 @@ use crate::status::Status;
 use crate::text;
 use crate::units::Length;
 
-/// The first part of a code: what it asks for is looked at.
+/// The first part of a code, which checks the request.
 const BEGINS: u8 = 0;
-/// Moves do not follow the plane any more: points may change.
+/// The part in which points may change, because moves no longer follow the plane.
 const CHANGES: u8 = 1;
-/// What was asked for is done.
+/// The part after the work is done.
 const ENDS: u8 = 2;
-/// From this part on the points are told.
+/// The first part that lists the points.
 const TELLS: u8 = 4;
-/// From this part on points are probed, in [`STAGES`] each.
+/// The first part that probes points. Each point takes [`STAGES`] parts.
 const PROBES: u8 = 16;
-/// Over the point, down to it, up, and what has come of that: a move that is ended leaves less than three points.
+/// The stages of a point: move over it, probe down, move up, take the result. An interrupted move leaves fewer than
+/// three points.
 const STAGES: u8 = 4;
-/// The part behind the last point.
+/// The part after the last point.
 const FOLLOWS: u8 = PROBES + STAGES * POINTS as u8;
 
-/// How far above and below the lower end of Z the bed is looked for, without the word Z: 5 mm.
+/// Without the word Z the bed is searched for within 5 mm above and below the lower end of Z.
 const HEIGHT: Length = Length(5 * Length::PER_MM);
-/// What Z may say: 0.5 to 50 mm.
+/// The range of the word Z: 0.5 to 50 mm.
 const HEIGHTS: core::ops::RangeInclusive<Length> =
     Length(Length::PER_MM / 2)..=Length(50 * Length::PER_MM);
-/// Without words nothing is probed in this part of the travel at either end.
+/// Without words, the outermost tenth of the travel at either end is not probed. This is the divisor.
 const MARGIN: i32 = 10;
 
-/// Why a code is not carried out.
+/// Why a code is refused.
 enum Trouble {
     Status(Status),
     Bed(Fault),
@@ -70,10 +71,10 @@ impl From<Fault> for Trouble {
     }
 }
 
-/// What comes next.
+/// The next step of a code.
 type Next = Result<Step, Trouble>;
 
-/// Does part `at` of a code.
+/// Performs part `at` of a code.
 #[inline(never)]
 #[small]
 pub fn part(
@@ -127,7 +128,7 @@ fn reason(trouble: &Trouble) -> Text {
     }
 }
 
-/// The length of a word, if it is there.
+/// Returns the length in a word; `None` if the block does not have the word.
 #[inline(never)]
 #[small]
 fn word(block: &[u8], letter: u8, machine: &mut impl Machine) -> Result<Option<Length>, Trouble> {
@@ -139,7 +140,7 @@ fn word(block: &[u8], letter: u8, machine: &mut impl Machine) -> Result<Option<L
     Ok(Some(Length(units.ok_or(Status::OutOfRange)?)))
 }
 
-/// M420. Moves follow the plane at any height: a height at which that ends, Z, is not read, for a plane needs none.
+/// M420. A plane is followed at any height, so the word Z (a fade height in other firmware) is not read.
 #[inline(never)]
 #[small]
 fn switch(at: u8, follows: Option<i32>, machine: &mut impl Machine) -> Next {
@@ -153,7 +154,7 @@ fn switch(at: u8, follows: Option<i32>, machine: &mut impl Machine) -> Next {
     follow(follows != 0, ENDS, machine)
 }
 
-/// G29 S.
+/// G29 with S: lists the points, adds one, or forgets them.
 #[inline(never)]
 #[small]
 fn change(at: u8, what: i32, block: &[u8], machine: &mut impl Machine) -> Next {
@@ -162,7 +163,7 @@ fn change(at: u8, what: i32, block: &[u8], machine: &mut impl Machine) -> Next {
         (_, ENDS) => return Ok(Step::Done),
         (1, BEGINS) => {
             let point = point(block, machine)?;
-            // A point that is refused changes nothing.
+            // Tried on a copy first: a refused point must change nothing.
             let mut trial = *bed(machine)?;
             trial.add(point)?;
             return follow(false, CHANGES, machine);
@@ -179,7 +180,7 @@ fn change(at: u8, what: i32, block: &[u8], machine: &mut impl Machine) -> Next {
     follow(known, ENDS, machine)
 }
 
-/// The point that G29 S1 names: where the nozzle is, but for the words.
+/// Returns the point of G29 S1: the position of the nozzle, with the named coordinates replaced.
 #[inline(never)]
 #[small]
 fn point(block: &[u8], machine: &mut impl Machine) -> Result<Point, Trouble> {
@@ -194,7 +195,7 @@ fn point(block: &[u8], machine: &mut impl Machine) -> Result<Point, Trouble> {
     Ok(point)
 }
 
-/// G29 without S.
+/// G29 without S: probes three points.
 #[inline(never)]
 #[small]
 fn level(at: u8, block: &[u8], machine: &mut impl Machine) -> Next {
@@ -228,12 +229,12 @@ fn level(at: u8, block: &[u8], machine: &mut impl Machine) -> Next {
             bed(machine)?.add([over_x, over_y, touched])?;
             Ok(Step::Later(at + 1))
         }
-        // Somebody has ended the move.
+        // The move was interrupted.
         _ => Err(Status::Terminated.into()),
     }
 }
 
-/// Whether three points can be probed, before anything moves.
+/// Checks, before anything moves, whether three points can be probed.
 #[inline(never)]
 #[small]
 fn check(block: &[u8], machine: &mut impl Machine) -> Result<(), Trouble> {
@@ -253,17 +254,17 @@ fn check(block: &[u8], machine: &mut impl Machine) -> Result<(), Trouble> {
     for [x, y] in places(block, machine)? {
         level.add([x, y, Length::ZERO])?;
     }
-    // Some may be at one place.
+    // Two of the points may coincide.
     if level.is_known() { Ok(()) } else { Err(Fault::Line.into()) }
 }
 
-/// 1 while the probe touches, 0 while it does not, -1 if there is none.
+/// Returns 1 while the probe touches, 0 while it does not, -1 if there is no probe.
 #[small]
 fn probe(machine: &mut impl Machine) -> i32 {
     machine.value(Value::Input(inputs::PROBE as u8))
 }
 
-/// From where to where an axis may go, if that is set.
+/// Returns the travel of an axis; `None` if it is not set.
 #[inline(never)]
 #[small]
 fn travel(axis: usize, machine: &mut impl Machine) -> Option<[Length; 2]> {
@@ -273,7 +274,7 @@ fn travel(axis: usize, machine: &mut impl Machine) -> Option<[Length; 2]> {
     is_set.then_some([low, high])
 }
 
-/// X and Y of the points.
+/// Returns X and Y of the three points.
 #[inline(never)]
 #[small]
 fn places(block: &[u8], machine: &mut impl Machine) -> Result<[[Length; 2]; POINTS], Trouble> {
@@ -283,7 +284,7 @@ fn places(block: &[u8], machine: &mut impl Machine) -> Result<[[Length; 2]; POIN
     Ok([[left, front], [right, front], [middle, back]])
 }
 
-/// Where the outermost points are along an axis.
+/// Returns the outermost positions of the points along an axis.
 #[inline(never)]
 #[small]
 fn edges(
@@ -310,7 +311,7 @@ fn edges(
     Ok(edges)
 }
 
-/// Z below which the bed is not, and above which it is not.
+/// Returns the Z range of the search: the bed is between the two heights.
 #[inline(never)]
 #[small]
 fn heights(block: &[u8], machine: &mut impl Machine) -> Result<[Length; 2], Trouble> {
@@ -327,7 +328,7 @@ fn heights(block: &[u8], machine: &mut impl Machine) -> Result<[Length; 2], Trou
     Ok([bottom.saturating_sub(height), high])
 }
 
-/// Where the machine is.
+/// Returns the position of the machine.
 #[inline(never)]
 #[small]
 fn here(machine: &mut impl Machine) -> Point {
@@ -342,7 +343,7 @@ fn bed(machine: &mut impl Machine) -> Result<&mut Bed, Trouble> {
     machine.bed().ok_or(Trouble::Status(Status::NotBuiltIn))
 }
 
-/// Begins with a move. The next part is behind it.
+/// Starts an operation. The part after `at` follows it.
 #[inline(never)]
 #[small]
 fn go(what: Level, at: u8, machine: &mut impl Machine) -> Next {
@@ -352,13 +353,13 @@ fn go(what: Level, at: u8, machine: &mut impl Machine) -> Next {
     }
 }
 
-/// Moves follow the plane from now on, or do not. The next part is `then`.
+/// Makes moves follow the plane, or not. The part `then` follows.
 #[small]
 fn follow(follows: bool, then: u8, machine: &mut impl Machine) -> Next {
     go(Level::Follow(follows), then - 1, machine)
 }
 
-/// Part `at` of what is known.
+/// Writes part `at` of the list of points.
 #[inline(never)]
 #[small]
 fn list(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Step {

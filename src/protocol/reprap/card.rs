@@ -1,4 +1,4 @@
-//! Files on an SD card: M20 to M27, M30 with a name, M32. While one is printed M25 to M27 and M24 alone are carried out.
+//! Files on an SD card: M20 to M27, M30 with a name, M32. While a file is printed only M24 to M27 are carried out.
 
 use super::command::{value, words};
 use super::host::Step;
@@ -9,7 +9,7 @@ use crate::protocol::{Machine, Out};
 use crate::status::Status;
 use crate::text;
 
-/// Does part `at` of a code.
+/// Performs part `at` of a code.
 #[inline(never)]
 #[small]
 pub fn part(
@@ -50,7 +50,7 @@ fn done(status: Status) -> Step {
     if status == Status::Ok { Step::Done } else { Step::Refused(status) }
 }
 
-/// The name of a file, without what hosts put around it.
+/// Returns the name of a file, without the characters that hosts put around it.
 #[small]
 fn name(block: &[u8]) -> &[u8] {
     let name = words(block);
@@ -60,7 +60,7 @@ fn name(block: &[u8]) -> &[u8] {
     name.get(..end).unwrap_or(&[])
 }
 
-/// The files, one in each part.
+/// Lists the files, one per part.
 #[small]
 fn list(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Step {
     if at == 0 {
@@ -123,7 +123,8 @@ fn open(number: u16, at: u8, block: &[u8], machine: &mut impl Machine, out: &mut
     if number == 32 { done(machine.card(Op::Print(true))) } else { Step::Done }
 }
 
-/// OctoPrint takes a print that is paused for one that has been begun at the printer, if its bytes are told.
+/// Reports the progress. Only while a file prints: if a paused print told its bytes, OctoPrint would take it for a
+/// print that was started at the printer.
 #[small]
 fn progress(machine: &mut impl Machine, out: &mut impl Out) {
     let prints = machine.card_prints();

@@ -1,9 +1,10 @@
-//! Which code a line has, and its words.
+//! Recognizes the code of a line, and finds its words.
 
 use super::frame::{Frame, Sum, integer};
 use crate::config::Number;
 
-/// The code of a block, its letter in upper case: the first word, if that is G, M or T with a whole number.
+/// Returns the code of a block, with its letter in upper case: the first word, if that is G, M or T with a whole
+/// number. `None` otherwise.
 #[inline(never)]
 #[small]
 pub fn code(block: &[u8]) -> Option<(u8, u16)> {
@@ -21,7 +22,7 @@ pub fn code(block: &[u8]) -> Option<(u8, u16)> {
     Some((letter, u16::try_from(number).ok()?))
 }
 
-/// The M code of a line whose checksum, if it has one, is right.
+/// Returns the M code of a line; `None` if the line has another code or a wrong checksum.
 fn whole(frame: &Frame, line: &[u8]) -> Option<u16> {
     match code(frame.block.of(line)) {
         Some((b'M', number)) if frame.sum != Sum::Wrong => Some(number),
@@ -29,13 +30,13 @@ fn whole(frame: &Frame, line: &[u8]) -> Option<u16> {
     }
 }
 
-/// M112.
+/// Whether the line is M112.
 #[small]
 pub fn is_stop(frame: &Frame, line: &[u8]) -> bool {
     whole(frame, line) == Some(112)
 }
 
-/// Whether a line overtakes those that wait.
+/// Whether a line overtakes the lines that wait.
 #[inline(never)]
 #[small]
 pub fn overtakes(frame: &Frame, line: &[u8]) -> bool {
@@ -46,14 +47,14 @@ pub fn overtakes(frame: &Frame, line: &[u8]) -> bool {
     }
 }
 
-/// Whether a code is answered when it is done: hosts take its `ok` for the end of the wait.
+/// Whether a code is answered only when it is done, because hosts take its `ok` for the end of the wait.
 #[inline(never)]
 #[small]
 pub fn waits(code: Option<(u8, u16)>) -> bool {
     matches!(code, Some((b'M', 0 | 1 | 109 | 116 | 190)))
 }
 
-/// What is behind the code of a block.
+/// Returns the text behind the code of a block.
 #[inline(never)]
 #[small]
 pub fn words(block: &[u8]) -> &[u8] {
@@ -62,20 +63,20 @@ pub fn words(block: &[u8]) -> &[u8] {
     rest.get(digits..).unwrap_or(&[]).trim_ascii()
 }
 
-/// Whether a block has a word of this letter behind its code.
+/// Whether a block has a word with this letter behind its code.
 #[inline(never)]
 #[small]
 pub fn has(block: &[u8], letter: u8) -> bool {
     without_comment(block).iter().any(|byte| byte.to_ascii_uppercase() == letter)
 }
 
-/// What is behind the code of a block, up to a comment.
+/// Returns the text behind the code of a block, up to a comment.
 #[small]
 fn without_comment(block: &[u8]) -> &[u8] {
     words(block).split(|byte| *byte == b';').next().unwrap_or(&[])
 }
 
-/// The number behind a letter, if there is one.
+/// Returns the number behind a letter; `None` if there is none.
 #[inline(never)]
 #[small]
 pub fn number(block: &[u8], letter: u8) -> Option<Number> {
@@ -87,7 +88,7 @@ pub fn number(block: &[u8], letter: u8) -> Option<Number> {
     Number::parse(text.get(..end)?)
 }
 
-/// The number behind a letter, kept with so many decimals.
+/// Returns the number behind a letter, scaled to `decimals` decimals.
 #[inline(never)]
 #[small]
 pub fn value(block: &[u8], letter: u8, decimals: u8) -> Option<i32> {

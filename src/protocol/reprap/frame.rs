@@ -1,64 +1,66 @@
-//! `N12 G1 X10*34`: the number of a line and its checksum, and what is between them.
+//! The frame of a line, as in `N12 G1 X10*34`: its number, its checksum, and the block between them.
 //!
-//! The checksum is the exclusive or of all bytes before the asterisk. It is checked in a line that begins with N, and in every line of a port whose lines
-//! have had numbers and checksums; else an asterisk is text. Such a port takes a line without one of the two for damaged, if it has the other: a byte of it
-//! may have been changed on its way. So is a line whose number cannot be read, or that has a byte 0, which changes no checksum.
+//! The checksum is the exclusive or of all bytes before the asterisk. It is checked in a line that begins with N, and
+//! in every line of a port that has received numbers and checksums. In other lines an asterisk is plain text. A port
+//! that has received numbers and checksums treats a line with only one of the two as damaged, because a transmission
+//! error may have changed the other. A line is also damaged if its number cannot be read, or if it has a byte 0,
+//! which does not change the checksum.
 
 use crate::protocol::Span;
 
-/// What a port keeps of its sender.
+/// What a port keeps about its sender.
 #[derive(Clone, Copy, Default)]
 pub struct Session {
-    /// The number of the last line that was taken.
+    /// The number of the last line in order.
     pub last: i32,
-    /// The number of a line that overtook those before it, and does not come again.
+    /// The number of a line that has overtaken those before it, and does not come again.
     ahead: i32,
-    /// A line with a number and a right checksum has come.
+    /// Whether a line with a number and a right checksum has been received.
     pub sums: bool,
-    /// Lines that have been begun, modulo 256.
+    /// The number of lines begun, modulo 256.
     pub lines: u8,
 }
 
-/// A tenth of the highest number.
+/// A tenth of the highest line number.
 const MOST: i32 = 99_999_999;
 
-/// What a line has for a checksum.
+/// The state of a line's checksum.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Sum {
-    /// None.
+    /// There is no checksum.
     None,
-    /// That of its bytes.
+    /// The checksum matches.
     Right,
-    /// Another one.
+    /// The checksum does not match.
     Wrong,
 }
 
 /// The parts of a line.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Frame {
-    /// N.
+    /// The number behind N; `None` if there is none or it cannot be read.
     pub number: Option<i32>,
-    /// It begins with N, whether a number can be read there or not.
+    /// Whether the line begins with N, even if the number cannot be read.
     pub numbered: bool,
-    /// Its checksum.
+    /// The state of the checksum.
     pub sum: Sum,
-    /// What is between them, without blanks at its ends.
+    /// The block between number and checksum, without blanks at its ends.
     pub block: Span,
 }
 
-/// Why a line is to be sent again.
+/// Why a line has to be sent again.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Fault {
-    /// Its checksum is that of other bytes.
+    /// The checksum does not match.
     Sum,
-    /// It has no checksum, and others have.
+    /// The checksum is missing, while other lines have one.
     NoSum,
-    /// Another number is expected.
+    /// The number is not the expected one.
     Number,
 }
 
 impl Frame {
-    /// The parts of a line. Cost on AVR: 12 cycles a byte and 500.
+    /// Splits a line into its parts. Cost on AVR: 12 cycles a byte and 500.
     #[inline(never)]
     #[small]
     pub fn of(line: &[u8]) -> Self {
@@ -95,7 +97,7 @@ impl Frame {
             {
                 behind += 1;
             }
-            // No fraction.
+            // A number with a fraction is not a line number.
             let ends = line.get(behind) != Some(&b'.');
             number = line.get(first..behind).filter(|_| ends).and_then(integer);
             if number.is_some() {
@@ -111,7 +113,7 @@ impl Frame {
         Self { number, numbered, sum, block: Span { start: start as u8, end: end as u8 } }
     }
 
-    /// What is between number and checksum; of a line whose asterisk is text, what is behind the number.
+    /// Returns the text between number and checksum. If the asterisk is plain text: everything behind the number.
     #[small]
     pub fn text(&self, line: &[u8]) -> Span {
         let Span { start, end } = self.block;
@@ -120,8 +122,8 @@ impl Frame {
     }
 }
 
-/// Where the checksum begins: the last asterisk with nothing but digits behind it. One with other bytes behind it counts in a line that
-/// begins with a number, whose checksum may be damaged.
+/// Returns where the checksum begins: at the last asterisk, if only digits follow it. In a line that begins with N
+/// other bytes may follow it, because the checksum may be damaged.
 fn asterisk(line: &[u8]) -> Option<usize> {
     let at = line.iter().rposition(|byte| *byte == b'*')?;
     let behind = line.get(at + 1..).unwrap_or(&[]).trim_ascii();
@@ -130,7 +132,7 @@ fn asterisk(line: &[u8]) -> Option<usize> {
     (digits || numbered).then_some(at)
 }
 
-/// Digits, with a sign or without.
+/// Parses digits with an optional minus sign; `None` for other text or a number that is too large.
 #[inline(never)]
 #[small]
 pub fn integer(text: &[u8]) -> Option<i32> {
@@ -151,7 +153,8 @@ pub fn integer(text: &[u8]) -> Option<i32> {
 
 #[small]
 impl Session {
-    /// Takes a line, or says why it is to be sent again. `sets`: the number to go on from, of M110; `overtakes`: it has come before those that wait.
+    /// Takes a line, or returns why it has to be sent again. `sets`: the number to continue from, by M110.
+    /// `overtakes`: whether the line has come before lines that wait.
     #[inline(never)]
     pub fn take(&mut self, frame: &Frame, sets: Option<i32>, overtakes: bool) -> Result<(), Fault> {
         self.lines = self.lines.wrapping_add(1);
@@ -189,8 +192,9 @@ impl Session {
     }
 }
 
-/// The block of a line without number and checksum, or of one that has the right ones, and comes next. `None`, and nothing done, for all others; blanks are left
-/// to who reads the block. What [`Frame::of`] and [`Session::take`] do, in a fifth of the time. Cost on AVR: 12 cycles a byte and 150.
+/// Takes a line in a usual form: one that does not begin with a capital N, or one with the next number and the right
+/// checksum. `None`, without any change, for all other lines. Blanks are left in the block. Does what [`Frame::of`]
+/// and [`Session::take`] do, in a fifth of the time. Cost on AVR: 12 cycles a byte and 150.
 #[inline(never)]
 pub fn fast_path(line: &[u8], session: &mut Session) -> Option<Span> {
     let mut end = line.len();
@@ -209,7 +213,7 @@ pub fn fast_path(line: &[u8], session: &mut Session) -> Option<Span> {
         behind = rest;
     };
     end -= stated.len() + 1;
-    // In 16 bits: on AVR a checked product of 8 bits does not tell of its overflow.
+    // In 16 bits, because on AVR a checked 8-bit product does not detect its overflow.
     let mut says = 0u16;
     for byte in stated {
         let digit = byte.wrapping_sub(b'0');
@@ -218,7 +222,7 @@ pub fn fast_path(line: &[u8], session: &mut Session) -> Option<Span> {
         }
         says = says * 10 + u16::from(digit);
     }
-    // More than nine digits are none that is taken.
+    // A long number may wrap. The check of `start` below rejects numbers of more than seven digits.
     let (mut number, mut start) = (0u32, 1u8);
     let mut digits = numbered;
     while let Some((byte, rest)) = digits.split_first() {
@@ -240,7 +244,7 @@ pub fn fast_path(line: &[u8], session: &mut Session) -> Option<Span> {
     Some(Span { start, end: end as u8 })
 }
 
-/// Whether a line is said in this dialect alone: one with a number and a checksum, M105, M110, M115.
+/// Whether a line is valid in this dialect alone: one with a number and a checksum, or M105, M110, M115.
 #[inline(never)]
 #[small]
 pub fn is_own(line: &[u8]) -> bool {
@@ -346,7 +350,7 @@ mod tests {
                 assert_eq!(of(fast), of(slow), "{line}");
                 assert_eq!(block.of(line.as_bytes()).trim_ascii(), frame.block.of(line.as_bytes()));
             }
-            // Those without a number, and two or three with.
+            // Those without a number, and two or three with a number.
             assert_eq!(usual_ones, if ahead == 0 { 5 } else { 2 });
         }
     }

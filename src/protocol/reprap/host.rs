@@ -1,4 +1,4 @@
-//! The codes that are not for the interpreter: they ask something, set something, or wait.
+//! The codes that the interpreter does not run: they query something, set something, or wait.
 
 use super::command::{has, value, words};
 use super::write::{cold, fixed, int, line_end, text};
@@ -13,24 +13,24 @@ use crate::status::Status;
 use crate::text;
 use crate::units::Length;
 
-/// A letter in upper case, and a number.
+/// The code of a line: a letter in upper case, and a number.
 pub type Code = (u8, u16);
 
-/// How far a code has come.
+/// The progress of a code.
 pub enum Step {
-    /// It goes on with this part.
+    /// Continue with this part at once.
     At(u8),
-    /// It goes on later.
+    /// Continue with this part later.
     Later(u8),
-    /// `ok`.
+    /// Answer `ok`.
     Done,
-    /// It has said `ok` itself.
+    /// The code has written its own `ok`.
     Answered,
-    /// It has not been carried out.
+    /// The code is refused.
     Refused(Status),
 }
 
-/// Bytes of a text that are put in a step.
+/// The most bytes of a text that a step writes.
 const PART: usize = 60;
 /// All axes, as bits.
 const ALL: u8 = u8::MAX;
@@ -39,13 +39,13 @@ const HOMED: [u8; 3] = *b"XYZ";
 /// The axis of the extruder.
 const EXTRUDER: u8 = 3;
 
-/// The code, if it is one of those here.
+/// Returns the code, if it is one of those in this module.
 #[inline(never)]
 #[small]
 pub fn of(code: Option<Code>, block: &[u8]) -> Option<Code> {
     let is_own = match code? {
         (b'M', 20..=27 | 32) => true,
-        // Without a name it ends the program.
+        // M30 without a file name ends the program, so the interpreter runs it.
         (b'M', 30) => !words(block).is_empty(),
         (b'G', 10 | 11 | 28 | 161 | 162) => true,
         (b'G', 29) | (b'M', 420) => Capability::BedPlane.is_built_in(),
@@ -60,7 +60,7 @@ pub fn of(code: Option<Code>, block: &[u8]) -> Option<Code> {
     code.filter(|_| is_own)
 }
 
-/// Does part `at` of a code.
+/// Performs part `at` of a code.
 #[inline(never)]
 #[small]
 pub fn part(
@@ -135,7 +135,7 @@ pub fn part(
     }
 }
 
-/// M400: what has been asked for is done, or an alarm has dropped it.
+/// M400: waits until all requested motion is done, or an alarm has dropped it.
 #[small]
 fn finished(machine: &mut impl Machine) -> Step {
     match machine.doing() {
@@ -153,7 +153,7 @@ fn listed(next: Option<u8>) -> Step {
     next.map_or(Step::Done, Step::At)
 }
 
-/// G10 and G11. One that has been carried out already does nothing.
+/// G10 and G11. Repeating the last one does nothing.
 #[inline(never)]
 #[small]
 fn retract(back: bool, machine: &mut impl Machine, out: &mut impl Out) -> Step {
@@ -179,11 +179,11 @@ fn retract(back: bool, machine: &mut impl Machine, out: &mut impl Out) -> Step {
     }
 }
 
-/// M207: S is the length, F the speed.
+/// M207: S is the length of the retraction, F its speed.
 #[small]
 fn set_retraction(block: &[u8], machine: &mut impl Machine) -> Step {
     let (length, feed) = (value(block, b'S', 4), value(block, b'F', 0));
-    // A meter would be no retraction.
+    // Limits the length to a metre.
     if length.is_some_and(|length| !(0..10_000_000).contains(&length))
         || feed.is_some_and(|feed| !(1..=60_000).contains(&feed))
     {
@@ -195,7 +195,7 @@ fn set_retraction(block: &[u8], machine: &mut impl Machine) -> Step {
     Step::Done
 }
 
-/// The axes that a block names, as bits; all if it names none.
+/// Returns the axes that a block names, as bits; [`ALL`] if it names none.
 #[inline(never)]
 #[small]
 fn axes(block: &[u8]) -> u8 {
@@ -206,7 +206,8 @@ fn axes(block: &[u8]) -> u8 {
     if axes == 0 { ALL } else { axes }
 }
 
-/// G28, and G161 and G162 where the switch is at the end that they name: at rest, and answered when the axes are homed.
+/// G28, G161 and G162. G161 and G162 need homing switches at the end that they name. Runs at rest, and is answered
+/// when homing is over.
 #[inline(never)]
 #[small]
 fn home(at: u8, number: u16, block: &[u8], machine: &mut impl Machine) -> Step {
@@ -239,8 +240,8 @@ fn home(at: u8, number: u16, block: &[u8], machine: &mut impl Machine) -> Step {
     if homed == 0 { Step::Refused(Status::HomingFailed) } else { Step::Done }
 }
 
-/// M84, M18: the motors of the axes that are named, or all, lose their power when the machine rests. With S none does: that says how long motors have power
-/// at rest, which is a setting here.
+/// M84, M18: turns off the named motors, or all, once the machine rests. With S nothing is turned off: S is the time
+/// for which motors stay powered at rest, which is a setting in Kerf.
 #[inline(never)]
 #[small]
 fn motors_off(block: &[u8], machine: &mut impl Machine) -> Step {
@@ -264,7 +265,7 @@ fn motors_off(block: &[u8], machine: &mut impl Machine) -> Step {
     Step::Done
 }
 
-/// M118: the text comes back, with `A1` behind `//`, with `E1` behind `echo:`; `P0`, the port, is left out.
+/// M118: sends the text back, after `//` for `A1` and after `echo:` for `E1`. `P0`, the port, is left out.
 #[small]
 fn echo(at: u8, block: &[u8], out: &mut impl Out) -> Step {
     let mut rest = words(block);
@@ -284,7 +285,7 @@ fn echo(at: u8, block: &[u8], out: &mut impl Out) -> Step {
     Step::Done
 }
 
-/// M220: S percent of the feed rates that are programmed.
+/// M220: sets the feed rate to S percent of the programmed one; without S reports it.
 #[small]
 fn speed(block: &[u8], machine: &mut impl Machine, out: &mut impl Out) -> Step {
     let Some(factor) = value(block, b'S', 1) else {
@@ -300,7 +301,7 @@ fn speed(block: &[u8], machine: &mut impl Machine, out: &mut impl Out) -> Step {
     }
 }
 
-/// M221: S percent of the filament that is programmed.
+/// M221: sets the flow of filament to S percent of the programmed one; without S reports it.
 #[small]
 fn flow(block: &[u8], machine: &mut impl Machine, out: &mut impl Out) -> Step {
     match value(block, b'S', 1) {
@@ -315,7 +316,8 @@ fn flow(block: &[u8], machine: &mut impl Machine, out: &mut impl Out) -> Step {
     }
 }
 
-/// M302: S is how hot filament must be to be moved, with 0 and P1 it may be cold; without both they are told.
+/// M302: S is the temperature from which filament may be moved. S0 or P1 allow any temperature. Without S and P the limit is
+/// reported.
 #[inline(never)]
 #[small]
 fn extrude_cold(block: &[u8], machine: &mut impl Machine, out: &mut impl Out) -> Step {
@@ -340,7 +342,7 @@ fn extrude_cold(block: &[u8], machine: &mut impl Machine, out: &mut impl Out) ->
     Step::Done
 }
 
-/// M900: K is the pressure advance, s; without it that is told.
+/// M900: K sets the pressure advance, in s; without K it is reported.
 #[small]
 fn advance(block: &[u8], machine: &mut impl Machine, out: &mut impl Out) -> Step {
     const MOST: u16 = 20_000;
@@ -372,7 +374,7 @@ fn percent(what: Text, thousandths: i32, out: &mut impl Out) -> Step {
     Step::Done
 }
 
-/// M502.
+/// M502: restores the defaults.
 #[small]
 fn restore(at: u8, machine: &mut impl Machine) -> Step {
     if at == 0 && machine.value(Value::Working) != 0 {
@@ -387,7 +389,7 @@ fn restore(at: u8, machine: &mut impl Machine) -> Step {
     if machine.value(Value::Kept) == 0 { Step::Later(1) } else { Step::Done }
 }
 
-/// A count behind a letter.
+/// Writes a letter and a count.
 #[small]
 pub fn count(letter: u8, value: i32, out: &mut impl Out) {
     out.put(b' ');

@@ -1,27 +1,29 @@
-//! The RepRap dialect: one `ok` for each line, line numbers and checksums, M codes for everything.
+//! The dialect of RepRap: one `ok` per line, line numbers and checksums, M codes for everything.
 //!
-//! Pure and synchronous, in thread mode, as every dialect. A line becomes a [`Request`], what the machine tells a [`Telling`]. A port keeps
-//! the number of its last line ([`Session`]); settings are views of Kerf's own ([`settings`]).
+//! Pure and synchronous, in thread mode, as every dialect. A line becomes a [`Request`], a notice of the machine a
+//! [`Telling`]. Each port keeps the number of its last line ([`Session`]). The settings are views of Kerf's own
+//! ([`settings`]).
 //!
-//! | module | what it has |
+//! | module | contents |
 //! |---|---|
-//! | [`frame`] | `N12 ... *34`: line number, checksum and what is between them |
-//! | [`command`] | which code a line has, and its words |
-//! | [`translate`] | moves and modes in the words of the interpreter: E is its A |
-//! | [`request`] | a line on its way to its answer |
-//! | [`host`] | the codes that ask or set something |
+//! | [`frame`] | `N12 ... *34`: line number, checksum, and the block between them |
+//! | [`command`] | recognizes the code of a line, and finds its words |
+//! | [`translate`] | translates moves and modes for the interpreter, where E is the A axis |
+//! | [`request`] | answers a line |
+//! | [`host`] | the codes that query or set something |
 //! | [`settings`] | M92, M201 to M206, M503 |
 //! | [`bed`] | G29, M420: the plane of the bed |
 //! | [`card`] | M20 to M27, M30, M32: the SD card |
 //! | [`report`] | M105, M114, M115, M119 |
 //! | [`tuning`] | M301, M303, M304 |
-//! | [`telling`] | what is told unasked |
+//! | [`telling`] | what is reported without being asked |
 //! | [`write`](mod@write) | numbers and texts |
 //!
-//! A line is answered in its order, when the planner has taken what it asks for. M105, M108, M112 and M114 overtake where they have no line number;
-//! M108 and M112 overtake with one, too. A damaged line is never carried out: its sender is asked to send it again. A step
-//! costs at most 15,000 cycles, with a setting that is in EEPROM 3 ms. Nothing here can be full. A plain move takes none of these steps: [`frame::fast_path`] looks at its number and
-//! checksum, and the interpreter reads it as it is.
+//! A line is answered in order, when the planner has taken its motion. M105 and M114 overtake if they have no line
+//! number; M108 and M112 always overtake. A damaged line is never carried out: the sender is asked to send it again.
+//! A step costs at most 15,000 cycles, or 3 ms with a setting that is in EEPROM. No buffer here can overflow. A plain
+//! move takes none of these steps: [`frame::fast_path`] checks its number and checksum, and the interpreter reads it
+//! untranslated.
 
 mod bed;
 mod card;
@@ -48,23 +50,23 @@ pub use frame::Session;
 pub use request::Request;
 pub use telling::Telling;
 
-/// What [`Settings::dialect_of`] says of a port that begins in this dialect.
+/// The value of [`Settings::dialect_of`] for a port that begins in this dialect.
 const CHOSEN: u8 = 4;
 
 /// The dialect.
 pub struct RepRap;
 
-/// What the machine keeps for its senders.
+/// What the dialect remembers of its senders' requests.
 pub struct Retraction {
-    /// M207 S: how far G10 pulls the filament back, in units of a `Length`.
+    /// M207 S: how far G10 retracts the filament, in units of a `Length`.
     length: i32,
-    /// M208 S: how much farther G11 pushes it.
+    /// M208 S: how much farther G11 pushes it back.
     extra: i32,
-    /// M207 F, mm/min.
+    /// M207 F: the speed of G10 and G11, mm/min.
     feed: i32,
-    /// G10 has been carried out, and no G11 since.
+    /// Whether G10 has retracted the filament, with no G11 since.
     retracted: bool,
-    /// M155 S: seconds between two reports of temperatures; 0 for none.
+    /// M155 S: seconds from one report of temperatures to the next; 0 for none.
     interval_s: u8,
 }
 
@@ -86,7 +88,7 @@ impl Dialect for RepRap {
     type Telling = Telling;
     type Memory = Retraction;
 
-    /// A `!` in M117 is text, and a `?` is.
+    /// A `!` or a `?` may be part of a text, as in M117.
     const IS_PLAIN: bool = true;
 
     fn speech(_settings: &Settings) -> Session {
@@ -128,7 +130,7 @@ impl Dialect for RepRap {
         Telling::begin(notice, machine)
     }
 
-    /// None: [`Dialect::fast_path`] looks through a line for its checksum first.
+    /// None, because [`Dialect::fast_path`] has to check the line's checksum first.
     #[inline(always)]
     fn brief(_session: Session, _settings: &Settings) -> Option<bool> {
         None

@@ -1,4 +1,4 @@
-//! M105, M114, M115, M119.
+//! The reports of M105, M114, M115, M119.
 
 use super::host::{Step, count};
 use super::settings;
@@ -9,11 +9,11 @@ use crate::plain;
 use crate::protocol::{Machine, Out, Value};
 use crate::text;
 
-/// The letters of the axes: E is the interpreter's A.
+/// The letters of the axes: E is the A axis of the interpreter.
 const LETTERS: [u8; 4] = *b"XYZE";
 
-/// Puts part `at` of ` T:21.50 /0.00 B:20.75 /0.00 @:0 B@:0`, without its end; nothing in an image without heaters. Returns the next part, `None`
-/// behind the last.
+/// Writes part `at` of ` T:21.50 /0.00 B:20.75 /0.00 @:0 B@:0`, without a line end. Returns the next part; `None`
+/// after the last. Writes nothing in an image without heaters.
 #[inline(never)]
 #[small]
 pub fn temperatures(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Option<u8> {
@@ -25,20 +25,20 @@ pub fn temperatures(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> O
         degrees(stands.to.into(), out);
     } else {
         text(out, if at == 2 { text!(" @:") } else { text!(" B@:") });
-        // Hosts know a share of 127.
+        // Hosts expect a power from 0 to 127.
         int(out, (stands.power >> 1).into());
     }
     (at < 3).then_some(at + 1)
 }
 
-/// Eighths of a degree, with two decimals.
+/// Writes eighths of a degree as degrees with two decimals.
 #[small]
 fn degrees(eighths: i32, out: &mut impl Out) {
     let thousandths = Fixed { value: eighths * 125, decimals: 3 };
     fixed(out, thousandths.rounded(2).padded(2));
 }
 
-/// M105: the temperatures come behind `ok`, in one line.
+/// M105: reports the temperatures behind the `ok`, in one line.
 #[small]
 pub fn answer(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Step {
     if at == 0 {
@@ -52,7 +52,7 @@ pub fn answer(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Step {
     Step::Answered
 }
 
-/// M114: where the machine is by now, and the steps of its motors.
+/// M114: reports the present position of the machine, and the steps of its motors.
 #[inline(never)]
 #[small]
 pub fn position(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Option<u8> {
@@ -79,7 +79,7 @@ pub fn position(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Optio
     None
 }
 
-/// M115: who the machine is, and what it can.
+/// M115: reports what the machine is and what it supports.
 #[inline(never)]
 #[small]
 pub fn identity(at: u8, out: &mut impl Out) -> Option<u8> {
@@ -101,7 +101,7 @@ pub fn identity(at: u8, out: &mut impl Out) -> Option<u8> {
     Some(at + 1)
 }
 
-/// M119: the switches that are set up.
+/// M119: reports the switches that are set up.
 #[inline(never)]
 #[small]
 pub fn switches(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Option<u8> {

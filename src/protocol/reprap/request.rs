@@ -1,7 +1,8 @@
-//! A line on its way to its answer.
+//! Answers a line.
 //!
-//! What a code tells comes before `ok`, a part each step. What has to be waited for (rest, homing, memory) is asked for each millisecond,
-//! 2,000 cycles; nothing of the answer has been put then, so that others may talk.
+//! The output of a code comes before the `ok`, one part per step. What has to be waited for (rest, homing, memory) is
+//! polled each millisecond, at 2,000 cycles. Nothing of the answer has been written then, so other output may come
+//! first.
 
 use super::command;
 use super::frame::{Fault, Frame, Session};
@@ -13,44 +14,44 @@ use crate::protocol::{Answers, Extruder, Machine, Next, Out, Span};
 use crate::status::Status;
 use crate::{plain, text};
 
-/// A line.
+/// A line that is being answered.
 pub struct Request {
     what: What,
-    /// How far it has come; what it says depends on `what`. Of G-code: [`WAITS`], or 0.
+    /// The progress. Its meaning depends on `what`. For G-code: [`WAITS`], or 0.
     at: u8,
     block: Span,
     begun: bool,
     silent: bool,
 }
 
-/// What is to be done.
+/// What the next step does.
 #[derive(Clone, Copy)]
 enum What {
-    /// To say `ok`.
+    /// Writes `ok`.
     Nothing,
-    /// To carry out G-code.
+    /// Runs the line as G-code.
     Gcode,
-    /// To say that filament is too cold to be moved, and to carry out the rest of the line.
+    /// Reports that filament is too cold to be moved, and runs the line without the extruder.
     Cold,
-    /// To carry out what is left of it.
+    /// Runs the line again, after [`What::Cold`].
     Rest,
-    /// To do what a code says that is not for the interpreter.
+    /// Performs a code that the interpreter does not run.
     Host(Code),
-    /// To ask for a line behind this one.
+    /// Asks for the line after this one.
     Resend(Fault, i32),
-    /// To say why the line was not carried out.
+    /// Reports why the line was refused.
     Refused(Status),
 }
 
-/// Bytes of a line that are told in a step.
+/// The most bytes of a line that a step writes.
 const PART: usize = 40;
-/// G-code is answered when it is done.
+/// The line is answered only when its G-code is done.
 const WAITS: u8 = 1;
 /// M400.
 const FINISHED: Code = (b'M', 400);
 
 impl Request {
-    /// Begins with a line.
+    /// Starts to answer a line.
     #[inline(never)]
     #[small]
     pub(super) fn begin(line: &[u8], session: &mut Session) -> Self {
@@ -66,7 +67,7 @@ impl Request {
         Self { what, at, block: frame.text(line), begun: false, silent: false }
     }
 
-    /// A line that could not be kept, or has been dropped.
+    /// Starts to answer a line that could not be kept, or was dropped.
     #[small]
     pub(super) fn refused(status: Status, line: &[u8], session: &mut Session) -> Self {
         let frame = Frame::of(line);
@@ -81,7 +82,7 @@ impl Request {
     }
 }
 
-/// The line takes its place in the order.
+/// Checks the line's number and checksum, and counts the line.
 #[small]
 fn take(
     frame: &Frame,
@@ -179,7 +180,7 @@ impl Answers for Request {
 
 #[small]
 impl Request {
-    /// `Error:checksum mismatch, Last Line: 3`, and `Resend: 4`.
+    /// Writes `Error:checksum mismatch, Last Line: 3`, then `Resend: 4`.
     fn resend(&mut self, fault: Fault, last: i32, out: &mut impl Out) {
         if self.at == 0 {
             self.at = 1;
@@ -199,7 +200,7 @@ impl Request {
         line_end(out);
     }
 
-    /// `echo:Unknown command: "M777"`.
+    /// Writes `echo:Unknown command: "M777"`.
     fn unknown(&mut self, block: &[u8], out: &mut impl Out) {
         if self.at == 0 {
             text(out, text!("echo:Unknown command: \""));

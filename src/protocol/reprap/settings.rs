@@ -1,6 +1,6 @@
 //! M92, M201 to M206, M503: Kerf's settings under the codes of this dialect, in its units.
 //!
-//! Nothing is kept here. A setting is in memory by itself: M500 waits for that alone.
+//! Nothing is kept here. A setting is written to memory without being asked for, so M500 only waits for that.
 
 use super::command::number;
 use super::host::Step;
@@ -18,9 +18,9 @@ use crate::status::Status;
 use crate::text;
 use crate::units::Length;
 
-/// The letters of the axes: E is the interpreter's A.
+/// The letters of the axes: E is the A axis of the interpreter.
 const LETTERS: [u8; 4] = *b"XYZE";
-/// The codes of M503, in its order.
+/// The codes that M503 lists, in order.
 const LISTED: [u16; 5] = [92, 203, 201, 205, 206];
 
 #[inline(never)]
@@ -29,20 +29,20 @@ pub fn read(machine: &mut impl Machine, owner: Owner, token: [u8; 4]) -> i32 {
     named(owner, token).map_or(0, |setting| machine.setting(setting))
 }
 
-/// The axis that a motor moves; of X and Y together the one that the motor has in its place.
+/// Returns the axis that a motor moves. For a motor that drives X and Y together this is the axis that it stands for.
 #[small]
 pub fn axis_of(motor: u8, machine: &mut impl Machine) -> Option<u8> {
     let drives = u8::try_from(read(machine, Owner::Motor(motor), token("ma"))).ok()?;
     Some(kinematics::stands_for(drives)).filter(|axis| *axis < 6)
 }
 
-/// The first motor of an axis.
+/// Returns the first motor of an axis.
 #[small]
 pub fn motor_of(axis: u8, machine: &mut impl Machine) -> Option<u8> {
     (0..MOTORS as u8).find(|motor| axis_of(*motor, machine) == Some(axis))
 }
 
-/// Of these axes those that home at their upper ends, as bits.
+/// Returns those of `axes` that home at their upper ends, as bits.
 #[small]
 pub fn homed_at_upper_end(axes: u8, machine: &mut impl Machine) -> u8 {
     let mut upper = 0;
@@ -52,7 +52,7 @@ pub fn homed_at_upper_end(axes: u8, machine: &mut impl Machine) -> u8 {
     upper
 }
 
-/// The setting of an axis behind a code, and its factor: of M203, which is in mm/s.
+/// Returns the axis setting behind a code, and a factor. M203 is in mm/s, so its factor is 60.
 fn setting(code: u16) -> Option<([u8; 4], i32)> {
     match code {
         201 => Some((token("ac"), 1)),
@@ -62,7 +62,7 @@ fn setting(code: u16) -> Option<([u8; 4], i32)> {
     }
 }
 
-/// The value of a code on an axis.
+/// Returns the value of a code on an axis.
 #[inline(never)]
 #[small]
 fn value(code: u16, axis: u8, machine: &mut impl Machine) -> Fixed {
@@ -85,7 +85,8 @@ fn value(code: u16, axis: u8, machine: &mut impl Machine) -> Fixed {
     }
 }
 
-/// The letter of an axis behind a code. X, Y, Z and E of M205 are not read: they are speeds of another kind of planner, in mm/s.
+/// Returns the letter of an axis in a code. M205 has only J: its X, Y, Z and E are jerk speeds, in mm/s, of another
+/// kind of planner.
 #[small]
 fn letter(code: u16, axis: u8) -> u8 {
     match code {
@@ -94,7 +95,7 @@ fn letter(code: u16, axis: u8) -> u8 {
     }
 }
 
-/// What a code is called in M503.
+/// Returns the name of a code in M503.
 fn name(code: u16) -> Text {
     match code {
         92 => text!("echo:  M92"),
@@ -105,7 +106,7 @@ fn name(code: u16) -> Text {
     }
 }
 
-/// Puts the value of a code on an axis, part `at` of its line. Whether there is more.
+/// Writes the value of a code on an axis, part `at` of its line. Returns whether there is more.
 #[small]
 fn put(code: u16, at: u8, machine: &mut impl Machine, out: &mut impl Out) -> bool {
     if at == 0 {
@@ -114,7 +115,7 @@ fn put(code: u16, at: u8, machine: &mut impl Machine, out: &mut impl Out) -> boo
     out.put(b' ');
     out.put(letter(code, at));
     fixed(out, value(code, at, machine));
-    // All axes have one J; the extruder has no offset.
+    // J applies to all axes. The extruder has no offset.
     let last = match code {
         205 => 0,
         206 => 2,
@@ -126,7 +127,7 @@ fn put(code: u16, at: u8, machine: &mut impl Machine, out: &mut impl Out) -> boo
     at < last
 }
 
-/// Puts part `at` of M503. Returns the next part, `None` behind the last.
+/// Writes part `at` of M503. Returns the next part; `None` after the last.
 #[inline(never)]
 #[small]
 pub fn list(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Option<u8> {
@@ -144,7 +145,7 @@ pub fn list(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Option<u8
     (heats || usize::from(row) + 1 < LISTED.len()).then_some((row + 1) << 2)
 }
 
-/// Sets what a code names, axis by axis, or tells it if it names none.
+/// Sets the values that a code names, axis by axis; reports them if it names none.
 #[inline(never)]
 #[small]
 pub fn set(
@@ -156,7 +157,7 @@ pub fn set(
 ) -> Step {
     const TELLS: u8 = 8;
     if matches!(code, 202 | 204) {
-        // An axis has one acceleration: M201.
+        // An axis has a single acceleration, set by M201.
         return Step::Done;
     }
     if at >= TELLS {
@@ -173,7 +174,7 @@ pub fn set(
     let Some(to) = word(at) else { return Step::Later(at + 1) };
     match set_axis(code, at, to, machine) {
         Ok(()) => Step::Later(at + 1),
-        // Settings of motors change at rest.
+        // Settings of motors can only change at rest.
         Err(Status::Again) => Step::Later(at),
         Err(status) => Step::Refused(status),
     }
@@ -188,7 +189,7 @@ fn set_axis(code: u16, axis: u8, to: Number, machine: &mut impl Machine) -> Resu
     match code {
         92 => set_steps(axis, to, machine),
         203 => {
-            // In mm/s.
+            // M203 is in mm/s.
             let by_second = to.fixed(3, false).filter(|to| (0..=i32::MAX / 60).contains(to));
             let by_second = by_second.ok_or(Status::OutOfRange)?;
             let to = Number::int(by_second.unsigned_abs() * 60).thousandth();
@@ -217,7 +218,7 @@ pub fn put_number(
     machine.set(setting, value).map(|_| ())
 }
 
-/// Steps per millimetre become the travel in a turn of each motor of the axis.
+/// Sets the steps per millimetre of an axis, by the travel per turn of each of its motors.
 #[small]
 fn set_steps(axis: u8, to: Number, machine: &mut impl Machine) -> Result<(), Status> {
     let to = to.fixed(3, false).filter(|to| *to > 0).ok_or(Status::OutOfRange)?;

@@ -1,10 +1,10 @@
-//! Why a line was not carried out, for people.
+//! Texts for people: why a line was refused.
 
 use crate::progmem::Text;
 use crate::status::Status;
 use crate::text;
 
-/// Whether there is no such code.
+/// Whether the status means that the code is unknown.
 #[small]
 pub fn is_unknown(status: Status) -> bool {
     matches!(
@@ -17,7 +17,8 @@ pub fn is_unknown(status: Status) -> bool {
     )
 }
 
-/// Whether a print goes on without a line that is refused: no move is missing, no heater is cold, and there is no alarm. Hosts leave the port when they read `Error:`.
+/// Whether a print continues after the refusal of this line: the line is no move, no heater stays cold, and there is
+/// no alarm. Such a refusal is not reported as `Error:`, because hosts disconnect when they read that.
 #[inline(never)]
 #[small]
 pub fn is_passed_over(status: Status, block: &[u8]) -> bool {
@@ -26,7 +27,7 @@ pub fn is_passed_over(status: Status, block: &[u8]) -> bool {
     !moves && of_words.contains(&(status as u8)) && status != Status::AboveMaximum
 }
 
-/// The reason.
+/// Returns the reason as text.
 #[inline(never)]
 #[small]
 pub fn reason(status: Status) -> Text {

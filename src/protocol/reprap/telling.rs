@@ -1,4 +1,4 @@
-//! A notice on its way out: the greeting, what has gone wrong, temperatures, and that a line takes long.
+//! Sends a notice: the greeting, exceptions, temperatures, and that a line takes long.
 
 use super::status::reason;
 use super::write::{line_end, text};
@@ -8,25 +8,25 @@ use crate::protocol::{Machine, Notice, Occasion, Out, Tells};
 use crate::status::Status;
 use crate::text;
 
-/// What is being told.
+/// What is being sent.
 pub enum Telling {
     /// Nothing.
     Nothing,
     /// `start`.
     Greeting,
-    /// Something has gone wrong, or has ended.
+    /// An exception: something has gone wrong, or has ended.
     Exception(Status),
     /// A line takes long.
     Busy,
     /// Temperatures, from this part on.
     Temperatures(u8),
-    /// How far an autotune is, from this part on.
+    /// The progress of an autotune, from this part on.
     Tuning(u8),
 }
 
 #[small]
 impl Telling {
-    /// Begins. What is told is what is so by now.
+    /// Starts to send a notice about the present state of the machine.
     #[inline(never)]
     pub(super) fn begin(notice: Notice, machine: &mut impl Machine) -> Self {
         match notice {

@@ -1,20 +1,21 @@
-//! A block in the words of the interpreter: E is its A, and codes that mean something else in RS274 become those that do what is meant.
+//! Translates a block for the interpreter. E becomes A, and codes with another meaning in RS274 become the codes that
+//! do what is meant.
 //!
 //! | RepRap | the interpreter's |
 //! |---|---|
-//! | G0 | G1: at F, as other firmwares of printers move |
+//! | G0 | G1: at F, as other printer firmware does |
 //! | G4 P in ms, S in s | G4 P in s |
 //! | G92 without words | G92 of X, Y, Z and E |
 //! | M0, M1, with a text or without | M0; with P or S G4 |
-//! | M2, M30 | M2: heaters and outputs off, modes as at first |
+//! | M2, M30 | M2: heaters and outputs off, default modes |
 //!
-//! G28 and G10 are not for the interpreter: [`host`](super::host) does what they ask for.
+//! G28 and G10 are not translated: [`host`](super::host) performs them.
 
 use super::command;
 use crate::protocol::Rewritten;
 use crate::status::Status;
 
-/// Writes a block down.
+/// Writes the translated block to `out`.
 #[inline(never)]
 #[small]
 pub fn block<'a>(block: &[u8], out: &'a mut Rewritten) -> Result<&'a [u8], Status> {
@@ -23,7 +24,7 @@ pub fn block<'a>(block: &[u8], out: &'a mut Rewritten) -> Result<&'a [u8], Statu
         Some((b'G', 4)) => dwell(block, out)?,
         Some((b'M', 0 | 1)) if has_time(block) => dwell(block, out)?,
         Some((b'M', 0 | 1)) => put(out, b"M0")?,
-        // An SD card's files are not deleted: there is none.
+        // M30 with a file name never comes here: `host` handles it.
         Some((b'M', 2 | 30)) => put(out, b"M2")?,
         Some((b'G', 92)) if !has_words(block) => put(out, b"G92X0Y0Z0A0")?,
         Some((b'G', 0)) => {
@@ -39,7 +40,7 @@ fn has_time(block: &[u8]) -> bool {
     time_ms(block).is_some()
 }
 
-/// P in ms, or S in s.
+/// Returns the time of a dwell in ms: S is in s, P in ms. `None` without either.
 #[small]
 fn time_ms(block: &[u8]) -> Option<i32> {
     command::value(block, b'S', 3).or_else(|| command::value(block, b'P', 0))
@@ -49,7 +50,7 @@ fn has_words(block: &[u8]) -> bool {
     command::words(block).first().is_some_and(|byte| *byte != b';')
 }
 
-/// A dwell of no more than it says.
+/// Writes `G4 P` with the time in seconds, and none of the block's other words.
 #[inline(never)]
 #[small]
 fn dwell(block: &[u8], out: &mut Rewritten) -> Result<(), Status> {
@@ -71,7 +72,7 @@ fn put(out: &mut Rewritten, text: &[u8]) -> Result<(), Status> {
     out.extend_from_slice(text).map_err(|_| Status::InputTooLong)
 }
 
-/// Copies words, without what is behind a semicolon. Cost on AVR: 30 cycles a byte.
+/// Copies words up to a semicolon. Cost on AVR: 30 cycles a byte.
 fn copy(text: &[u8], out: &mut Rewritten) -> Result<(), Status> {
     for byte in text {
         let byte = match byte {

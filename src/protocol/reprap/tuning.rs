@@ -1,4 +1,4 @@
-//! M303, and the factors of heaters: M301, M304, and in Teacup's units M130 to M132.
+//! M303, and the PID factors of heaters: M301 and M304, and M130 to M132 in Teacup's units.
 
 use super::command::{has, number, value};
 use super::host::Step;
@@ -11,22 +11,22 @@ use crate::protocol::{Machine, Out};
 use crate::status::Status;
 use crate::text;
 
-/// The letters of M301 and M304, which are those of the settings.
+/// The letters of M301 and M304, which are also those of the settings.
 const LETTERS: [u8; 3] = *b"PID";
-/// From this part on the factors are told.
+/// The first part that reports the factors.
 const TELLS: u8 = 8;
 
-/// Whose factors a code is about.
+/// Returns the owner of the factors that a code is about.
 fn owner(bed: bool) -> Owner {
     if bed { Owner::Bed } else { Owner::HotEnd }
 }
 
-/// The setting of a letter.
+/// Returns the name of the setting for a letter.
 fn name(letter: u8) -> [u8; 4] {
     [LETTERS.get(usize::from(letter)).map_or(0, u8::to_ascii_lowercase), 0, 0, 0]
 }
 
-/// M303: E is the heater, -1 the bed, S how hot, C how many cycles, U1 uses what is found.
+/// M303: E selects the heater (-1 is the bed), S the temperature, C the number of cycles; U1 uses the result.
 #[inline(never)]
 #[small]
 pub fn begin(block: &[u8], machine: &mut impl Machine, out: &mut impl Out) -> Step {
@@ -52,7 +52,8 @@ pub fn begin(block: &[u8], machine: &mut impl Machine, out: &mut impl Out) -> St
     }
 }
 
-/// Puts part `at` of how far an autotune is: the cycle, what has come of it. Returns the next part, `None` behind the last.
+/// Writes part `at` of the progress of an autotune: the cycle, or the result. Returns the next part; `None` after the
+/// last.
 #[inline(never)]
 #[small]
 pub fn put(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Option<u8> {
@@ -94,7 +95,7 @@ fn powers(tune: &Tune, out: &mut impl Out) {
     int(out, tune.swing.into());
 }
 
-/// 1/64 degree, with two decimals.
+/// Writes 1/64 degree as degrees with two decimals.
 #[small]
 fn degrees(name: Text, value: i16, out: &mut impl Out) {
     text(out, name);
@@ -112,7 +113,7 @@ fn ending(stage: Stage) -> Text {
     }
 }
 
-/// `echo:  M301 P20 I0.8 D80`, a letter at a time.
+/// Writes `echo:  M301 P20 I0.8 D80`, one letter per call.
 #[inline(never)]
 #[small]
 fn factor(bed: bool, letter: u8, value: Fixed, out: &mut impl Out) {
@@ -127,7 +128,7 @@ fn factor(bed: bool, letter: u8, value: Fixed, out: &mut impl Out) {
     }
 }
 
-/// Puts the factor of a letter of a heater's. Whether there is more.
+/// Writes one factor of a heater. Returns whether there is more.
 #[inline(never)]
 #[small]
 pub fn list(bed: bool, letter: u8, machine: &mut impl Machine, out: &mut impl Out) -> bool {
@@ -136,8 +137,8 @@ pub fn list(bed: bool, letter: u8, machine: &mut impl Machine, out: &mut impl Ou
     letter < 2
 }
 
-/// M130, M131, M132: S is a factor as Teacup has it, for quarters of a degree four times a second; P 1 is the bed. Without S the factors are
-/// told as M301 tells them.
+/// M130, M131, M132: S is a factor in Teacup's units (quarters of a degree, four times a second). P1 selects the bed.
+/// Without S the factors are reported as by M301.
 #[inline(never)]
 #[small]
 pub fn set_teacup(
@@ -158,7 +159,8 @@ pub fn set_teacup(
         }
         return if list(bed, at, machine, out) { Step::At(at + 1) } else { Step::Done };
     };
-    // Power for a degree, for a degree and second, and for a degree a second, over two seconds.
+    // Converts to power per degree, per degree and second, and per degree a second; Teacup takes the difference over
+    // two seconds.
     let (letter, factor) = match code {
         130 => (0, 4),
         131 => (1, 16),
@@ -174,7 +176,7 @@ pub fn set_teacup(
     }
 }
 
-/// M301, of the bed M304: sets the factors that are named, or tells all if none is.
+/// M301, and M304 for the bed: sets the factors that are named, or reports all if none is.
 #[inline(never)]
 #[small]
 pub fn set(

@@ -6,19 +6,19 @@ use crate::text;
 
 pub use crate::protocol::write::{fixed, int, text};
 
-/// A length in units of a `Length`, in millimetres with three decimals.
+/// Writes a length given in units of a `Length`, in millimetres with three decimals.
 #[inline(never)]
 #[small]
 pub fn length(out: &mut impl Out, units: i32) {
     fixed(out, Fixed { value: units, decimals: 4 }.rounded(3));
 }
 
-/// The end of a line.
+/// Writes a line end.
 pub fn line_end(out: &mut impl Out) {
     out.put(b'\n');
 }
 
-/// Filament is too cold to be moved.
+/// Reports that filament is too cold to be moved.
 #[small]
 pub fn cold(out: &mut impl Out) {
     text(out, text!("echo: cold extrusion prevented\n"));

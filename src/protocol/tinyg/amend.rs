@@ -1,6 +1,7 @@
-//! What a status report gains and loses: `{srs:{set:{vel:t,posa:f}}}`, `{srs:{clear:t}}`, `{srs:{defa:t}}`.
+//! Changes to the status report: `{srs:{set:{vel:t,posa:f}}}`, `{srs:{clear:t}}`, `{srs:{defa:t}}`.
 //!
-//! One pair a step, told as it was sent. The first that makes no sense is refused; those before it have taken effect.
+//! Each step handles one pair and reports it as it was sent. The first pair that makes no sense is refused; the pairs
+//! before it have taken effect.
 
 use super::json::{self, Kind, Pair};
 use super::request::{Context, Request};
@@ -11,7 +12,7 @@ use crate::plain;
 use crate::protocol::{Machine, Out, Remembers};
 use crate::status::Status;
 
-/// Whether an object of this name changes the report, where that of the other (`sr`) is a new one.
+/// Whether an object with this name (`srs`) changes the report. An object named `sr` replaces the report.
 #[small]
 pub(super) fn is_amended(name: &[u8]) -> bool {
     name.len() > 2
@@ -19,7 +20,7 @@ pub(super) fn is_amended(name: &[u8]) -> bool {
 
 #[small]
 impl Request {
-    /// Carries out one pair of the object. `selected` is set in the inner object.
+    /// Carries out one pair of the object. `selected` means that the pair is in the inner object `set`.
     #[inline(never)]
     pub(super) fn amend<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         let Some(pair) = json::pair(c.line, self.at) else {
@@ -49,7 +50,7 @@ impl Request {
         }
     }
 
-    /// The end of an object.
+    /// Handles the end of an object.
     fn amended<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         match core::mem::take(&mut self.selected) {
             true => Writer::body(c.out, &mut self.format).close(),
@@ -58,7 +59,7 @@ impl Request {
     }
 }
 
-/// `clear` and `defa`.
+/// Carries out `clear` or `defa`.
 #[small]
 fn reset(name: &Name, pair: &Pair, machine: &mut impl Machine) -> Result<(), Status> {
     let clears = name.is(plain!("clear"));
@@ -74,7 +75,7 @@ fn reset(name: &Name, pair: &Pair, machine: &mut impl Machine) -> Result<(), Sta
     Ok(())
 }
 
-/// A value to tell from now on, or no more.
+/// Adds a value to the report, or removes it.
 #[small]
 fn change<M: Machine, O>(pair: &Pair, c: &mut Context<'_, M, O>) -> Result<(), Status> {
     let token = match resolve(Name::new(), pair.name.of(c.line)) {

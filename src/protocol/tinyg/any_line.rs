@@ -1,4 +1,4 @@
-//! What holds for any line whatever.
+//! Properties that hold for any line.
 
 use super::Mode;
 use super::fake::Fake;
@@ -9,7 +9,7 @@ use std::string::String;
 use std::vec::Vec;
 use std::{format, vec};
 
-/// Whether an answer nests, separates and quotes as JSON must.
+/// Whether an answer is nested, separated and quoted as JSON requires.
 #[small]
 fn is_json(answer: &[u8]) -> bool {
     let (mut depth, mut quoted, mut escaped, mut last) = (0, false, false, b' ');
@@ -36,7 +36,7 @@ fn is_json(answer: &[u8]) -> bool {
     depth == 0 && !quoted && separated
 }
 
-/// Lines that mean something, or nearly.
+/// Lines that make sense, or nearly make sense.
 #[small]
 fn lines() -> impl Strategy<Value = Vec<u8>> {
     let word = || {
@@ -107,7 +107,7 @@ fn sets_style(line: &[u8]) -> bool {
     line.windows(2).any(|pair| pair.eq_ignore_ascii_case(b"js"))
 }
 
-/// All that a line can ask for by a name alone.
+/// Everything that a line can ask for by a name alone.
 fn askable() -> Vec<String> {
     let mut names: Vec<String> =
         ["", "$", "o", "m", "q", "g", "h", "prog", "test", "defa", "boot", "me", "sr", "qr"]
@@ -115,7 +115,7 @@ fn askable() -> Vec<String> {
             .into();
     let own = |c: &char| c.is_ascii_lowercase() || c.is_ascii_digit();
     let letters: Vec<char> = ('0'..='z').filter(own).collect();
-    // Groups and settings have five characters at most; the longer ones begin with the name of their group.
+    // Names of groups and settings have five characters at most. Longer ones begin with the name of their group.
     names.extend(letters.iter().map(|letter| format!("{letter}")));
     names.extend(
         (0..Setting::NUMBERS)
@@ -181,9 +181,9 @@ proptest! {
         let responses = answer.split(|&b| b == b'\n').filter(|l| l.starts_with(b"{\"r\":")).count();
         match fake.mode {
             Mode::Json if blank => prop_assert!(answer.is_empty()),
-            // Verbosity and style may have been set by the line itself.
+            // The line itself may have changed verbosity and style.
             Mode::Json if fake.settings.json_verbosity() == 0 => {}
-            // One that sets the style more than once may end in another than it is answered in.
+            // A line that sets the style twice may be answered in a style other than the last.
             Mode::Json if !fake.settings.json_strict() || sets_style(&line) => {
                 prop_assert_eq!(lines, 1);
             }

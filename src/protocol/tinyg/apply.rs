@@ -1,4 +1,4 @@
-//! What a pair of a request does: reading, setting, acting.
+//! Carries out a pair of a request: reads, sets, acts.
 
 use super::defaults::is_sure;
 use super::json::{Kind, Pair};
@@ -49,7 +49,7 @@ impl Request {
                     Some(Subject::Member(vector, _, axis))
                         if Group::Vector(vector) == Group::TOOL_OFFSETS =>
                     {
-                        // In millimetres, as it is told.
+                        // In millimetres, as the length is reported.
                         let length = fixed(pair, c.line, Length::DECIMALS, false)?;
                         c.machine.set_tool_length(axis, Length(length))?;
                     }
@@ -74,7 +74,7 @@ impl Request {
         }
     }
 
-    /// What has decided for the dialect of the port, if there are several.
+    /// Reports what has decided the dialect of the port, if the image has several dialects.
     #[inline(never)]
     fn tell_choice<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         let remark = match c.machine.value(Value::Choice) {
@@ -120,7 +120,7 @@ impl Request {
     }
 }
 
-/// The value of a pair as 32 bits: `"0x2a"`.
+/// Returns the value of a pair as 32 bits, as in `"0x2a"`.
 #[small]
 fn bits(pair: &Pair, line: &[u8]) -> Result<i32, Status> {
     if !matches!(pair.kind, Kind::Text | Kind::Number) {
@@ -148,7 +148,7 @@ fn set_row<M: Machine, O>(
     c.machine.set_row(row, axis, Length(value))
 }
 
-/// Jogs the axis whose letter ends the name, to a place in mm or degrees whatever the units.
+/// Jogs the axis whose letter ends the name. The position is in mm or degrees, even if the units are inches.
 #[inline(never)]
 #[small]
 fn jog<M: Machine, O>(pair: &Pair, c: &mut Context<'_, M, O>) -> Result<(), Status> {
@@ -157,7 +157,7 @@ fn jog<M: Machine, O>(pair: &Pair, c: &mut Context<'_, M, O>) -> Result<(), Stat
     done(c.machine.jog(axis.ok_or(Status::UnrecognizedName)?, Length(place)))
 }
 
-/// Sets a value of the machine: an override; or homes, or checks lines from now on.
+/// Sets a value of the machine: changes an override, starts homing, or switches check mode.
 #[small]
 fn set_value<M: Machine, O>(
     source: Source,
@@ -194,7 +194,7 @@ fn set_value<M: Machine, O>(
     Ok(())
 }
 
-/// The factor that a pair gives an override, thousandths.
+/// Returns the factor that a pair gives an override, in thousandths.
 #[small]
 fn factor(which: Override, pair: &Pair, line: &[u8]) -> Result<u16, Status> {
     let factor = fixed(pair, line, 3, false)?;
@@ -207,7 +207,7 @@ fn done(status: Status) -> Result<(), Status> {
     if status == Status::Ok { Ok(()) } else { Err(status) }
 }
 
-/// The value of a pair, a number.
+/// Returns the value of a pair as a number.
 #[inline(never)]
 #[small]
 fn number(pair: &Pair, line: &[u8]) -> Result<Number, Status> {
@@ -217,14 +217,14 @@ fn number(pair: &Pair, line: &[u8]) -> Result<Number, Status> {
     }
 }
 
-/// The value of a pair with so many decimals.
+/// Returns the value of a pair, scaled to `decimals` decimals.
 #[inline(never)]
 #[small]
 fn fixed(pair: &Pair, line: &[u8], decimals: u8, inches: bool) -> Result<i32, Status> {
     number(pair, line)?.fixed(decimals, inches).ok_or(Status::OutOfRange)
 }
 
-/// The value of a pair as a whole number.
+/// Returns the value of a pair as a whole number.
 #[inline(never)]
 #[small]
 fn whole(pair: &Pair, line: &[u8]) -> Result<i32, Status> {
@@ -240,7 +240,7 @@ fn act<M: Machine, O>(
     c: &mut Context<'_, M, O>,
 ) -> Result<(), Status> {
     let on = match action {
-        // A block is run only where nothing of the response is out yet.
+        // A block runs only before the response has begun.
         Operation::Block if pair.kind == Kind::Null => return Ok(()),
         Operation::Block if pair.kind == Kind::Text => return Err(Status::NotAccepted),
         Operation::Block => return Err(Status::UnsupportedType),
@@ -267,7 +267,7 @@ fn act<M: Machine, O>(
             let sure = is_sure(pair, c)?;
             return if sure { done(c.machine.restart(false)) } else { Ok(()) };
         }
-        // Its report would stand in the midst of the response.
+        // The report would interrupt the response.
         Operation::Exception => return Err(Status::NotAccepted),
         Operation::Energize => true,
         Operation::Release => false,

@@ -1,4 +1,4 @@
-//! What a response tells of its G-code block: the block itself, its message, its line number.
+//! What a response reports of its G-code block: the block itself, its message, its line number.
 
 use super::Format;
 use super::request::{Context, Phase, Request};
@@ -10,16 +10,16 @@ use crate::protocol::{Ending, Machine, Out, Value};
 use crate::status::Status;
 use crate::{plain, progmem, text};
 
-/// Verbosities from which the parts show.
+/// The verbosity from which each part is shown.
 const FRAMES: u8 = 1;
 const LINE_NUMBERS: u8 = 4;
 const BLOCKS: u8 = 5;
 
-/// Behind the highest line number.
+/// One more than the highest line number.
 const LINE_NUMBER_END: i32 = 1 << 24;
 
-/// Whether nothing of a block is to be shown, so that the response is the frame alone: of a block
-/// without a comment, in JSON mode, and `numbered` or not.
+/// Whether the response to a block without a comment, in JSON mode, is the frame alone. `numbered`: whether the block
+/// has a line number.
 pub fn is_brief(settings: &Settings, numbered: bool) -> bool {
     match settings.json_verbosity() {
         FRAMES..LINE_NUMBERS => true,
@@ -28,12 +28,12 @@ pub fn is_brief(settings: &Settings, numbered: bool) -> bool {
     }
 }
 
-/// The response to a block that has run, of which nothing is to be shown.
+/// Writes the response to a block that has run, where the response is the frame alone.
 pub fn put_brief(settings: &Settings, ending: Ending, out: &mut impl Out) {
     if Variation::of(settings) != Variation::Lines || settings.expand_line_feeds() {
         return put_other(settings, ending, out);
     }
-    // There are fewer than ten.
+    // The number of free line slots has one digit.
     let free = ending.free % 10;
     if settings.json_strict() {
         return out.put_plain(BRIEF.plain().behind(free * BRIEF_LEN).first(BRIEF_LEN));
@@ -43,7 +43,7 @@ pub fn put_brief(settings: &Settings, ending: Ending, out: &mut impl Out) {
     out.put_plain(plain!("]}\n"));
 }
 
-/// The response of which nothing is to be shown.
+/// The response with an empty body.
 const BRIEF_0: [u8; BRIEF_LEN as usize] = *b"{\"r\":{},\"f\":[1,0,0]}\n";
 const BRIEF_LEN: u8 = 21;
 
@@ -63,7 +63,7 @@ progmem! {
     };
 }
 
-/// The response of [`put_brief`] in a variation that does not count lines, or with `ec` 1.
+/// As [`put_brief`], for the variations that do not count lines, and for `ec` 1.
 #[inline(never)]
 fn put_other(settings: &Settings, ending: Ending, out: &mut impl Out) {
     Writer::frame(out, &mut Format::json(settings)).empty_response(Status::Ok, ending);
@@ -76,7 +76,8 @@ impl Request {
         quiet && !self.begun && !self.is_json && !self.commented
     }
 
-    /// The block's line number, 0 for none. The machine does not know that of a block that it has not carried out.
+    /// Returns the block's line number; 0 for none. If the block was refused, the machine does not know its number,
+    /// so it is read from the line.
     fn line_number<M: Machine, O>(&self, c: &mut Context<'_, M, O>) -> i32 {
         match self.status {
             Status::Ok => c.machine.value(Value::BlockLine),
@@ -84,7 +85,8 @@ impl Request {
         }
     }
 
-    /// The whole response to most lines, in one step.
+    /// Writes the whole response in one step, if it is the frame alone. This holds for most lines. Returns whether it
+    /// did.
     pub(super) fn brief<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) -> bool {
         let brief = self.is_brief(c);
         if brief {
@@ -112,7 +114,7 @@ impl Request {
         }
     }
 
-    /// The block as it is read: upper case, without blanks and comments.
+    /// Writes the block as the interpreter reads it: in upper case, without blanks and comments.
     pub(super) fn block_text<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         let mut writer = Writer::message(c.out, &mut self.format);
         for _ in 0..super::CHUNK / 2 {
@@ -187,7 +189,7 @@ impl Request {
     }
 }
 
-/// The number of the N word that a block begins with; 0 if it does not, or if that is no line number.
+/// Returns the number of the N word that a block begins with; 0 if there is none or it is not a valid line number.
 #[inline(never)]
 #[small]
 fn leading_number(block: &[u8]) -> i32 {
@@ -196,7 +198,7 @@ fn leading_number(block: &[u8]) -> i32 {
         match byte {
             b' ' | b'\t' | b'/' => {}
             b'N' | b'n' if number < 0 => number = 0,
-            // Higher ones are none, and would not fit at last.
+            // A higher number is not a line number, and more digits would overflow.
             b'0'..=b'9' if (0..LINE_NUMBER_END).contains(&number) => {
                 number = number * 10 + i32::from(byte - b'0');
             }
@@ -207,14 +209,14 @@ fn leading_number(block: &[u8]) -> i32 {
     number.max(0)
 }
 
-/// Byte `at` of the line if that is before `end`.
+/// Returns byte `at` of the line; `None` from `end` on.
 #[inline(never)]
 #[small]
 pub(super) fn byte_of(line: &[u8], at: u8, end: u8) -> Option<u8> {
     line.get(usize::from(at)).copied().filter(|_| at < end)
 }
 
-/// Where the message of a comment `(MSG text)` begins.
+/// Returns where the message of a comment `(MSG text)` begins; `None` if there is none.
 fn message_start(line: &[u8], start: u8, end: u8) -> Option<u8> {
     let byte = |at| byte_of(line, at, end);
     let mut at = (start..end).find(|&at| matches!(byte(at), Some(b'(' | b';')))? + 1;

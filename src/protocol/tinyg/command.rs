@@ -1,4 +1,4 @@
-//! Text mode: what a line that begins with `$` asks for.
+//! Text mode: lines that begin with `$`.
 
 use super::help::Hint;
 use super::json::{Kind, Pair};
@@ -13,7 +13,7 @@ use crate::status::Status;
 
 #[small]
 impl Request {
-    /// Shows, sets or does what the line says; `at` is behind its `$`.
+    /// Shows, sets or does what the line asks for. `at` is behind the `$`.
     #[inline(never)]
     pub(super) fn command<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         let pair = split(c.line, self.at);
@@ -36,7 +36,7 @@ impl Request {
         let target = resolve(Name::new(), name.bytes());
         match target {
             Target::Group(group) if null => self.enlist(Some(group), None),
-            // Neither groups nor blocks can be given a value here.
+            // In text mode neither a group nor a block can be given a value.
             Target::Group(_)
             | Target::Operation(
                 Operation::Block | Operation::Text | Operation::Message | Operation::Id,
@@ -72,7 +72,7 @@ impl Request {
                 self.enlist(Some(Group::One(token)), None);
             }
             Ok(None) => {
-                // The defaults have a status of their own, which is for JSON.
+                // The status for restored defaults is for JSON only.
                 self.status = Status::Ok;
                 self.phase = Phase::Prompt;
             }
@@ -96,7 +96,7 @@ fn is_blank(byte: u8) -> bool {
     matches!(byte, b' ' | b'\t')
 }
 
-/// The name at `at` and what stands behind it, a number if anything does.
+/// Splits the text at `at` into a name and the value behind it. Any value is taken for a number.
 #[small]
 fn split(line: &[u8], at: u8) -> Pair {
     let byte = |at: u8| line.get(usize::from(at)).copied();
@@ -117,7 +117,8 @@ fn split(line: &[u8], at: u8) -> Pair {
     Pair { name: Span { start, end }, kind, value: Span { start: value, end: next }, next }
 }
 
-/// A setting and a number without anything in between, `$xfr30`: the two. No name is another with digits behind it.
+/// Divides a setting and a number without a separator, as in `$xfr30`. This is unambiguous: no name is another name
+/// followed by digits. `None` if the text is nothing of this kind.
 #[inline(never)]
 #[small]
 fn divide(line: &[u8], pair: &Pair) -> Option<Pair> {

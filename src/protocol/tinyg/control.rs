@@ -1,14 +1,14 @@
-//! Which lines are control lines: JSON, `$`, `?` and the letter H. JSON that holds G-code is none.
+//! Recognizes control lines: JSON without G-code, `$`, `?`, and the letter H alone.
 
 use super::help::asks_help;
 
-/// Whether one may begin so.
+/// Whether a control line may begin with this byte.
 #[inline(always)]
 pub fn may_be(first: u8) -> bool {
     matches!(first, b'{' | b'$' | b'?' | b'h' | b'H')
 }
 
-/// Whether a line is one.
+/// Whether a line is a control line.
 #[inline(always)]
 pub fn is(line: &[u8]) -> bool {
     match line.first() {
@@ -19,14 +19,16 @@ pub fn is(line: &[u8]) -> bool {
     }
 }
 
-/// Whether a line of JSON is `gc`, or a `txt` that is no line of text mode, as far as it has come. Either may stand behind `tid`.
+/// Whether the JSON received so far is a `gc`, or a `txt` with anything but a `$` or `?` line. A `tid` may come
+/// first.
 #[inline(never)]
 #[small]
 fn holds_gcode(line: &[u8]) -> bool {
-    // The last letters of a name, and whether its value is being read.
+    // The last two letters of a name, and whether its value is being read.
     let (mut last, mut before, mut within) = (0, 0, false);
     for byte in line.iter().skip(1) {
-        // Letters in lower case; others that count here stay as they are, and a tab is a parenthesis.
+        // The OR makes letters lower case. Other bytes that matter here stay as they are; a tab becomes a
+        // parenthesis.
         let byte = *byte | b' ';
         if matches!(byte, b' ' | b'"' | b')') {
             continue;

@@ -1,5 +1,5 @@
-//! What wants to be sure: restoring the defaults, of which is told who we are, status 15 and a message; and the boot
-//! loader, status 16.
+//! Operations that need a confirmation. Restoring the defaults is answered with the identity of the firmware, status
+//! 15 and a message; entering the boot loader with status 16.
 
 use super::json::{Kind, Pair};
 use super::notice::{BANNER_ROWS, put_row};
@@ -13,7 +13,7 @@ use crate::status::Status;
 
 #[small]
 impl Request {
-    /// Restores the defaults if the value of `pair` says so; else tells how to.
+    /// Restores the defaults if the value of `pair` confirms it; otherwise tells how to do it.
     pub(super) fn restore<M: Machine, O>(
         &mut self,
         pair: &Pair,
@@ -22,7 +22,7 @@ impl Request {
         if !is_sure(pair, c)? {
             return self.advise(Remark::AskDefaults);
         }
-        // It is the answer: nothing may have been told before.
+        // The answer is the identity of the firmware, so nothing may have been written before.
         let status = if self.begun { Status::NotAccepted } else { c.machine.restore() };
         if status != Status::Ok {
             return Err(status);
@@ -34,7 +34,7 @@ impl Request {
         Ok(None)
     }
 
-    /// Has the machine start anew, in its boot loader, if the value of `pair` says so; else tells how to.
+    /// Restarts the machine in its boot loader if the value of `pair` confirms it; otherwise tells how to do it.
     pub(super) fn boot<M: Machine, O>(
         &mut self,
         pair: &Pair,
@@ -52,13 +52,13 @@ impl Request {
         }
     }
 
-    /// Tells where to go on.
+    /// Makes the response give a hint.
     pub(super) fn advise(&mut self, remark: Remark) -> Outcome {
         self.remark = self.remark.max(remark);
         Ok(None)
     }
 
-    /// A row of who we are.
+    /// Writes one row of the firmware's identity.
     pub(super) fn greeting<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         put_row(self.item, c.machine, &mut Writer::body(c.out, &mut self.format));
         self.item += 1;
@@ -69,7 +69,7 @@ impl Request {
     }
 }
 
-/// Whether the value of a pair says that something is to be done.
+/// Whether the value of a pair confirms an operation.
 #[small]
 pub(super) fn is_sure<M, O>(pair: &Pair, c: &Context<'_, M, O>) -> Result<bool, Status> {
     match pair.kind {

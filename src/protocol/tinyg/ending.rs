@@ -1,4 +1,4 @@
-//! The end of a response: what has to be told yet, and the footer. Of a line that makes no sense that is the line itself.
+//! The end of a response: what remains to be reported, and the footer. For a malformed line also the line itself.
 
 use super::block::byte_of;
 use super::json;
@@ -10,12 +10,12 @@ use crate::status::Status;
 use crate::text;
 
 impl Request {
-    /// Whether the footer is all that has to be told when all has been carried out.
+    /// Whether only the footer is left to be written.
     pub(super) fn adds_nothing(&self) -> bool {
         !self.identified && self.status == Status::Ok && self.remark == Remark::None
     }
 
-    /// Tells the `tid` of the line, which one that has failed may have further on.
+    /// Reports the `tid` of the line. A line that has failed may have it in a pair that was not reached.
     pub(super) fn warning<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         self.open(c);
         self.phase = Phase::Advice;

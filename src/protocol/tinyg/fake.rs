@@ -31,12 +31,12 @@ pub struct Fake {
     pub rows: HashMap<(u8, u8), i32>,
     /// Lengths of the tool, by axis.
     pub tool_lengths: HashMap<u8, i32>,
-    /// Settings that are in EEPROM.
+    /// Settings that are in EEPROM only.
     pub cold: HashMap<u8, i32>,
-    /// The program that is kept.
+    /// The stored program.
     pub program: Vec<u8>,
     waits: bool,
-    /// What a block of G-code is answered with, and the blocks that were run.
+    /// The status that G-code blocks return, and the blocks that were run.
     pub outcome: Status,
     pub blocks: Vec<String>,
 }
@@ -66,7 +66,7 @@ impl Fake {
         }
     }
 
-    /// What the machine answers to a line.
+    /// Sends a line and returns the answer of the machine.
     pub fn send(&mut self, line: &[u8]) -> Vec<u8> {
         let mut mode = self.mode;
         let length = line.len() as u16 + 1;
@@ -102,7 +102,7 @@ impl Fake {
     }
 }
 
-/// Output that insists on the limit of a step.
+/// An output that enforces the limit of bytes per step.
 #[derive(Default)]
 pub struct Chunk {
     pub bytes: Vec<u8>,
@@ -155,7 +155,7 @@ impl Machine for Fake {
     }
 
     fn set_row(&mut self, row: TableRow, axis: u8, value: Length) -> Result<(), Status> {
-        // Every other time, as if another row were on its way.
+        // Refuses every other call, as if another row were still being stored.
         self.waits = !self.waits;
         if self.waits {
             return Err(Status::Again);

@@ -10,22 +10,22 @@ use crate::protocol::{Machine, Out, Span};
 use crate::status::Status;
 use crate::text;
 
-/// Lines of [`SCREENS`]; a screen is some of them.
+/// The number of lines in [`SCREENS`]. A screen is a range of them.
 const LINES: usize = 64;
-/// What `h` shows.
+/// The screen for `h`.
 pub const GENERAL: Span = Span { start: 0, end: 19 };
-/// What `$h` shows.
+/// The screen for `$h`.
 pub const SETTINGS: Span = Span { start: 19, end: 34 };
-/// What `$defa` shows.
+/// The screen for `$defa`.
 pub const DEFAULTS: Span = Span { start: 34, end: 39 };
-/// What `$test` shows.
+/// The screen for `$test`.
 pub const TESTS: Span = Span { start: 39, end: 56 };
-/// What `$boot` shows.
+/// The screen for `$boot`.
 pub const BOOT: Span = Span { start: 56, end: 61 };
-/// The first of the hints for what grbl's users type.
+/// The first of the hints for grbl's commands.
 const HINTS: u8 = 61;
 
-/// What grbl's users type, and what that is here. Capitals are grbl's: `$h` and `$x` are ours.
+/// A command of grbl that has another name here. grbl's commands are in capitals; `$h` and `$x` are TinyG's.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[repr(u8)]
 pub(super) enum Hint {
@@ -39,7 +39,7 @@ pub(super) enum Hint {
 
 #[small]
 impl Hint {
-    /// The hint for a name that is asked for, or given a value.
+    /// Returns the hint for a name. `asked`: whether the name has no value. `None` if the name is no command of grbl.
     pub fn of(name: &[u8], asked: bool) -> Option<Hint> {
         match name {
             b"H" if asked => Some(Hint::Home),
@@ -128,7 +128,7 @@ progmem! {
 
 #[small]
 impl Request {
-    /// Shows a screen, if this image has them.
+    /// Shows a screen, or refuses if this image has no help.
     pub(super) fn help(&mut self, screen: Span) {
         match Capability::Help.check() {
             Ok(()) => {
@@ -139,14 +139,14 @@ impl Request {
         }
     }
 
-    /// A hint for a `$` line of grbl, that is refused with `status`.
+    /// Shows the hint for a `$` line of grbl, which is refused with `status`.
     pub(super) fn hint(&mut self, hint: Hint, status: Status) {
         let line = HINTS + hint as u8;
         self.help(Span { start: line, end: line + 1 });
         self.status = status;
     }
 
-    /// A line of it.
+    /// Writes one line of the screen.
     pub(super) fn help_line<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         let is_built_in = Capability::Help.is_built_in();
         let line = if is_built_in { SCREENS.at(self.block.start.into()) } else { None };
@@ -166,7 +166,7 @@ impl Request {
     }
 }
 
-/// Whether a line, behind its blanks, is one of text mode.
+/// Whether a line, apart from leading blanks, is one of text mode.
 #[small]
 pub fn is_text_command(line: &[u8]) -> bool {
     let mut bytes = line.iter().skip_while(|byte| matches!(byte, b' ' | b'\t'));

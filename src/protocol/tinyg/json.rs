@@ -1,21 +1,20 @@
-//! Reading a line of relaxed JSON in place: no copies, no tree.
+//! Reads a line of relaxed JSON in place: no copies, no tree.
 //!
-//! [`check`] judges a whole line before anything of it is done; [`pair`] then reads one name and
-//! value at a time. Keys may be bare, blanks may stand anywhere, values are numbers, strings, words
-//! of which the first letter counts (`t`, `f`, `n`), and one level of objects, two
-//! if the second is called `set`.
+//! [`check`] validates a whole line before any of it is carried out. [`pair`] then reads one name and value at a
+//! time. Keys may be unquoted, blanks may stand anywhere. Values are numbers, strings, the words `true`, `false` and
+//! `null` or their first letters, and one level of objects, or two if the second one is called `set`.
 
 use crate::config::Name;
 use crate::plain;
 use crate::protocol::Span;
 use crate::status::Status;
 
-/// The longest name that is read.
+/// The longest name that is accepted.
 const LONGEST_NAME: u8 = 32;
-/// The longest number: any 64-bit float fits.
+/// The longest number that is accepted: any 64-bit float fits.
 const LONGEST_NUMBER: u8 = 24;
 
-/// What a value is.
+/// The type of a value.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Kind {
     /// `n`, `null`, or the empty string.
@@ -26,9 +25,9 @@ pub enum Kind {
     False,
     /// A number.
     Number,
-    /// A string; the span is between the quotes, escapes included.
+    /// A string. The span is between the quotes, with escapes.
     Text,
-    /// An object; the span is empty and behind its brace.
+    /// An object. The span is empty and behind the opening brace.
     Object,
 }
 
@@ -37,11 +36,11 @@ pub enum Kind {
 pub struct Pair {
     /// The name, without quotes.
     pub name: Span,
-    /// What the value is.
+    /// The type of the value.
     pub kind: Kind,
-    /// Where the value is.
+    /// The position of the value.
     pub value: Span,
-    /// Where to read on.
+    /// The position to read on.
     pub next: u8,
 }
 
@@ -50,13 +49,14 @@ fn is_punctuation(byte: u8) -> bool {
     matches!(byte, b'"' | b'{' | b'}' | b'[' | b']' | b':' | b',' | b'\\')
 }
 
-/// Whether `line` is one object, no deeper than `{srs:{set:{vel:t}}}`, or what is wrong. About 80 cycles a byte on AVR.
+/// Checks that `line` is one object, no deeper than `{srs:{set:{vel:t}}}`. The error says what is wrong. About 80
+/// cycles a byte on AVR.
 #[small]
 pub fn check(line: &[u8]) -> Result<(), Status> {
     Cursor { line, at: 0 }.object().unwrap_or(Err(Status::JsonSyntax))
 }
 
-/// The first pair of the outer object that has a name like that. The line has passed [`check`].
+/// Returns the first pair of the outer object for whose name `wanted` is true. The line has passed [`check`].
 #[small]
 pub fn find(line: &[u8], wanted: impl Fn(&[u8]) -> bool) -> Option<Pair> {
     let mut cursor = Cursor { line, at: 0 };
@@ -86,7 +86,7 @@ pub fn pair(line: &[u8], at: u8) -> Option<Pair> {
     cursor.pair()
 }
 
-/// Where to read on behind the brace that closes an object and at or behind `at`.
+/// Returns the position behind the brace that closes an object, the first brace at or behind `at`.
 #[small]
 pub fn behind_object(line: &[u8], at: u8) -> u8 {
     let mut cursor = Cursor { line, at };
@@ -94,13 +94,13 @@ pub fn behind_object(line: &[u8], at: u8) -> u8 {
     cursor.at
 }
 
-/// Whether no other pair of the object follows at `at`. The line has passed [`check`].
+/// Whether the object ends at `at`, without another pair. The line has passed [`check`].
 #[small]
 pub fn is_last(line: &[u8], at: u8) -> bool {
     Cursor { line, at }.take(b'}')
 }
 
-/// The first byte of `line` that is not a blank, as an index.
+/// Returns the index of the first byte of `line` that is not a blank.
 #[small]
 pub fn skip_blanks(line: &[u8]) -> u8 {
     let mut cursor = Cursor { line, at: 0 };
@@ -108,7 +108,7 @@ pub fn skip_blanks(line: &[u8]) -> u8 {
     cursor.at
 }
 
-/// What may stand behind the first letter of `null`, `true` and `false`.
+/// The rest of `null`, `true` and `false`, after the first letter.
 const ULL: u32 = u32::from_be_bytes(*b"\0ull");
 const RUE: u32 = u32::from_be_bytes(*b"\0rue");
 const ALSE: u32 = u32::from_be_bytes(*b"alse");
@@ -145,7 +145,7 @@ impl Cursor<'_> {
         Span { start, end: self.at }
     }
 
-    /// `None` if it is malformed.
+    /// Checks the object. `None` if it is malformed.
     fn object(&mut self) -> Option<Result<(), Status>> {
         let mut depth = u8::from(self.take(b'{'));
         let mut empty = true;
@@ -205,7 +205,7 @@ impl Cursor<'_> {
                 Some((Kind::Object, Span { start: self.at, end: self.at }))
             }
             letter => {
-                // The last four letters behind the first, in one word.
+                // The last four letters after the first one, packed into 32 bits.
                 let mut rest = 0u32;
                 let span = self.span(|b| b.is_ascii_alphanumeric());
                 for byte in span.of(self.line).iter().skip(1) {
@@ -222,7 +222,7 @@ impl Cursor<'_> {
         }
     }
 
-    /// A string of printing ASCII and escapes; anything above is kept out by framing or refused.
+    /// Reads a string of printable ASCII and escapes. Other bytes are removed by the framing or refused.
     fn quoted(&mut self) -> Option<Span> {
         self.next_if(|b| b == b'"')?;
         let start = self.at;
@@ -233,7 +233,7 @@ impl Cursor<'_> {
                 b'\\' => {
                     let letter = self.next_if(|b| matches!(b, b' '..=b'~'))?;
                     if letter == b'u' {
-                        // Four digits; those behind them are characters like others.
+                        // Four digits belong to the escape. Further digits are plain characters.
                         let digits = self.span(|b| b.is_ascii_hexdigit());
                         (digits.end - digits.start >= 4).then_some(())?;
                     }

@@ -1,12 +1,12 @@
-//! Text mode: settings and values, a line each.
+//! Text mode: lists settings and values, one per line.
 //!
 //! ```text
 //! [xvm] x velocity maximum        800 mm/min
 //! [1po] m1 polarity                 0 [0=normal,1=reverse]
 //! ```
 //!
-//! The last digit before the decimals, or the first letter of a text, is in column 35. Values that are
-//! no settings are shown as the status report shows them.
+//! The last digit of the integer part, or the first letter of a text, is in column 35. Values that are not settings
+//! are shown as in the status report.
 
 use super::place::Place;
 use super::request::{Context, Phase, Request};
@@ -21,13 +21,13 @@ use crate::progmem::Text;
 use crate::protocol::{Machine, Out, Span};
 use crate::text;
 
-/// Parts of a line, a step each.
+/// The number of parts of a line. Each step writes one part.
 const PARTS: u8 = 3;
-/// Where descriptions begin.
+/// The column at which descriptions begin.
 const TITLE_START: usize = 6;
-/// Where the integer part of a number ends.
+/// The column at which the integer part of a number ends.
 const UNITS_END: usize = 35;
-/// Counts of the group `p1` end so much behind that, below the decimals of the others.
+/// In the group `p1`, numbers without decimals end this much further right, below the decimals of the others.
 const PWM_SHIFT: usize = 4;
 
 progmem! {
@@ -39,7 +39,7 @@ progmem! {
     ];
 }
 
-/// Several groups in a row.
+/// A range of groups that are listed in a row.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Series {
     first: u8,
@@ -48,7 +48,9 @@ pub(super) struct Series {
 
 #[small]
 impl Series {
-    /// What a letter stands for: `$` all but tools, `m` motors, `q` axes, `o` offsets.
+    /// Returns the groups that a letter stands for; `None` for other letters. `m`: motors. `q`: axes. `$`: settings,
+    /// coordinate systems, G92, stored positions. `o`: coordinate systems, G92, stored positions, work offset, tool
+    /// length.
     pub fn of_letter(letter: u8) -> Option<Series> {
         let (first, end) = match letter {
             b'$' => (0, 27),
@@ -60,7 +62,7 @@ impl Series {
         Some(Series { first, end })
     }
 
-    /// The group of that number.
+    /// Returns the group with that number.
     fn group(number: u8) -> Group {
         match number {
             0 => Group::Settings(Owner::System),
@@ -81,7 +83,7 @@ impl Series {
 
 #[small]
 impl Request {
-    /// Lists a group, or those of a series.
+    /// Starts to list a group, or the groups of a series.
     pub(super) fn enlist(&mut self, group: Option<Group>, series: Option<Series>) {
         self.group = group;
         self.item = 0;
@@ -89,7 +91,7 @@ impl Request {
         self.phase = Phase::Listing;
     }
 
-    /// A part of a line of a group.
+    /// Writes a part of one line of a group.
     pub(super) fn listing<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         let member = self.group.and_then(|group| group.member(self.item / PARTS, c.machine));
         let Some((index, token)) = member else { return self.next_group() };
@@ -112,7 +114,7 @@ impl Request {
     }
 }
 
-/// What `token` is, its value, and what comes behind that.
+/// Writes a part of a token's line: its title, its value, or its unit.
 #[inline(never)]
 #[small]
 fn put_part<M: Machine, O: Out>(
@@ -141,13 +143,13 @@ fn put_part<M: Machine, O: Out>(
     }
 }
 
-/// Where the description of a setting starts, behind its name in brackets.
+/// Returns the column at which the description of a setting starts, behind its name in brackets.
 #[small]
 fn title_start(setting: Setting) -> usize {
     TITLE_START.max(setting.name().bytes().len() + 3)
 }
 
-/// The length of what tells whose a setting is: `m1 `, `x `.
+/// Returns the length of the owner's name in a description, as in `m1 ` or `x `.
 #[small]
 fn owner_len(setting: Setting) -> usize {
     match setting.owner() {
@@ -174,7 +176,7 @@ fn put_title<O: Out>(setting: Setting, words: &Words, writer: &mut Writer<'_, O>
     writer.text(words.title);
 }
 
-/// The value of a setting, in its column.
+/// Writes the value of a setting in its column.
 #[small]
 fn put_value<M: Machine, O: Out>(
     setting: Setting,
@@ -212,7 +214,7 @@ fn put_number<O: Out>(fixed: Fixed, width: usize, writer: &mut Writer<'_, O>) {
     writer.aligned(fixed, width + decimals + usize::from(decimals > 0));
 }
 
-/// The unit of a setting, or its choices.
+/// Writes the unit of a setting, or its choices.
 #[small]
 fn put_tail<M: Machine, O: Out>(
     setting: Setting,
@@ -226,7 +228,7 @@ fn put_tail<M: Machine, O: Out>(
         writer.text(match (is_length, machine.inches()) {
             (true, true) => text!(" in"),
             (true, false) if !row.is(RADIUS) => text!(" mm"),
-            // That of a radius too, as senders know it.
+            // A radius is shown in degrees too, as TinyG's senders expect.
             _ => text!(" deg"),
         });
     }

@@ -1,10 +1,10 @@
-//! TinyG's dialect: JSON lines in, responses and reports out; and text for people.
+//! TinyG's dialect: JSON lines for programs, and a text mode for people.
 //!
-//! Pure and synchronous; the tasks own the bytes and the waiting. A line becomes a [`Request`],
-//! [`Report`] and the [`notice`]s are stepped alike. Tables and texts are in program memory.
+//! Pure and synchronous: the tasks own the bytes and do the waiting. A line becomes a [`Request`], which is stepped;
+//! [`Report`] and the [`notice`]s are stepped in the same way. Tables and texts are in program memory.
 //!
-//! Wire format: TinyG 0.97 build 440.20, by default with the three-element footer `[1,status,free line slots]`;
-//! [`variation`] has what can be chosen instead.
+//! Wire format: TinyG 0.97 build 440.20, by default with the three-element footer `[1,status,free line slots]`. See
+//! [`variation`] for the alternatives.
 
 mod amend;
 mod apply;
@@ -64,7 +64,7 @@ impl Dialect for Tinyg {
         if settings.starts_in_json() { Mode::Json } else { Mode::Text }
     }
 
-    /// JSON, and what text mode alone knows: a `$` with small letters or digits and letters.
+    /// JSON, and lines that only TinyG's text mode knows: a `$` followed by text with a lower-case letter.
     fn is_decided_by(line: &[u8]) -> bool {
         let line = line.trim_ascii();
         match line {
@@ -114,7 +114,7 @@ impl Dialect for Tinyg {
         write::put_line_end(settings, out);
     }
 
-    /// In text mode by a prompt.
+    /// In text mode an empty line is answered with a prompt.
     #[inline(always)]
     fn answers_empty(mode: Mode) -> bool {
         mode == Mode::Text
@@ -136,18 +136,18 @@ impl Dialect for Tinyg {
     }
 }
 
-/// How the host wants to be spoken to: as it spoke last.
+/// How the port is spoken to: in the mode of its last line.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Mode {
-    /// In JSON.
+    /// JSON.
     #[default]
     Json,
-    /// In text, with prompts.
+    /// Text, with prompts.
     Text,
 }
 
 impl Mode {
-    /// The format of unasked reports.
+    /// Returns the format of reports that nobody has asked for.
     fn format(self, machine: &impl Machine) -> Format {
         match self {
             Mode::Json => Format::json(machine.settings()),

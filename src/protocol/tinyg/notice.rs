@@ -1,4 +1,4 @@
-//! What the machine tells once: that it is ready, and that something has gone wrong.
+//! One-time notices: the greeting, exceptions, the result of a probing.
 
 use super::Format;
 use super::token::{Group, Token};
@@ -20,17 +20,17 @@ pub struct Banner {
     format: Format,
 }
 
-/// The rows of `sys` that every greeting tells, in its order; one that is ready adds Kerf's version.
+/// The rows of `sys` in every greeting, in order. The greeting of a ready machine adds Kerf's version.
 pub(super) const BANNER_ROWS: u8 = 5;
 
 #[small]
 impl Banner {
-    /// Begins. It is whole whatever the verbosity, unless that is 0.
+    /// Starts the greeting. It is complete at every verbosity except 0.
     pub fn begin(occasion: Occasion, settings: &Settings) -> Banner {
         Banner { stage: 0, occasion, format: Format::announcement(settings) }
     }
 
-    /// Does the next part. Whether there is more to do.
+    /// Writes the next part. Returns whether there is more to do.
     #[inline(never)]
     pub fn step(&mut self, machine: &mut impl Machine, out: &mut impl Out) -> bool {
         let mut writer = Writer::frame(out, &mut self.format);
@@ -42,7 +42,7 @@ impl Banner {
                 put_row(self.stage, machine, &mut writer);
             }
             BANNER_ROWS => {
-                // With the longer message the greeting would not fit the ring of a port.
+                // With the longer message the greeting would not fit into the port's ring buffer.
                 if self.occasion == Occasion::Ready {
                     put_row(Setting::VERSION, machine, &mut writer);
                 }
@@ -66,7 +66,7 @@ impl Banner {
     }
 }
 
-/// Puts one of the rows that tell what firmware this is.
+/// Writes one of the rows that identify the firmware.
 #[small]
 pub(super) fn put_row<O: Out>(row: u8, machine: &mut impl Machine, writer: &mut Writer<'_, O>) {
     // The version comes before the build.
@@ -76,19 +76,18 @@ pub(super) fn put_row<O: Out>(row: u8, machine: &mut impl Machine, writer: &mut 
 }
 
 progmem! {
-    /// The axes that may be homed.
+    /// The axes that can be homed.
     static AXES: [Text; 4] = [text!("x"), text!("y"), text!("z"), text!("a")];
 
-    /// What the switches at the ends of axes are called.
+    /// The names of the switches at the ends of axes.
     static ENDS: [Text; inputs::ENDS] = [
         text!("xmin"), text!("xmax"), text!("ymin"), text!("ymax"),
         text!("zmin"), text!("zmax"), text!("amin"), text!("amax"),
     ];
 }
 
-/// An exception report, `{"er":{"fb":440.20,"st":13,"msg":"Buffer full"}}`; sent whatever the
-/// verbosity, and always as JSON. Of a limit it also says which, `"sw":"xmin"`, of homing the axis,
-/// `"ax":"x"`.
+/// An exception report, `{"er":{"fb":440.20,"st":13,"msg":"Buffer full"}}`. Sent at every verbosity, and always as
+/// JSON. A limit adds the switch, `"sw":"xmin"`, and homing the axis, `"ax":"x"`.
 pub struct Exception {
     stage: u8,
     status: Status,
@@ -97,12 +96,12 @@ pub struct Exception {
 
 #[small]
 impl Exception {
-    /// Begins.
+    /// Starts an exception report.
     pub fn begin(status: Status, settings: &Settings) -> Exception {
         Exception { stage: 0, status, format: Format::json(settings) }
     }
 
-    /// Does the next part. Whether there is more to do.
+    /// Writes the next part. Returns whether there is more to do.
     #[inline(never)]
     pub fn step(&mut self, machine: &mut impl Machine, out: &mut impl Out) -> bool {
         let mut writer = Writer::body(out, &mut self.format);
@@ -112,7 +111,7 @@ impl Exception {
     }
 }
 
-/// A part of an exception report. Whether there is more to do.
+/// Writes a part of an exception report. Returns whether there is more to do.
 #[small]
 pub(super) fn put_exception<O: Out>(
     stage: u8,
@@ -158,8 +157,7 @@ pub(super) fn put_exception<O: Out>(
     true
 }
 
-/// What probing has come to, as if somebody had asked:
-/// `{"r":{"prb":{"e":1,"x":20.000,...,"c":0.000}},"f":[1,0,0]}`.
+/// The result of a probing, in the form of a response: `{"r":{"prb":{"e":1,"x":20.000,...,"c":0.000}},"f":[1,0,0]}`.
 pub struct Probing {
     member: u8,
     format: Format,
@@ -167,12 +165,12 @@ pub struct Probing {
 
 #[small]
 impl Probing {
-    /// Begins. It is whole whatever the verbosity, unless that is 0.
+    /// Starts the report. It is complete at every verbosity except 0.
     pub fn begin(settings: &Settings) -> Probing {
         Probing { member: 0, format: Format::announcement(settings) }
     }
 
-    /// Does the next part. Whether there is more to do.
+    /// Writes the next part. Returns whether there is more to do.
     #[inline(never)]
     pub fn step(&mut self, machine: &mut impl Machine, out: &mut impl Out) -> bool {
         let mut writer = Writer::frame(out, &mut self.format);
@@ -199,7 +197,7 @@ impl Probing {
     }
 }
 
-/// Tells that a jog has ended.
+/// Reports that a jog has ended.
 pub fn jog_ended(settings: &Settings, out: &mut impl Out) {
     let mut format = Format::json(settings);
     let mut writer = Writer::body(out, &mut format);
@@ -210,7 +208,7 @@ pub fn jog_ended(settings: &Settings, out: &mut impl Out) {
     writer.end_line();
 }
 
-/// Answers the question whether anybody is there.
+/// Answers an enquiry (ENQ).
 #[small]
 #[inline(never)]
 pub fn acknowledge(settings: &Settings, out: &mut impl Out) {

@@ -1,4 +1,4 @@
-//! Names and values of a JSON line: walking through them, and telling what has come of each.
+//! The pairs of a JSON line: carries them out one by one, and reports the result of each.
 
 use super::Format;
 use super::amend::is_amended;
@@ -12,7 +12,7 @@ use crate::protocol::{Machine, Out};
 use crate::status::Status;
 use crate::text;
 
-/// What to tell of a pair that was carried out.
+/// The result of a pair: a token whose value is to be reported, `None` to report the pair as sent, or a status.
 pub(super) type Outcome = Result<Option<Token>, Status>;
 
 #[small]
@@ -47,7 +47,7 @@ impl Request {
                 self.refuse_pair(&pair, target, status, c);
             }
             (Target::Operation(Operation::Message), Kind::Text) => self.give_string(&pair, c),
-            // It is told when everything else has been, so that a block may still be run.
+            // The `tid` is reported at the end, so that a block may still run.
             (Target::Operation(Operation::Id), Kind::Number | Kind::Null) => self.identified = true,
             (Target::Operation(Operation::Id), _) => {
                 self.status = Status::UnsupportedType;
@@ -59,13 +59,13 @@ impl Request {
                 self.item = 0;
                 self.phase = Phase::Raise;
             }
-            // It goes on by itself: a pair may have to wait.
+            // `carry_out` moves on by itself, because a pair may have to wait.
             _ => return self.carry_out(&pair, target, c),
         }
         self.at = pair.next;
     }
 
-    /// A part of an exception report that was asked for; then the response.
+    /// Writes a part of an exception report that was asked for. Begins the response after the last part.
     pub(super) fn raise<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         let (stage, status) = (self.item, Status::ExceptionReport);
         self.item += 1;
@@ -112,7 +112,7 @@ impl Request {
         };
         let prefix = self.group.map_or(Name::new(), Group::prefix);
         let target = match resolve(prefix, pair.name.of(c.line)) {
-            // A group has no groups, and no strings, in it.
+            // A group contains neither groups nor strings.
             Target::Group(_) => Target::Unknown,
             Target::Operation(
                 Operation::Block | Operation::Text | Operation::Message | Operation::Id,
@@ -122,7 +122,7 @@ impl Request {
         self.carry_out(&pair, target, c);
     }
 
-    /// Puts one member of the group, in its order.
+    /// Writes one member of the group, in order.
     #[inline(never)]
     pub(super) fn list<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         let member =
@@ -139,8 +139,8 @@ impl Request {
         writer.shown(shown);
     }
 
-    /// Selects one entry of a new status report. Names that mean nothing here are passed over; a report
-    /// that would hold nothing is refused.
+    /// Selects one entry of a new status report. Names that cannot be reported are skipped. A report without any
+    /// entry is refused.
     #[inline(never)]
     pub(super) fn select<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         let Some(pair) = json::pair(c.line, self.at) else {
@@ -165,7 +165,7 @@ impl Request {
         }
     }
 
-    /// Tells the new report, or why there is none.
+    /// Lists the new report, or reports why there is none.
     fn selected<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         if self.selected {
             self.item = 0;
@@ -190,7 +190,7 @@ impl Request {
     ) {
         let outcome = self.apply(pair, target, c);
         if outcome == Err(Status::Again) {
-            // From its beginning, later.
+            // The pair is repeated from its beginning later.
             self.waits = true;
             return;
         }
@@ -202,7 +202,8 @@ impl Request {
                 let mut writer = Writer::body(c.out, &mut self.format);
                 writer.key(pair.name.of(c.line));
                 writer.shown(shown);
-                // A short question is answered in one step: each costs 700 cycles, and may wait for motion.
+                // A short request is answered in one step: each step costs 700 cycles, and may have to wait for
+                // motion.
                 if self.phase == Phase::Pair
                     && self.adds_nothing()
                     && json::is_last(c.line, self.at)
@@ -228,7 +229,7 @@ impl Request {
         self.leave(c);
     }
 
-    /// Tells a pair as it was sent; null if its name means nothing, or for a string.
+    /// Reports a pair as it was sent; as null if its name is unknown, or its value a string.
     pub(super) fn tell_sent<M, O: Out>(
         &mut self,
         pair: &Pair,
@@ -246,7 +247,7 @@ impl Request {
     }
 }
 
-/// A number without the leading zeros that JSON does not allow.
+/// Returns a number without the leading zeros that JSON forbids.
 #[small]
 fn plain_number(mut text: &[u8]) -> &[u8] {
     while let [b'0', rest @ ..] = text

@@ -1,4 +1,5 @@
-//! Text mode: a line for a place on an axis: a coordinate system's, G92's, a stored one, a tool's.
+//! Text mode: a line for a position on an axis: that of a coordinate system, of G92, a stored position, or a tool
+//! length.
 //!
 //! ```text
 //! [g54x] g54 x offset               0.000 mm
@@ -14,7 +15,7 @@ use crate::progmem::Text;
 use crate::protocol::{Machine, Out};
 use crate::text;
 
-/// A place.
+/// A position on an axis.
 pub(super) struct Place {
     token: Token,
     axis: u8,
@@ -23,7 +24,7 @@ pub(super) struct Place {
 
 #[small]
 impl Place {
-    /// The place that a token tells, if it does.
+    /// Returns the position that a token stands for; `None` if it stands for something else.
     pub fn of(token: Token) -> Option<Place> {
         let (axis, title) = match token.subject()? {
             Subject::Member(SHIFT, _, axis) => (axis, text!(" offset")),
@@ -35,7 +36,7 @@ impl Place {
         Some(Place { token, axis, title })
     }
 
-    /// What it is.
+    /// Writes the title.
     #[inline(never)]
     pub fn title<O: Out>(&self, writer: &mut Writer<'_, O>) {
         let name = self.token.name();
@@ -49,12 +50,12 @@ impl Place {
         writer.text(self.title);
     }
 
-    /// Where that ends.
+    /// Returns the column at which the title ends.
     pub fn title_end(&self) -> usize {
         2 * self.token.name().bytes().len() + 4 + self.title.len()
     }
 
-    /// Where it is.
+    /// Returns the value.
     pub fn value(&self, machine: &mut impl Machine) -> Fixed {
         match self.token.read(machine) {
             Shown::Number(fixed) => fixed,
@@ -62,7 +63,7 @@ impl Place {
         }
     }
 
-    /// In what that is measured, and the end of the line.
+    /// Writes the unit, and ends the line.
     pub fn unit<M: Machine, O: Out>(&self, machine: &mut M, writer: &mut Writer<'_, O>) {
         writer.text(match (place_form(self.axis), machine.inches()) {
             (Form::Length, true) => text!(" in"),
@@ -73,7 +74,7 @@ impl Place {
     }
 }
 
-/// A name without the letter of the axis.
+/// Returns a name without the letter of the axis.
 #[small]
 fn group(name: &Name) -> &[u8] {
     name.bytes().split_last().map_or(&[], |(_, group)| group)

@@ -1,11 +1,11 @@
-//! The program that is kept in EEPROM, on the wire.
+//! The stored program, as senders write and read it.
 //!
 //! ```text
-//! {prog:f}          a new one begins        $prog=f
-//! {prog:"G0 X1"}    a line of it            $prog=G0 X1
-//! {prog:t}          it is complete          $prog=t
-//! {prog:n}          what it is              $prog
-//! {test:100}        carries it out          $test=100
+//! {prog:f}       begins a new program  $prog=f
+//! {prog:"G0 X1"} appends a line        $prog=G0 X1
+//! {prog:t}       completes it          $prog=t
+//! {prog:n}       shows it              $prog
+//! {test:100}     runs it               $test=100
 //! ```
 
 use super::json::{Kind, Pair};
@@ -14,10 +14,10 @@ use super::write::Writer;
 use crate::protocol::{Machine, Out, Store};
 use crate::status::Status;
 
-/// Bytes of it that a step shows; each may become two.
+/// The bytes of the program that a step shows. Each may take two bytes of output.
 const STEP: u16 = 24;
 
-/// Does to the program what the value of a pair says.
+/// Performs the operation on the program that the value of a pair asks for.
 #[inline(never)]
 #[small]
 pub(super) fn store<M: Machine, O>(pair: &Pair, c: &mut Context<'_, M, O>) -> Result<(), Status> {
@@ -25,10 +25,10 @@ pub(super) fn store<M: Machine, O>(pair: &Pair, c: &mut Context<'_, M, O>) -> Re
     let what = match (pair.kind, text) {
         (Kind::Null, _) => return Ok(()),
         (Kind::Object, _) => return Err(Status::UnsupportedType),
-        // In text mode every value is a line.
+        // In text mode `t` and `f` are parsed as numbers.
         (Kind::False, _) | (Kind::Number, [b'f' | b'F']) => Store::Begin,
         (Kind::True, _) | (Kind::Number, [b't' | b'T']) => Store::End,
-        // No line of G-code needs one.
+        // No line of G-code needs a backslash or a quote.
         _ if text.iter().any(|byte| matches!(byte, b'\\' | b'"')) => {
             return Err(Status::JsonSyntax);
         }
@@ -39,7 +39,7 @@ pub(super) fn store<M: Machine, O>(pair: &Pair, c: &mut Context<'_, M, O>) -> Re
 
 #[small]
 impl Request {
-    /// Begins to show the program as the value of a pair.
+    /// Starts to show the program as the value of a pair.
     pub(super) fn show_program<M: Machine, O: Out>(
         &mut self,
         pair: &Pair,
@@ -50,11 +50,11 @@ impl Request {
         self.phase = Phase::Program;
     }
 
-    /// Some of it.
+    /// Writes the next part of the program.
     pub(super) fn program<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         let start = u16::from(self.item) * STEP;
         self.item += 1;
-        // That of text mode, in a string or not, ends otherwise.
+        // In text mode, wrapped in a string or not, the program ends with a prompt instead of a quote.
         let is_value = self.is_json && !self.format.is_wrapped();
         let mut writer = Writer::body(c.out, &mut self.format);
         for at in start..start + STEP {

@@ -1,4 +1,4 @@
-//! Text mode: the prompt that answers a line.
+//! Text mode: the prompt, which answers a line.
 
 use super::Format;
 use super::block::byte_of;
@@ -11,7 +11,7 @@ use crate::text;
 
 #[small]
 impl Request {
-    /// `tinyg [mm] ok> `, or the beginning of `tinyg [mm] err: <text>: <line> `.
+    /// Writes `tinyg [mm] ok> `, or the beginning of `tinyg [mm] err: <text>: <line> `.
     pub(super) fn prompt<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         if self.resume != 0 {
             return self.unwrap_text(c);
@@ -64,7 +64,7 @@ fn put_prompt<O: Out>(ok: bool, machine: &mut impl Machine, writer: &mut Writer<
     writer.text(if ok { phrases.ok } else { phrases.err });
 }
 
-/// The prompt of a machine that has started in text mode.
+/// Writes the prompt of a machine that has started in text mode.
 #[small]
 pub fn put_ready_prompt(machine: &mut impl Machine, out: &mut impl Out) {
     if machine.settings().text_verbosity() != 0 {

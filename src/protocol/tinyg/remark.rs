@@ -1,37 +1,37 @@
-//! What a response tells beside what has been done.
+//! Messages that a response gives beside its result.
 
 use crate::progmem;
 use crate::progmem::Text;
 use crate::protocol::Warning;
 use crate::text;
 
-/// What is told beside what has been done; the last one counts most.
+/// A message beside the result. If several are due, the last variant in this order is given.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Default)]
 pub enum Remark {
     /// No message.
     #[default]
     None,
-    /// Drivers with so many microsteps are unusual.
+    /// This number of microsteps is unusual.
     Microsteps,
     /// The velocity limits of an axis were lowered to what its motors can follow.
     Velocity,
-    /// A jerk limit of an axis is not in force beside its acceleration limit.
+    /// A jerk limit of an axis has no effect because of its acceleration limit.
     Jerk,
     /// A search velocity is above the traverse velocity.
     Search,
-    /// The line has no such rate.
+    /// The serial line does not support this rate.
     Baud,
-    /// There is no such built-in job.
+    /// There is no built-in job with this number.
     Test,
-    /// The port is spoken to so for it is set.
+    /// A setting has decided the dialect of the port.
     Set,
-    /// The port is spoken to so for it was spoken to so first.
+    /// The first line has decided the dialect of the port.
     Said,
-    /// Where help is.
+    /// Where to find help.
     Help,
-    /// How to get into the boot loader.
+    /// How to enter the boot loader.
     AskBoot,
-    /// The boot loader is next.
+    /// The machine enters the boot loader.
     Boot,
     /// How to restore the defaults.
     AskDefaults,
@@ -40,14 +40,14 @@ pub enum Remark {
 }
 
 impl Remark {
-    /// What it says.
+    /// Returns the text of the message.
     pub fn text(self) -> Text {
         REMARKS.at(self as usize).unwrap_or(text!(""))
     }
 }
 
 progmem! {
-    // A table, for what the compiler makes of a `match` would be in RAM.
+    // A table, because the compiler would put the texts of a `match` into RAM.
     static REMARKS: [Text; 14] = [
         text!(""),
         text!("*** WARNING *** Setting non-standard microstep value"),

@@ -1,8 +1,8 @@
-//! What the machine tells unasked: status reports and queue reports.
+//! Reports that nobody has asked for: status reports and queue reports.
 //!
-//! [`StatusReport`] is the list of what to tell and what was told last; [`Report`] sends one report
-//! in steps, [`queue_report`] one queue report at once. The reporting task holds the transmitter
-//! from the first step of a report to its last; [`Machine::moment`] makes it tell of one moment.
+//! [`StatusReport`] is the list of what to report, with the values that were sent last. [`Report`] sends one status
+//! report in steps. [`queue_report`] sends a queue report at once. The reporting task holds the transmitter from the
+//! first step of a report to the last. [`Machine::moment`] makes all steps of a report describe the same moment.
 
 use super::Format;
 use super::Mode;
@@ -14,28 +14,28 @@ use crate::progmem::Text;
 use crate::protocol::{Machine, Out, Remembers, Value};
 use crate::text;
 
-/// Entries a report may have.
+/// The most entries of a status report.
 pub const LONGEST_REPORT: usize = 36;
 
-/// Bytes of a bit for each entry.
+/// The number of bytes for one bit per entry.
 const HIGH: usize = LONGEST_REPORT.div_ceil(8);
 
-/// The status report: its tokens, in order, and the value of each as last sent.
+/// The list of the status report: its tokens, in order, and the value of each as last sent.
 pub struct StatusReport {
-    /// The lower eight bits of their numbers, and the ninth.
+    /// The lower eight bits of the tokens' numbers; the ninth bits are in `high`.
     low: [u8; LONGEST_REPORT],
     high: [u8; HIGH],
-    /// The low 24 bits of each value, which saves 38 bytes: a change would have to be a multiple of 16,777,216, for
-    /// positions 1.6777216 m between two reports, to pass unseen.
+    /// The low 24 bits of each value, which saves 38 bytes. A change goes unnoticed only if it is a multiple of
+    /// 16,777,216. For a position, which is compared in thousandths, that is 16.777216 m between two reports.
     sent: [[u8; 3]; LONGEST_REPORT],
     len: u8,
-    /// The list is new: what was sent means nothing.
+    /// Whether the list is new, so that the values in `sent` have no meaning.
     fresh: bool,
 }
 
 #[small]
 impl StatusReport {
-    /// Entry `index`.
+    /// Returns the token of an entry; `None` past the end.
     pub fn token(&self, index: u8) -> Option<Token> {
         (index < self.len).then(|| self.at(index))
     }
@@ -53,7 +53,7 @@ impl StatusReport {
         self.fresh = true;
     }
 
-    /// Enters a token. Whether there is room.
+    /// Writes a token into an entry. Returns whether there is room.
     fn put(&mut self, index: u8, token: Token) -> bool {
         let place = usize::from(index);
         let [number, ninth] = token.number().to_le_bytes();
@@ -67,7 +67,8 @@ impl StatusReport {
         true
     }
 
-    /// Adds a token that is not [far](Token::is_far) behind the others, once. Whether there was room.
+    /// Adds a token, unless it is in the list already. The token must not be [far](Token::is_far). Returns whether
+    /// there was room.
     pub fn add(&mut self, token: Token) -> bool {
         if (0..self.len).any(|index| self.at(index) == token) {
             return true;
@@ -80,7 +81,7 @@ impl StatusReport {
         true
     }
 
-    /// Takes a token off the list.
+    /// Removes a token from the list.
     pub fn remove(&mut self, token: Token) {
         let Some(found) = (0..self.len).find(|&index| self.at(index) == token) else { return };
         for index in found + 1..self.len {
@@ -90,7 +91,7 @@ impl StatusReport {
         self.fresh = true;
     }
 
-    /// Notes that `value` is being sent for an entry. Whether it differs from the last.
+    /// Records that `value` is being sent for an entry. Returns whether it differs from the value sent before.
     fn note(&mut self, index: u8, value: i32) -> bool {
         let [a, b, c, _] = value.to_le_bytes();
         match self.sent.get_mut(usize::from(index)) {
@@ -100,7 +101,7 @@ impl StatusReport {
     }
 }
 
-/// With the defaults of settings it is the default list.
+/// The list goes back to its default together with the settings.
 #[small]
 impl Remembers for StatusReport {
     fn new() -> Self {
@@ -125,20 +126,21 @@ impl Remembers for StatusReport {
     }
 }
 
-/// A status report on its way.
+/// A status report that is being sent.
 pub struct Report {
     index: u8,
     all: bool,
-    /// The next entry is the first of a line: it is told of now.
+    /// Whether the next entry is the first of a line, so that the line describes the machine now.
     first: bool,
-    /// Something has been put of the line.
+    /// Whether part of the current line has been written.
     begun: bool,
     format: Format,
 }
 
 #[small]
 impl Report {
-    /// Begins an automatic report, if the settings want any: of what has changed, or everything.
+    /// Starts an automatic report of all changed entries, or of all entries. `None` if the settings want no status
+    /// reports.
     #[inline(never)]
     pub fn begin(mode: Mode, machine: &mut impl Machine) -> Option<Report> {
         let verbosity = machine.settings().status_verbosity();
@@ -151,7 +153,7 @@ impl Report {
         Some(Report { index: 0, all, first: true, begun: false, format })
     }
 
-    /// Looks at one entry. Whether there is more to do. If nothing has changed, nothing is sent.
+    /// Handles one entry. Returns whether there is more to do. If no value has changed, nothing is sent.
     #[inline(never)]
     pub fn step(&mut self, machine: &mut impl Machine, out: &mut impl Out) -> bool {
         let Some(token) = machine.memory().tinyg.token(self.index) else {
@@ -178,8 +180,8 @@ impl Report {
         true
     }
 
-    /// Ends the line here, so that an answer can be sent: what is left follows in a line of its own, which tells of its own moment.
-    /// False if a line can't end here: in text a report is as many lines as it has entries.
+    /// Ends the line here, so that an answer can be sent in between. The rest follows in a line of its own, which
+    /// describes its own moment. `false` in text mode, where every entry is a line already.
     pub fn split(&mut self, out: &mut impl Out) -> bool {
         if self.format.is_plain() {
             return false;
@@ -196,8 +198,8 @@ impl Report {
     }
 }
 
-/// Sends a queue report if the settings want any: free blocks, and with more verbosity those added
-/// and removed since the last.
+/// Sends a queue report, if the settings want any: the free blocks, and at a higher verbosity the blocks added and
+/// removed since the last report.
 #[small]
 #[inline(never)]
 pub fn queue_report(mode: Mode, machine: &mut impl Machine, out: &mut impl Out) {
@@ -216,7 +218,7 @@ pub fn queue_report(mode: Mode, machine: &mut impl Machine, out: &mut impl Out) 
     writer.end_object();
 }
 
-/// Sends how far the axes are ahead of the spindle: a status report of that alone.
+/// Sends a status report that has only the sync error: how far the axes are ahead of the spindle.
 #[small]
 #[inline(never)]
 pub fn sync_report(mode: Mode, machine: &mut impl Machine, out: &mut impl Out) {
@@ -230,7 +232,7 @@ pub fn sync_report(mode: Mode, machine: &mut impl Machine, out: &mut impl Out) {
     writer.tail();
 }
 
-/// Sends what is free for lines, after a queue flush, whatever the verbosity.
+/// Sends how much the sender may send again, after a queue flush. Sent at every verbosity.
 #[small]
 #[inline(never)]
 pub fn receive_report(mode: Mode, machine: &mut impl Machine, out: &mut impl Out) {
@@ -243,7 +245,7 @@ pub fn receive_report(mode: Mode, machine: &mut impl Machine, out: &mut impl Out
 
 #[small]
 impl<O: Out> Writer<'_, O> {
-    /// Begins a report: nothing in text, else `{"name":{`.
+    /// Begins a report: with nothing in text mode, with `{"name":{` in JSON.
     fn head(&mut self, name: Text) {
         if !self.is_plain() {
             self.open();

@@ -1,8 +1,8 @@
-//! A line on its way through the protocol.
+//! Answers a line, as a state machine.
 //!
-//! The parser task holds the line and calls [`Request::step`] until [`Next::Done`], handing the line
-//! in anew each time. Every line but an empty one gets exactly one response. No response is begun
-//! before its G-code has run, so a wait for the planner never holds up the transmitter.
+//! The parser task holds the line and calls [`Request::step`] until [`Next::Done`]. It passes the line anew each
+//! time. Every line except an empty one gets exactly one response. No response starts before its G-code has run, so a
+//! wait for the planner never blocks the transmitter.
 //!
 //! ```text
 //!   line --{--> check --bad--> Echo ------------------------------> Warning -> Advice -> Footer
@@ -32,92 +32,92 @@ use crate::status::Status;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub(super) enum Phase {
-    /// A malformed line is given back.
+    /// Sends a malformed line back.
     Echo,
     EchoText,
-    /// At a pair of the line's object.
+    /// At a pair of the line's outer object.
     Pair,
     /// At a pair of a group's object.
     Member,
     /// Listing the members of a group.
     List,
-    /// At a pair of a new status report.
+    /// At a pair of an object that defines a new status report.
     Select,
-    /// At a pair of what the status report gains and loses.
+    /// At a pair of an object that changes the status report.
     Amend,
-    /// The caller is to run the block.
+    /// The caller has to run the block.
     Gcode,
-    /// The block, its message, its line number.
+    /// Reports the block, its message, its line number.
     Block,
     BlockText,
     Message,
     MessageText,
     Number,
-    /// All is carried out, or something has failed: what has to be told yet.
+    /// All pairs are done, or one has failed: what remains to be reported.
     Warning,
     Advice,
     Footer,
-    /// A line of text mode that is answered in a string.
+    /// A line of text mode whose output goes into a JSON string.
     Wrap,
     /// A line that begins with `$`.
     Command,
-    /// Groups in text.
+    /// Lists groups in text.
     Listing,
-    /// Help in text.
+    /// Writes a help screen.
     Help,
-    /// The program that is kept.
+    /// Shows the stored program.
     Program,
-    /// The defaults have been restored: tell who we are.
+    /// The defaults have been restored: reports what the firmware is.
     Greeting,
-    /// An exception report that was asked for.
+    /// Sends an exception report that was asked for.
     Raise,
-    /// Giving a string back.
+    /// Sends a string back.
     Quote,
-    /// The prompt, a status, the line that caused it.
+    /// Writes the prompt, then the status and the line that caused it.
     Prompt,
     Failure,
     Complaint,
     Done,
 }
 
-/// A line being answered.
+/// A line that is being answered.
 pub struct Request {
     pub(super) phase: Phase,
     pub(super) status: Status,
     pub(super) format: Format,
-    /// The verbosity of the response, fixed when it begins.
+    /// The verbosity of the response, fixed when the response begins.
     pub(super) verbosity: u8,
-    /// The group whose object is open.
+    /// The group whose object is open in the response.
     pub(super) group: Option<Group>,
-    /// The G-code in the line.
+    /// The part of the line that is G-code.
     pub(super) block: Span,
-    /// The length of the line with its end, as its sender counts it.
+    /// The length of the line with its line end, as the sender counts it.
     pub(super) length: u16,
-    /// In a `txt`: where to read on behind it. Else 0.
+    /// In a `txt`: the position to read on after it. Otherwise 0.
     pub(super) resume: u8,
-    /// Where to read on in the line.
+    /// The position to read on in the line.
     pub(super) at: u8,
-    /// Where a phase that takes several steps has got to.
+    /// The progress within a phase that takes several steps.
     pub(super) item: u8,
-    /// The response has begun.
+    /// Whether the response has begun.
     pub(super) begun: bool,
-    /// The line is JSON.
+    /// Whether the line is JSON.
     pub(super) is_json: bool,
-    /// The block is answered with a prompt.
+    /// Whether the block is answered with a prompt.
     is_text: bool,
-    /// The block may have a comment, and that a message.
+    /// Whether the block may have a comment, which may contain a message.
     pub(super) commented: bool,
     /// The message that is due.
     pub(super) remark: Remark,
-    /// Something has been selected in the phase `Select`.
+    /// In the phase `Select`: whether an entry has been selected.
     pub(super) selected: bool,
-    /// What the last step was to do has to wait.
+    /// Whether the work of the last step has to be repeated later.
     pub(super) waits: bool,
-    /// The line has a `tid`, which is told at the end.
+    /// Whether the line has a `tid`, which is reported at the end.
     pub(super) identified: bool,
 }
 
-/// What a step works with.
+/// What a step works on.
 pub(super) struct Context<'a, M, O> {
     pub line: &'a [u8],
     pub machine: &'a mut M,
@@ -126,8 +126,8 @@ pub(super) struct Context<'a, M, O> {
 
 #[small]
 impl Request {
-    /// Begins with a line, without its terminator; its sender counts `length` bytes for it. `None` if there is
-    /// nothing to answer. The line decides the `mode` from now on.
+    /// Starts to answer a line, which comes without its line end. The sender counts `length` bytes for it. `None` if
+    /// there is nothing to answer. The line sets `mode`, which applies from now on.
     ///
     /// A JSON line is checked as a whole here: up to 20,000 cycles on AVR.
     pub fn begin(
@@ -183,7 +183,8 @@ impl Request {
         Some(request)
     }
 
-    /// Answers a line that could not be kept with a status; `line` is what is left of it. It leaves the mode as it is.
+    /// Answers a line that could not be kept with a status. `line` is what is left of the line. The mode stays as it
+    /// is.
     pub fn refused(
         status: Status,
         line: &[u8],
@@ -200,7 +201,7 @@ impl Request {
         request
     }
 
-    /// Gives the line back, for it makes no sense.
+    /// Sends the line back, because it cannot be understood.
     fn give_back(&mut self, status: Status) {
         self.status = status;
         self.phase = Phase::Echo;
@@ -234,7 +235,7 @@ impl Request {
         self.phase = if mode == Mode::Text { Phase::Prompt } else { Phase::Warning };
     }
 
-    /// Begins the response, if it has not begun.
+    /// Begins the response, unless it has begun already.
     pub(super) fn open<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         if core::mem::replace(&mut self.begun, true) {
             return;
@@ -260,10 +261,11 @@ impl Answers for Request {
         }
     }
 
-    /// Not inlined: with the machine's view in its frame it would reach beyond 63 bytes, at five instructions an access.
+    /// Not inlined: together with the machine's view the stack frame would exceed 63 bytes, beyond which an access
+    /// takes five instructions.
     #[inline(never)]
     fn step(&mut self, line: &[u8], machine: &mut impl Machine, out: &mut impl Out) -> Next {
-        // Within a `txt` the line ends where that does, before its quote.
+        // Within a `txt` the line ends before the closing quote of that string.
         let end = match self.resume {
             0 => line.len(),
             resume => usize::from(resume - 1),

@@ -1,7 +1,6 @@
-//! Text mode: a line of the status report that answers `?`, and of any value that is no setting.
+//! Text mode: a line of the status report that answers `?`, or of any value that is not a setting.
 //!
-//! Numbers end in column 22 if they are counts, in column 26 if they have decimals; texts begin in
-//! column 22.
+//! Counts end in column 22, numbers with decimals in column 26. Texts begin in column 22.
 
 use super::token::{Shown, Subject, Token};
 use super::value::Form;
@@ -17,7 +16,7 @@ const COUNT_END: usize = 22;
 const DECIMALS_END: usize = 26;
 const TEXT_START: usize = 21;
 
-/// What stands before a value.
+/// The label before a value.
 pub(super) struct Label {
     letter: Option<u8>,
     text: Text,
@@ -84,7 +83,7 @@ impl Label {
     }
 }
 
-/// The names of a value's numbers, and its number, if they have names.
+/// Returns the names of a value's numbers, and the index of the present one; `None` if its numbers have no names.
 #[small]
 fn choice<M: Machine>(token: Token, machine: &mut M) -> Option<(Text, i32)> {
     match token.subject() {
@@ -95,7 +94,7 @@ fn choice<M: Machine>(token: Token, machine: &mut M) -> Option<(Text, i32)> {
     }
 }
 
-/// Entry `index` of `choices`; the number if there is none.
+/// Writes entry `index` of `choices`, or the number if there is no such entry.
 #[small]
 fn write_choice<O: Out>(choices: Text, index: i32, writer: &mut Writer<'_, O>) {
     let (mut entry, mut found) = (0, false);
@@ -112,7 +111,7 @@ fn write_choice<O: Out>(choices: Text, index: i32, writer: &mut Writer<'_, O>) {
     }
 }
 
-/// The value as text reports show it: speeds with a third decimal.
+/// Returns the value as text reports show it, where speeds have a third decimal.
 #[small]
 fn read<M: Machine>(token: Token, machine: &mut M) -> Shown {
     let inches = machine.inches();

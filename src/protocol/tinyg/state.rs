@@ -1,10 +1,10 @@
-//! What the machine is doing, in TinyG's numbers.
+//! The state of the machine, in TinyG's numbers.
 
 use crate::machine::{Alarm, Cycle, Doing};
 use crate::motion::snapshot::Program;
 use crate::protocol::{Hold, Machine, Value};
 
-/// `stat` in its states. Those from [`INTERLOCK`] on are five less as `macs`.
+/// The values of `stat`. From [`INTERLOCK`] on, the values of `macs` are five less.
 const READY: i32 = 1;
 const ALARM: i32 = 2;
 const STOP: i32 = 3;
@@ -18,7 +18,7 @@ const INTERLOCK: i32 = 11;
 const SHUTDOWN: i32 = 11;
 const PANIC: i32 = 13;
 
-/// `stat`: the state in one number.
+/// Returns `stat`: the state in one number.
 #[small]
 #[inline(never)]
 pub fn stat(machine: &mut impl Machine) -> i32 {
@@ -42,13 +42,13 @@ pub fn stat(machine: &mut impl Machine) -> i32 {
     }
 }
 
-/// Whether the machine is shut down, by a number that means the door to a g2core.
+/// Whether the machine is shut down and shows a number that means an open door on a g2core.
 #[small]
 pub fn is_tinyg_shutdown(machine: &mut impl Machine) -> bool {
     matches!(machine.doing(), Doing::Alarm(Alarm::Shutdown)) && !machine.settings().is_g2core()
 }
 
-/// `macs`: machine state.
+/// Returns `macs`: the machine state.
 #[small]
 pub fn macs(machine: &mut impl Machine) -> i32 {
     match stat(machine) {
@@ -58,7 +58,7 @@ pub fn macs(machine: &mut impl Machine) -> i32 {
     }
 }
 
-/// `cycs`: cycle.
+/// Returns `cycs`: the cycle.
 #[small]
 pub fn cycs(machine: &mut impl Machine) -> i32 {
     if matches!(machine.doing(), Doing::Alarm(_)) {
@@ -74,13 +74,13 @@ pub fn cycs(machine: &mut impl Machine) -> i32 {
     }
 }
 
-/// `mots`: motion.
+/// Returns `mots`: the motion state.
 #[small]
 pub fn mots(machine: &mut impl Machine) -> i32 {
     if machine.hold() != Hold::None { 2 } else { machine.value(Value::Running) }
 }
 
-/// `hold`: feedhold.
+/// Returns `hold`: the state of the feedhold.
 #[small]
 pub fn hold(machine: &mut impl Machine) -> i32 {
     match machine.hold() {

@@ -1,18 +1,18 @@
-//! The numbers of statuses, which senders know by heart and which never change, and their texts for people.
+//! The numbers and texts of statuses. Senders rely on the numbers, so they never change.
 
 use crate::progmem;
 use crate::progmem::Text;
 use crate::status::Status;
 use crate::text;
 
-/// The number of a status.
+/// Returns the number of a status.
 #[small]
 #[inline(never)]
 pub fn number(status: Status) -> u8 {
     ROWS.at(status as usize).map_or(0, |(number, _)| number)
 }
 
-/// The text of a status; `None` for one that prints its number.
+/// Returns the text of a status; `None` for a status that is shown as its number.
 #[small]
 pub fn status_text(status: Status) -> Option<Text> {
     ROWS.at(status as usize).map(|(_, text)| text).filter(|text| !text.is_empty())
@@ -36,7 +36,7 @@ macro_rules! rows {
     };
 }
 
-// No sender gets to see `Again`.
+// Senders never see `Again`.
 rows! {
     Ok = 0, "OK";
     Error = 1, "Error";

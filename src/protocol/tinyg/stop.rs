@@ -1,4 +1,4 @@
-//! Which lines begin an alarm, before they are answered.
+//! The lines that raise an alarm on arrival, before they are answered.
 
 use super::json;
 use super::token::{Operation, Target, resolve};
@@ -6,9 +6,9 @@ use crate::config::Name;
 use crate::machine::Alarm;
 use crate::protocol::STOP_MAX;
 
-/// The alarm that a line of JSON begins with, if all of the line is as it should be: `{alarm:1}`, `{"shutd":true}`,
-/// `{panic:n,tid:7}`. An alarm behind other pairs depends on them. Cost: 200 cycles; for one
-/// that begins like an alarm 200 a byte and 3,000.
+/// Returns the alarm that a line of JSON asks for in its first pair, if the whole line is well-formed: `{alarm:1}`,
+/// `{"shutd":true}`, `{panic:n,tid:7}`. An alarm behind other pairs is not raised on arrival, because those pairs may
+/// fail. Cost: 200 cycles; for a line that begins like an alarm 200 a byte and 3,000.
 #[inline(never)]
 #[small]
 pub fn asks_alarm(line: &[u8]) -> Option<Alarm> {
@@ -23,7 +23,7 @@ pub fn asks_alarm(line: &[u8]) -> Option<Alarm> {
     }
 }
 
-/// Whether the first letters are those of an alarm.
+/// Whether the first two letters are those of an alarm.
 #[small]
 fn may_ask(line: &[u8]) -> bool {
     let mut letters = line.iter().filter(|byte| byte.is_ascii_alphanumeric());

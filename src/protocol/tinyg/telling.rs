@@ -1,4 +1,4 @@
-//! A notice on its way out, in this dialect.
+//! Sends a notice in this dialect.
 
 use super::Mode;
 use super::notice::{Banner, Exception, Probing, acknowledge, jog_ended};
@@ -7,13 +7,13 @@ use super::report::{Report, queue_report, receive_report, sync_report};
 use crate::capability::Capability;
 use crate::protocol::{Machine, Notice, Occasion, Out, Tells, Value};
 
-/// How far it has been told, and how.
+/// A notice that is being sent, and the mode of the port.
 pub struct Telling {
     part: Part,
     mode: Mode,
 }
 
-/// What is being told.
+/// What is being sent.
 enum Part {
     Greeting(Banner, Occasion),
     Enquiry,
@@ -25,13 +25,13 @@ enum Part {
         flushed: bool,
     },
     SyncError,
-    /// How many blocks are free, as it was told.
+    /// The queue report, with the number of free blocks that it has told.
     Queue(usize),
 }
 
 #[small]
 impl Telling {
-    /// Begins. What is told is what is so by now.
+    /// Starts to send a notice about the present state of the machine.
     #[inline(never)]
     pub(super) fn begin(notice: Notice, mode: Mode, machine: &mut impl Machine) -> Self {
         let settings = machine.settings();
@@ -42,7 +42,7 @@ impl Telling {
             Notice::Enquiry => Part::Enquiry,
             Notice::Exception(status) => Part::Exception(Exception::begin(status, settings)),
             Notice::Probing => Part::Probing(Probing::begin(settings)),
-            // Nobody asks so in this dialect, nor keeps such lines.
+            // This dialect has neither start-up lines nor these reports.
             Notice::Startup(..) | Notice::Busy | Notice::Temperatures | Notice::Tuning => {
                 Part::Status(None)
             }

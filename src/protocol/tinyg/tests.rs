@@ -1,4 +1,4 @@
-//! Exchanges byte for byte.
+//! Exchanges of lines and answers, byte for byte.
 
 use super::fake::{Chunk, Fake};
 use super::notice::{Banner, Exception};
@@ -13,7 +13,7 @@ use std::format;
 use std::string::String;
 use std::vec::Vec;
 
-/// Each line asked of a new machine, and its answer.
+/// Each line is sent to a new machine, and its answer compared.
 #[test]
 fn answers_as_documented() {
     for (line, answer) in [
@@ -51,7 +51,7 @@ fn answers_as_documented() {
     }
 }
 
-/// Answers whose form the exchanges above do not show.
+/// Answers in forms that the exchanges above do not cover.
 #[test]
 fn answers_as_senders_expect() {
     for (line, answer) in [
@@ -251,7 +251,7 @@ fn the_screen_shows_any_token() {
     assert_eq!(screen.lines().take(11).collect::<Vec<_>>(), expected);
 }
 
-/// What `step` puts until it has no more.
+/// Returns everything that `step` writes.
 fn all(mut step: impl FnMut(&mut Chunk) -> bool) -> String {
     let mut all = Vec::new();
     loop {
@@ -277,7 +277,7 @@ fn automatic_reports_tell_what_changed() {
     fake.position = 100_900;
     fake.rest = Program::Stopped;
     assert_eq!(automatic(&mut fake, Mode::Json), "{\"sr\":{\"posx\":10.090,\"stat\":3}}\n");
-    // Less than what shows is no change.
+    // A change smaller than the last decimal shown does not count.
     fake.position = 100_901;
     assert_eq!(automatic(&mut fake, Mode::Json), "");
     fake.doing = Doing::Runs;

@@ -9,7 +9,7 @@ use std::vec::Vec;
 
 const OK: &str = "tinyg [mm] ok> ";
 
-/// What a new machine answers, without the prompt.
+/// Returns what a new machine answers to a line, without the prompt.
 fn listed(line: &str) -> String {
     let answer = Fake::new().ask(line);
     let listing = answer.strip_suffix(OK).expect("a prompt that says ok");

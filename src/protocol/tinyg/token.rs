@@ -1,4 +1,4 @@
-//! Names on the wire: settings, values, groups and actions.
+//! Names in requests and responses: settings, values, groups and actions.
 
 use super::value::{
     Form, PROBE_STATE, PROBED, SHIFT, SINGLE_COUNT, SINGLES, Single, Source, VECTOR_COUNT, VECTORS,
@@ -18,26 +18,26 @@ use crate::{named, plain, progmem, text};
 const FIRST_SINGLE: u16 = Setting::NUMBERS as u16;
 const FIRST_VECTOR: u16 = FIRST_SINGLE + SINGLE_COUNT as u16;
 
-/// The first value of the interpreter's tables. Those below it may be told all the time.
+/// The number of the first token for the interpreter's tables. Only tokens below it may be in the status report.
 const FIRST_ROW: u16 = 512;
 
-/// A setting or a value, as a number.
+/// A setting or a value, identified by a number.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Token(u16);
 
-/// What a token is.
+/// What a token stands for.
 pub enum Subject {
     /// A setting.
     Setting(Setting),
     /// A value with a name of its own.
     Single(Single),
-    /// A member of a vector: the vector's number, the vector, the member's number.
+    /// A member of a vector: the index of the vector, the vector, and the index of the member.
     Member(u8, Vector, u8),
     /// A value of the interpreter's tables.
     TableRow(TableRow, u8),
 }
 
-/// A token's value, ready to be written.
+/// The value of a token, ready to be written.
 #[derive(Clone, Copy)]
 pub enum Shown {
     /// A number.
@@ -50,47 +50,48 @@ pub enum Shown {
 
 #[small]
 impl Token {
-    /// The token of row `row` of the group `sys`.
+    /// Returns the token for row `row` of the group `sys`.
     pub const fn system(row: u8) -> Token {
         Token(row as u16)
     }
 
-    /// Whether it is in EEPROM alone, too far away to be told all the time.
+    /// Whether the value is in EEPROM only, and so takes too long to read for the status report.
     pub fn is_far(self) -> bool {
         self.0 >= FIRST_ROW || self.setting().is_some_and(Setting::is_cold)
     }
 
-    /// The number of the token; below 512 unless it is [far](Self::is_far).
+    /// Returns the number of the token, which is below 512 unless the token is [far](Self::is_far).
     pub const fn number(self) -> u16 {
         self.0
     }
 
-    /// The token of a number that [`Token::number`] returned.
+    /// Returns the token with a number that [`Token::number`] returned.
     pub const fn numbered(number: u16) -> Token {
         Token(number)
     }
 
-    /// The token of a setting.
+    /// Returns the token of a setting.
     fn of_setting(setting: Setting) -> Token {
         Token(setting.number().into())
     }
 
-    /// The token of a value in the table of [`SINGLES`].
+    /// Returns the token of a row of [`SINGLES`].
     pub const fn single(index: u8) -> Token {
         Token(FIRST_SINGLE + index as u16)
     }
 
-    /// The token of a vector's member.
+    /// Returns the token of a member of a vector.
     const fn member(vector: u8, index: u8) -> Token {
         Token(FIRST_VECTOR + (vector * AXES as u8 + index) as u16)
     }
 
-    /// The token of a value of a row.
+    /// Returns the token of a value in the interpreter's tables.
     fn row(row: TableRow, axis: u8) -> Token {
         Token(FIRST_ROW + u16::from(row.number()) * AXES as u16 + u16::from(axis))
     }
 
-    /// The setting or value called `name`. About 3,000 cycles on AVR; 8,000 for one that begins as those of the tables do.
+    /// Returns the setting or value called `name`; `None` if there is none. About 3,000 cycles on AVR; 8,000 for a
+    /// name that begins like those of the interpreter's tables.
     pub fn find(name: &Name) -> Option<Token> {
         let setting = || Setting::find(name).map(Token::of_setting);
         let single = name.row_name(0).and_then(|token| SINGLES.slice().find(token));
@@ -120,7 +121,7 @@ impl Token {
         row.has(axis).then(|| Token::row(row, axis))
     }
 
-    /// What it is.
+    /// Returns what the token stands for; `None` if its number is unused.
     pub fn subject(self) -> Option<Subject> {
         let number = self.0;
         if let Some(setting) = self.setting() {
@@ -141,12 +142,12 @@ impl Token {
         TableRow::from_number(row).map(|row| Subject::TableRow(row, axis))
     }
 
-    /// The setting it is, if it is one.
+    /// Returns the setting; `None` if the token is not a setting.
     pub fn setting(self) -> Option<Setting> {
         u8::try_from(self.0).ok().and_then(Setting::from_number)
     }
 
-    /// The full name of the token.
+    /// Returns the full name of the token.
     pub fn name(self) -> Name {
         match self.subject() {
             Some(Subject::Setting(setting)) => setting.name(),
@@ -162,7 +163,7 @@ impl Token {
         }
     }
 
-    /// The value of the token now.
+    /// Returns the present value of the token.
     pub fn read(self, machine: &mut impl Machine) -> Shown {
         let inches = machine.inches();
         let (source, form) = match self.subject() {
@@ -191,13 +192,13 @@ impl Token {
     }
 }
 
-/// Which group of six, and which of it.
+/// Splits a number into a group of six, and the index in that group.
 #[small]
 fn by_axis(number: u8) -> (u8, u8) {
     (number / AXES as u8, number % AXES as u8)
 }
 
-/// Which vector, and which member of it. The last one may have more members.
+/// Returns the vector, and the member of it. The last vector may have more members than there are axes.
 #[small]
 fn vector_index(offset: u8) -> (u8, u8) {
     let number = (offset / AXES as u8).min(VECTOR_COUNT as u8 - 1);
@@ -209,7 +210,7 @@ fn find_vector(name: &Name) -> Option<u8> {
     VECTORS.slice().find(name.row_name(0)?)
 }
 
-/// The reports that a machine sends before anyone asks for others.
+/// The number of entries of the default status report.
 pub const DEFAULT_REPORT: usize = 11;
 
 progmem! {
@@ -248,7 +249,7 @@ progmem! {
     ];
 }
 
-/// The name of an action, padded with zeros, and the action.
+/// The name of an action, padded with zeros, and its operation.
 #[derive(Clone, Copy)]
 struct Verb {
     token: [u8; LONGEST],
@@ -261,14 +262,14 @@ const fn verb(name: &str, action: Operation) -> Verb {
     Verb { token: padded(name), action }
 }
 
-/// What a request may have done.
+/// An action that a request may ask for.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Operation {
     /// `gc`: run a block of G-code.
     Block,
-    /// `clear`, `clr`: end the alarm.
+    /// `clear`, `clr`: ends the alarm.
     Clear,
-    /// `alarm`, `shutd`, `panic`: begin one.
+    /// `alarm`, `shutd`, `panic`: raises an alarm.
     Raise(Alarm),
     /// `me`: power motors.
     Energize,
@@ -276,19 +277,19 @@ pub enum Operation {
     Release,
     /// `test`: run a built-in job.
     Test,
-    /// `prog`: the program in EEPROM.
+    /// `prog`: writes or shows the stored program.
     Program,
-    /// `qf`: drop what is queued.
+    /// `qf`: flushes the queue.
     Flush,
     /// `defa`: restore the defaults.
     Defaults,
-    /// `h`, `help`: tell about settings.
+    /// `h`, `help`: gives a hint on help.
     Help,
-    /// `txt`: do what a line of text mode says.
+    /// `txt`: carries out a line of text mode.
     Text,
-    /// `tid`: nothing; it comes back.
+    /// `tid`: no action; the value is sent back.
     Id,
-    /// `msg`: nothing; it comes back.
+    /// `msg`: no action; the text is sent back.
     Message,
     /// `er`: send an exception report.
     Exception,
@@ -296,20 +297,20 @@ pub enum Operation {
     Jog,
     /// `boot`: start the boot loader.
     Boot,
-    /// `reset`: start anew.
+    /// `reset`: restarts the machine.
     Reset,
 }
 
-/// Names that stand for several.
+/// A name that stands for several settings or values.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Group {
     /// `sys`, `1` to `4`, `x` to `c`, `p1`, `uda` to `udd`, `jid`.
     Settings(Owner),
-    /// `pos` and its like, by their number in [`VECTORS`].
+    /// `pos` and similar groups, by their index in [`VECTORS`].
     Vector(u8),
-    /// `g54`, `g28`, `tt1` and their like.
+    /// `g54`, `g28`, `tt1` and similar groups.
     TableRow(TableRow),
-    /// A token alone.
+    /// A group of a single token.
     One(Token),
     /// `sr`, `srs`: the tokens of the status report.
     Report,
@@ -337,7 +338,7 @@ impl Group {
         find_vector(name).map(Group::Vector).or_else(|| find_row(name).map(Group::TableRow))
     }
 
-    /// What comes before the names of its members.
+    /// Returns the prefix of the members' names.
     pub fn prefix(self) -> Name {
         match self {
             Group::Settings(owner) => owner.prefix(),
@@ -349,7 +350,7 @@ impl Group {
         }
     }
 
-    /// The member behind number `from` and its number, if there is one.
+    /// Returns the first member from index `from` on, and its index; `None` if there is none.
     pub fn member(self, from: u8, machine: &mut impl Machine) -> Option<(u8, Token)> {
         match self {
             Group::Settings(owner) => (from..owner.rows())
@@ -370,8 +371,8 @@ impl Group {
     }
 }
 
-/// Every name that means something at the top of a request, for tests and documents: settings and values by their
-/// full names, and actions.
+/// Returns every name that has a meaning at the top level of a request, for tests and documents: settings and values
+/// by their full names, and actions.
 #[cfg(feature = "std")]
 #[small]
 pub fn names() -> std::vec::Vec<std::string::String> {
@@ -387,19 +388,19 @@ pub fn names() -> std::vec::Vec<std::string::String> {
 pub enum Target {
     /// A setting or value.
     Token(Token),
-    /// Something to do.
+    /// An action.
     Operation(Operation),
     /// Several settings or values.
     Group(Group),
-    /// The name means nothing.
+    /// The name is unknown.
     Unknown,
 }
 
-/// What `name` means behind `prefix`, a group's.
+/// Returns what `name` means with the `prefix` of a group.
 #[small]
 pub fn resolve(prefix: Name, name: &[u8]) -> Target {
     let Some(full) = prefix.with(name) else { return Target::Unknown };
-    // First, for they are few: `tid` comes with each line of some senders.
+    // Actions are searched first because they are few: some senders put a `tid` into each line.
     let verb = ACTIONS.slice().find(full.padded());
     if let Some(verb) = verb.and_then(|verb| ACTIONS.at(verb.into())) {
         return Target::Operation(verb.action);

@@ -1,4 +1,4 @@
-//! What can be read of the machine beside its settings: names, units and texts, as tables.
+//! The values of the machine that can be read beside its settings: tables of names, units and texts.
 
 use super::state;
 use super::variation::Variation;
@@ -12,7 +12,7 @@ use crate::protocol::{Machine, Value};
 use crate::units::FIRST_ROTARY;
 use crate::{named, progmem, text};
 
-/// Where a number comes from that is told.
+/// Where a reported number comes from.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Source {
     /// A value of the machine.
@@ -27,7 +27,7 @@ pub enum Source {
     Motion,
     /// `hold`.
     Hold,
-    /// `rx`: what the sender may send: lines, or characters if it counts those.
+    /// `rx`: how much the sender may send, in lines, or in characters if the sender counts characters.
     Room,
     /// Not supported; always reads 0: `fd`, `ma`, `_xs1`, `_fe1`.
     Zero,
@@ -35,14 +35,15 @@ pub enum Source {
 
 #[small]
 impl Source {
-    /// The place of its name among those of its numbers. TinyG has no interlock: its shutdown has the number of g2core's.
+    /// Returns the index of the value's name in its `choices`. TinyG has no interlock, and its shutdown has the
+    /// number of g2core's interlock, so the index of the shutdown is one higher than the number.
     pub fn choice(self, machine: &mut impl Machine) -> i32 {
         let number = self.read(machine);
         let is_state = matches!(self, Source::State | Source::Machine);
         if is_state && state::is_tinyg_shutdown(machine) { number + 1 } else { number }
     }
 
-    /// The number now.
+    /// Returns the number now.
     #[inline(never)]
     pub fn read(self, machine: &mut impl Machine) -> i32 {
         match self {
@@ -61,19 +62,19 @@ impl Source {
     }
 }
 
-/// A value of the machine.
+/// Makes the source of a machine's value.
 const fn of(value: Value) -> Source {
     Source::Of(value)
 }
 
-/// Most steps that are shown: with two decimals they fit.
+/// The most steps that are shown, so that they fit 32 bits with two decimals.
 const STEPS_MAX: i32 = i32::MAX / 100;
 
-/// What a value is measured in.
+/// The unit of a value, and how it is shown.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub enum Form {
-    /// An integer, or a choice.
+    /// An integer, or a number that stands for a choice.
     Count,
     /// A speed.
     Speed,
@@ -81,9 +82,9 @@ pub enum Form {
     Factor,
     /// A length or angle.
     Length,
-    /// A length in millimetres whatever the units, or an angle.
+    /// A length in millimetres even if the units are inches, or an angle.
     Millimetres,
-    /// A length in millimetres whatever the units, or an angle, shown with two decimals.
+    /// A length in millimetres even if the units are inches, or an angle; shown with two decimals.
     Rough,
     /// Thousandths of a millimetre, shown in the units in force.
     Micrometres,
@@ -97,7 +98,7 @@ pub enum Form {
 
 #[small]
 impl Form {
-    /// `value` as shown, lengths in inches if `inches`.
+    /// Returns `value` as it is shown; lengths are in inches if `inches`.
     pub fn show(self, value: i32, inches: bool) -> Fixed {
         let (stored, shown) = match self {
             Form::Count => return Fixed::int(value),
@@ -123,7 +124,7 @@ impl Form {
     }
 }
 
-/// How a place on an axis is shown: an angle never in inches.
+/// Returns how a position on an axis is shown. An angle is never converted to inches.
 #[small]
 pub fn place_form(axis: u8) -> Form {
     if usize::from(axis) < FIRST_ROTARY { Form::Length } else { Form::Millimetres }
@@ -134,28 +135,28 @@ pub fn place_form(axis: u8) -> Form {
 pub struct Single {
     /// The name of the value, padded with zeros.
     pub token: [u8; 4],
-    /// What it is.
+    /// Where the value comes from.
     pub source: Source,
-    /// What it is measured in.
+    /// The unit of the value.
     pub form: Form,
-    /// What text reports call it; empty if they do not know it.
+    /// The label in text reports; empty if they do not show the value.
     pub label: Text,
-    /// The names of its numbers from 0, separated by `|`; empty if they have none.
+    /// The names of the value's numbers from 0 on, separated by `|`; empty if the numbers have no names.
     pub choices: Text,
 }
 
 named! { Single, 4 }
 
-/// Values of each axis or motor.
+/// A group of values with one member for each axis, motor or input.
 #[derive(Clone, Copy)]
 pub struct Vector {
-    /// The group's name, zero padded.
+    /// The name of the group, padded with zeros.
     pub token: [u8; 4],
-    /// What they are measured in.
+    /// The unit of the members.
     pub form: Form,
-    /// Members: axes, motors, or inputs. More than axes only in the last row.
+    /// The number of members: axes, motors, or inputs. Only the last row may have more members than there are axes.
     pub members: u8,
-    /// What text reports call it, behind the axis's letter.
+    /// The label in text reports, which follows the letter of the axis.
     pub label: Text,
 }
 
@@ -163,23 +164,23 @@ named! { Vector, 4 }
 
 #[small]
 impl Vector {
-    /// How member `index` is shown: an angle never in inches.
+    /// Returns how member `index` is shown. An angle is never converted to inches.
     pub fn form(&self, index: u8) -> Form {
         if self.form == Form::Length { place_form(index) } else { self.form }
     }
 }
 
-/// Entries of [`SINGLES`].
+/// The number of rows of [`SINGLES`].
 pub const SINGLE_COUNT: usize = 46 + if Capability::Printer.is_built_in() { 6 } else { 0 };
-/// Entries of [`VECTORS`].
+/// The number of rows of [`VECTORS`].
 pub const VECTOR_COUNT: usize = 17;
-/// The number of the vector `g92`.
+/// The index of the vector `g92`.
 pub const SHIFT: u8 = 5;
-/// The number of the vector `prb`, whose group begins with `prbe`.
+/// The index of the vector `prb`, whose group begins with `prbe`.
 pub const PROBED: u8 = 15;
-/// The number of `spf`.
+/// The index of `spf`.
 pub const SYNC_ERROR: u8 = 28;
-/// The number of `prbe`.
+/// The index of `prbe`.
 pub const PROBE_STATE: u8 = SINGLE_COUNT as u8 - 1;
 
 const NONE: Text = text!("");
@@ -306,7 +307,7 @@ progmem! {
         count("prbe", of(Value::ProbeState), text!("Probe state:"), text!("Failed|Succeeded|Waiting")),
     ];
 
-    /// Values of each axis or motor; [`vector_value`] gives the order.
+    /// The groups of values by axis, motor or input. [`vector_value`] depends on their order.
     pub static VECTORS: [Vector; VECTOR_COUNT] = [
         vector("mpo", Form::Millimetres, 6, text!(" machine posn:")),
         vector("pos", Form::Length, 6, text!(" position:")),
@@ -328,7 +329,7 @@ progmem! {
     ];
 }
 
-/// Member `index` of a vector.
+/// Returns the source of member `index` of a vector.
 #[small]
 pub fn vector_value(vector: u8, index: u8) -> Source {
     let value = match vector {

@@ -1,13 +1,14 @@
-//! Variations: what machines that speak this dialect say differently. One table, no branches elsewhere.
+//! Variations: differences between machines that speak this dialect. One table, no branches elsewhere.
 //!
 //! | | setting | footer | senders |
 //! |---|---|---|---|
-//! | [`Variation::Lines`] | as it comes | `[1,status,free line slots]` | count responses |
+//! | [`Variation::Lines`] | default | `[1,status,free line slots]` | count responses |
 //! | [`Variation::Characters`] | `rxm` 0 | `[1,status,length,checksum]` | count characters: TinyG 0.97 |
 //! | [`Variation::G2core`] | `dia` 1 | `[1,status,length]` | take the machine for a g2core |
 //!
-//! The length is that of the line that is answered, its end included; 0 if no line is (g2core says 1). The
-//! first two share TinyG's status codes and texts, the third has its own for some (`CHANGES`), and for prompts.
+//! The length is that of the answered line, its line end included; 0 if no line is answered (1 for g2core). The first
+//! two variations share TinyG's status codes and texts. The third has other codes and texts for some statuses
+//! (`CHANGES`), and other prompts.
 
 use super::{number, status_text};
 use crate::config::Settings;
@@ -28,18 +29,18 @@ pub enum Variation {
     G2core,
 }
 
-/// What a variation says.
+/// The phrases of a variation.
 #[derive(Clone, Copy)]
 pub struct Phrases {
-    /// Before and behind the units of a prompt, if all is well and if not.
+    /// The text before the units in a prompt. `ok` or `err` follows the units.
     pub prompt: Text,
-    /// See `prompt`.
+    /// The text after the units if all is well.
     pub ok: Text,
-    /// See `prompt`.
+    /// The text after the units if the line has failed.
     pub err: Text,
-    /// Behind the status code of a prompt; it is left out if this is empty.
+    /// The text behind the status code in a prompt. If it is empty, the code is left out.
     pub code: Text,
-    /// The length of what answers no line.
+    /// The length in a footer that answers no line.
     pub no_line: u8,
 }
 
@@ -64,7 +65,7 @@ progmem! {
         },
     ];
 
-    /// What g2core calls otherwise: a status, its code there, its text there.
+    /// Statuses with another code or text on g2core: the status, its code, its text.
     static CHANGES: [(Status, u8, Text); 32] = [
         (Status::Noop, 3, text!("No operation performed")),
         (Status::BufferFull, 13, text!("Buffer full non-fatal")),
@@ -102,7 +103,7 @@ progmem! {
 }
 
 impl Variation {
-    /// The one that the settings say.
+    /// Returns the variation that the settings select.
     pub fn of(settings: &Settings) -> Self {
         match (settings.is_g2core(), settings.counts_characters()) {
             (true, _) => Variation::G2core,
@@ -111,17 +112,17 @@ impl Variation {
         }
     }
 
-    /// What it says.
+    /// Returns the phrases of the variation.
     pub fn phrases(self) -> Phrases {
         PHRASES.at(self as usize).unwrap_or(TINYG)
     }
 
-    /// The number of a status.
+    /// Returns the number of a status.
     pub fn code(self, status: Status) -> u8 {
         self.change(status).map_or_else(|| number(status), |(code, _)| code)
     }
 
-    /// The text of a status; `None` for one that prints its number.
+    /// Returns the text of a status; `None` for a status that is shown as its number.
     pub fn status_text(self, status: Status) -> Option<Text> {
         self.change(status).map(|(_, text)| text).or_else(|| status_text(status))
     }

@@ -1,9 +1,9 @@
-//! What comes and goes in strings: `txt`, of which what text mode would say is told in a string, and `msg`.
+//! Strings in requests and responses: `txt`, whose text-mode output is returned in a string, and `msg`.
 //!
-//! A `txt` holds what a line of text mode does: `{txt:"$xvm"}` is answered with
-//! `{"r":{"txt":"[xvm] x velocity maximum        800 mm/min\\n"},"f":[...]}`. There are no prompts in it; the status is the
-//! line's. G-code has nothing to say there. JSON within JSON is refused (114). A g2core has no text mode that a line could
-//! switch to: there `$xvm` alone is answered like this, with one response.
+//! A `txt` holds a line of text mode: `{txt:"$xvm"}` is answered with `{"r":{"txt":"[xvm] x velocity maximum  800
+//! mm/min\\n"},"f":[...]}`. The string has no prompts; the status in the footer is that of the line. G-code returns
+//! an empty string. JSON within JSON is refused (114). A g2core has no text mode to switch to: there a plain `$xvm`
+//! is answered in this form, with one response.
 
 use super::block::byte_of;
 use super::json::{Kind, Pair};
@@ -17,7 +17,7 @@ use crate::text;
 
 #[small]
 impl Request {
-    /// Does what the line says, as if it stood in a `txt`.
+    /// Carries out the line as if it stood in a `txt`.
     pub(super) fn wrap_line<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         let value = core::mem::take(&mut self.block);
         let next = value.end.saturating_add(1);
@@ -28,7 +28,7 @@ impl Request {
         }
     }
 
-    /// Does what the text of `pair` says.
+    /// Carries out the text of `pair`. The error is the status with which it is refused.
     #[inline(never)]
     pub(super) fn wrap<M: Machine, O: Out>(
         &mut self,
@@ -64,7 +64,7 @@ impl Request {
         Ok(())
     }
 
-    /// The text is at its end.
+    /// Ends the string after its text.
     pub(super) fn unwrap_text<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         self.format.wrap(false);
         Writer::body(c.out, &mut self.format).byte(b'"');
@@ -73,7 +73,7 @@ impl Request {
         self.phase = if on { Phase::Pair } else { Phase::Warning };
     }
 
-    /// A block in a `txt` has run.
+    /// Reports an empty `txt` after the block in a `txt` has run.
     pub(super) fn unwrap_block<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         if core::mem::take(&mut self.resume) != 0 {
             let mut writer = Writer::body(c.out, &mut self.format);
@@ -94,7 +94,7 @@ impl Request {
         writer.byte(b'"');
     }
 
-    /// Gives the string of `pair` back.
+    /// Starts to send the string of `pair` back.
     pub(super) fn give_string<M: Machine, O: Out>(
         &mut self,
         pair: &Pair,
@@ -105,7 +105,7 @@ impl Request {
         self.phase = Phase::Quote;
     }
 
-    /// The next part of it, as it came.
+    /// Writes the next part of the string, as received.
     pub(super) fn quote<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         let mut writer = Writer::body(c.out, &mut self.format);
         for _ in 0..CHUNK / 2 {
@@ -120,20 +120,20 @@ impl Request {
     }
 }
 
-/// Puts a character of a string of the request into one of the response; returns how many bytes it was. An escape of JSON
-/// stays as it is; any other backslash is a character. At most two bytes come out.
+/// Copies one character of a string from the request to the response, and returns its length in the request. An
+/// escape of JSON is kept; any other backslash is a plain character. Writes at most two bytes.
 #[small]
 pub(super) fn pass_on<O: Out>(line: &[u8], at: u8, end: u8, writer: &mut Writer<'_, O>) -> u8 {
     let byte = byte_of(line, at, end).unwrap_or(b' ');
     let next = byte_of(line, at.saturating_add(1), end);
     match (byte, next) {
-        // Digits follow a `u`: `json::check` has seen to it.
+        // After a `u` there are digits: `json::check` has made sure.
         (b'\\', Some(letter @ (b'"' | b'\\' | b'/' | b'b' | b'f' | b'n' | b'r' | b't' | b'u'))) => {
             writer.byte(byte);
             writer.byte(letter);
             2
         }
-        // A tabulator may stand in a request, not in a response.
+        // A tab is allowed in a request but not in a response.
         (b'\t', _) => {
             writer.byte(b' ');
             1

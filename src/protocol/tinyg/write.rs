@@ -1,4 +1,4 @@
-//! Writing JSON and plain text, byte by byte, into an [`Out`].
+//! Writes JSON and plain text, byte by byte, into an [`Out`].
 
 use super::format::{COMMA, EXPAND, Format, HUSHED, MUTE, SILENT, STRICT, WRAPPED};
 use super::token::Shown;
@@ -9,12 +9,12 @@ pub use crate::protocol::{Ending, Out};
 use crate::status::Status;
 use crate::{plain, text};
 
-/// Puts the end of a line.
+/// Writes a line end.
 pub fn put_line_end(settings: &Settings, out: &mut impl Out) {
     Writer::body(out, &mut Format::plain(settings)).end_line();
 }
 
-/// A writer for the time of one step.
+/// A writer, made for one step.
 pub struct Writer<'a, O> {
     out: &'a mut O,
     format: &'a mut Format,
@@ -22,17 +22,17 @@ pub struct Writer<'a, O> {
 }
 
 impl<'a, O: Out> Writer<'a, O> {
-    /// Writes names and values, or a report.
+    /// Makes a writer for names and values, or for a report.
     pub fn body(out: &'a mut O, format: &'a mut Format) -> Self {
         Self::unless(HUSHED, out, format)
     }
 
-    /// Writes messages, and what a response says of its line.
+    /// Makes a writer for messages, and for what a response reports of its line.
     pub fn message(out: &'a mut O, format: &'a mut Format) -> Self {
         Self::unless(MUTE, out, format)
     }
 
-    /// Writes the frame of a response.
+    /// Makes a writer for the frame of a response.
     pub fn frame(out: &'a mut O, format: &'a mut Format) -> Self {
         Self::unless(SILENT, out, format)
     }
@@ -42,17 +42,17 @@ impl<'a, O: Out> Writer<'a, O> {
         Writer { out, format, shown }
     }
 
-    /// Whose words are used.
+    /// Returns whose phrases are used.
     pub fn variation(&self) -> Variation {
         self.format.variation
     }
 
-    /// Whether this is text.
+    /// Whether output is text.
     pub fn is_plain(&self) -> bool {
         self.format.is_plain()
     }
 
-    /// Puts a byte.
+    /// Writes a byte.
     pub fn byte(&mut self, byte: u8) {
         if !self.shown {
             return;
@@ -63,7 +63,7 @@ impl<'a, O: Out> Writer<'a, O> {
         self.out.put(byte);
     }
 
-    /// The end of a line.
+    /// Writes a line end.
     pub fn end_line(&mut self) {
         if !self.shown {
             return;
@@ -75,12 +75,12 @@ impl<'a, O: Out> Writer<'a, O> {
         self.out.put_plain(if expand { plain!("\n\r") } else { plain!("\n") });
     }
 
-    /// Puts a byte of text that came from outside; what does not print becomes `?`.
+    /// Writes a received byte; one that is not printable as `?`.
     pub fn printable(&mut self, byte: u8) {
         self.byte(if matches!(byte, b' '..=b'~') { byte } else { b'?' });
     }
 
-    /// Puts a byte of text that came from outside within a string. At most two bytes come out.
+    /// Writes a received byte within a string. Takes at most two bytes of output.
     pub fn escaped(&mut self, byte: u8) {
         if matches!(byte, b'"' | b'\\') {
             self.byte(b'\\');
@@ -88,34 +88,34 @@ impl<'a, O: Out> Writer<'a, O> {
         self.printable(byte);
     }
 
-    /// A text. By itself, for it is called in many places.
+    /// Writes a text. Not inlined, because it is called in many places.
     #[inline(never)]
     #[small]
     pub fn text(&mut self, text: Text) {
         text.bytes().for_each(|byte| self.byte(byte));
     }
 
-    /// Bytes as they are, in lower case.
+    /// Writes bytes in lower case, without escapes.
     pub fn lower(&mut self, bytes: &[u8]) {
         bytes.iter().for_each(|byte| self.printable(byte.to_ascii_lowercase()));
     }
 
-    /// A blank, `count` times.
+    /// Writes `count` blanks.
     pub fn blanks(&mut self, count: usize) {
         (0..count).for_each(|_| self.byte(b' '));
     }
 
-    /// A number.
+    /// Writes a number.
     pub fn fixed(&mut self, fixed: Fixed) {
         let mut digits = Digits::default();
         let digits = fixed.render(&mut digits);
         if self.shown {
-            // Nothing in it has to be escaped, wrapped or not.
+            // A number has no character that would need an escape.
             self.out.put_all(digits.iter().copied());
         }
     }
 
-    /// A number, ending in column `width`.
+    /// Writes a number that ends in column `width`.
     pub fn aligned(&mut self, fixed: Fixed, width: usize) {
         let mut digits = Digits::default();
         let digits = fixed.render(&mut digits);
@@ -123,14 +123,14 @@ impl<'a, O: Out> Writer<'a, O> {
         digits.iter().for_each(|&byte| self.byte(byte));
     }
 
-    /// Begins a member: a comma if one is due, the key, a colon.
+    /// Begins a member of an object: a comma if one is due, the key, a colon.
     pub fn key(&mut self, name: &[u8]) {
         self.before_key();
         self.lower(name);
         self.after_key();
     }
 
-    /// Begins a member whose key is a text of the firmware's own.
+    /// Begins a member whose key is a text of the firmware.
     pub fn key_text(&mut self, name: Text) {
         self.before_key();
         self.text(name);
@@ -159,14 +159,14 @@ impl<'a, O: Out> Writer<'a, O> {
         }
     }
 
-    /// A string of ours as a value.
+    /// Writes a text of the firmware as a string value.
     pub fn string(&mut self, text: Text) {
         self.byte(b'"');
         self.text(text);
         self.byte(b'"');
     }
 
-    /// A token's value.
+    /// Writes the value of a token.
     pub fn shown(&mut self, shown: Shown) {
         match shown {
             Shown::Number(fixed) => self.fixed(fixed),
@@ -179,7 +179,7 @@ impl<'a, O: Out> Writer<'a, O> {
         }
     }
 
-    /// 32 bits: `0x2a`.
+    /// Writes 32 bits as hexadecimal, such as `0x2a`.
     pub fn bits(&mut self, bits: i32) {
         self.text(text!("0x"));
         let mut begun = false;
@@ -208,7 +208,7 @@ impl<'a, O: Out> Writer<'a, O> {
         }
     }
 
-    /// Opens a response, and its body.
+    /// Opens a response and its body.
     pub fn begin_response(&mut self) {
         self.begin_sum();
         self.frame_part(plain!("{\"r\":{"), plain!("{r:{"));
@@ -221,15 +221,15 @@ impl<'a, O: Out> Writer<'a, O> {
         self.footer_values(status, ending);
     }
 
-    /// A whole response of which nothing but the frame shows.
+    /// Writes a whole response with an empty body.
     pub fn empty_response(&mut self, status: Status, ending: Ending) {
         self.begin_sum();
         self.frame_part(plain!("{\"r\":{},\"f\":[1,"), plain!("{r:{},f:[1,"));
         self.footer_values(status, ending);
     }
 
-    /// A part of the frame of a response, which never stands within a string: at once, which is 100 cycles a byte less on AVR than
-    /// [`Writer::byte`].
+    /// Writes a part of the frame of a response at once. The frame is never within a string, so no byte needs an
+    /// escape. On AVR this saves 100 cycles a byte compared with [`Writer::byte`].
     fn frame_part(&mut self, strict: Plain, relaxed: Plain) {
         if self.shown {
             self.out.put_plain(if self.format.flags & STRICT != 0 { strict } else { relaxed });
@@ -261,7 +261,7 @@ impl<'a, O: Out> Writer<'a, O> {
         }
     }
 
-    /// A number, which most often has one digit.
+    /// Writes a number that usually has one digit.
     fn small(&mut self, value: u16) {
         match value {
             ..10 => self.byte(b'0' + value as u8),

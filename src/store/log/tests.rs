@@ -8,10 +8,10 @@ use proptest::prelude::*;
 
 use super::*;
 
-/// Eight slots and a rest.
+/// Eight slots and a remainder.
 const BYTES: usize = 8 * SIZE as usize + 3;
 
-/// A memory that loses power after so many bytes; the last one is then `torn`.
+/// A memory that loses power after a number of bytes. The last byte is then `torn`.
 #[derive(Clone)]
 struct Cells {
     bytes: [u8; BYTES],
@@ -47,7 +47,7 @@ impl Memory for Cells {
     }
 }
 
-/// Puts an item away. False if there is no room.
+/// Stores an item. `false` if there is no room.
 fn put(log: &mut Log, cells: &mut Cells, key: u16, value: i32) -> bool {
     for moved in 0.. {
         let (mut write, last) = match log.put(cells, key, value, moved) {
@@ -124,7 +124,8 @@ fn rubbish_is_known() {
     assert!(!log.is_rubbish(&cells));
 }
 
-/// A memory that keeps pieces of bytes, as the flash of the RP2040 does: one that waits takes more, and is kept for who waits.
+/// A memory that is written in pieces, as the flash of the RP2040 is. A pending piece takes further bytes of its own
+/// range. `is_busy` writes the pending piece, and counts it in `kept`.
 struct Pieces {
     cells: Cells,
     waiting: Cell<Option<u16>>,
@@ -164,7 +165,7 @@ fn a_record_is_kept_in_one_piece_or_three() {
         while write.step(&mut pieces) {
             assert!(!write.waits(&pieces));
         }
-        // Its first byte is in the first piece, and written last.
+        // The record's first byte is in the first piece, but is written last.
         assert!([1, 3].contains(&pieces.kept.get()), "{} pieces", pieces.kept.get());
         assert!(pieces.waiting.get().is_none(), "all of it is kept");
         assert_eq!(log.newest(&pieces, 5), Some(value));
@@ -172,7 +173,7 @@ fn a_record_is_kept_in_one_piece_or_three() {
 }
 
 proptest! {
-    /// Whoever reads while a record is written finds what the item was or is to be, and all others as they are.
+    /// A reader during a write finds either the old or the new value of the item, and all other items unchanged.
     #[test]
     fn the_log_is_read_while_it_is_written(
         puts in prop::collection::vec((0u16..6, any::<i32>()), 0..60),
@@ -204,7 +205,7 @@ proptest! {
         }
     }
 
-    /// Whatever is put away, and at whatever byte power fails: each item is what it was or what it was to be.
+    /// For any writes, and a power failure at any byte: each item has either its old or its new value.
     #[test]
     fn a_power_cut_leaves_old_or_new(
         before in prop::collection::vec((0u16..6, any::<i32>()), 0..40),
@@ -239,7 +240,7 @@ proptest! {
                 let new = item == key && found == Some(value);
                 prop_assert!(new || found == kept.get(&item).copied(), "{item} {found:?}");
             }
-            // And the log goes on.
+            // The log still takes records.
             prop_assert!(put(&mut log, &mut cells, key, 1));
             prop_assert_eq!(log.newest(&cells, key), Some(1));
             for (item, value) in &kept {
