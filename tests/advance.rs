@@ -1,5 +1,5 @@
-//! Pressure advance: the extruder's steps agree with its line and K times its velocity, and at rest with its line alone, whatever holds, drops
-//! and stops come between.
+//! Pressure advance: the steps of the extruder agree with its line plus K times its velocity. At rest they agree with
+//! the line alone, whatever holds, drops and stops come before.
 
 use kerf::config::StepRatio;
 use kerf::dda::STEP;
@@ -13,7 +13,7 @@ use crate::cases::cases;
 use crate::rig::{Config, Rig, at};
 
 const E: usize = 3;
-/// Steps of a mm of X, Y and Z, and of filament.
+/// Steps in a mm of X, Y and Z, and of filament.
 const STEPS: [f64; 4] = [80.0, 80.0, 400.0, 93.0];
 
 fn printer(jerk: f32) -> Config {
@@ -45,7 +45,7 @@ fn rig(jerk: f32, k: f64) -> Rig {
     rig
 }
 
-/// A line to X, Y, Z and E in mm, at so many mm/s.
+/// A line to X, Y, Z and E in mm, at a speed in mm/s.
 type To = ([f64; 4], f32);
 
 fn run(rig: &mut Rig, lines: &[To]) {
@@ -58,13 +58,14 @@ fn run(rig: &mut Rig, lines: &[To]) {
     rig.finish();
 }
 
-/// The way along X that the machine was told to go, which is what the lead is held against: between its steps too, from the segments. Of the
-/// pulses alone neither place nor velocity are known where they are far apart, as near the ends of a ramp: the lead would be measured up to 0.7
-/// steps worse than it is.
+/// The commanded path along X, from the segments. The lead is compared with it, between the steps too. The pulses
+/// alone do not show position and velocity where they are far apart, as near the ends of a ramp: the lead would be
+/// measured up to 0.7 steps worse than it is.
 struct Path(Vec<(f64, f64)>);
 
 impl Path {
-    /// Steps of X are where the path says, to 1/20 step: else it would be no measure.
+    /// Takes the path from the segments. Checks that the steps of X are on it to 1/20 step, because otherwise it
+    /// would be no measure.
     fn of(rig: &Rig) -> Self {
         let mut ends = vec![(0.0, 0.0)];
         let (mut time, mut at) = (0.0, 0.0);
@@ -84,22 +85,22 @@ impl Path {
         path
     }
 
-    /// mm, at a time in cycles.
+    /// Returns the position, mm, at a time in cycles.
     fn at(&self, time: f64) -> f64 {
         let n = self.0.partition_point(|(end, _)| *end < time).clamp(1, self.0.len() - 1);
         let ((before, from), (after, to)) = (self.0[n - 1], self.0[n]);
         from + (to - from) * ((time - before) / (after - before)).min(1.0)
     }
 
-    /// mm/s: the mean of 6 ms, over which jerk takes 0.05 mm/s.
+    /// Returns the velocity, mm/s: the mean of 6 ms, over which jerk changes it by 0.05 mm/s.
     fn velocity(&self, time: f64) -> f64 {
         let half = 0.003 * 16e6;
         (self.at(time + half) - self.at((time - half).max(0.0))) / 0.006
     }
 }
 
-/// How far the extruder is off at each step of any motor, in steps, on lines along X: with the time in s. The half step to which positions are
-/// rounded counts.
+/// Returns how far the extruder is off at each step of any motor, in steps, each with the time in s, on lines along
+/// X. The half step by which positions are rounded counts.
 fn off(rig: &Rig, k: f64, lines: &[To]) -> Vec<(f64, f64)> {
     let path = Path::of(rig);
     let off = |(position, time): &([i64; 4], u64)| {
@@ -114,12 +115,12 @@ fn off(rig: &Rig, k: f64, lines: &[To]) -> Vec<(f64, f64)> {
     rig.pins.trail.iter().map(off).collect()
 }
 
-/// The worst of it.
+/// Returns the largest of these errors.
 fn worst(rig: &Rig, k: f64, lines: &[To]) -> f64 {
     off(rig, k, lines).iter().map(|(off, _)| off.abs()).fold(0.0, f64::max)
 }
 
-/// A way along X of so many lines of `length`, whose speeds change.
+/// A path along X of `lines` lines of `length` mm, whose speeds change.
 fn along_x(lines: usize, length: f64, speeds: &[f32], ratio: f64) -> Vec<To> {
     (1..=lines)
         .map(|n| {
@@ -133,7 +134,7 @@ const RATIO: f64 = 0.0333;
 const SPEEDS: [f32; 3] = [60.0, 20.0, 100.0];
 const ALL_K: [f64; 5] = [0.0, 0.02, 0.05, 0.1, 0.2];
 
-/// The worst of a job along X with such a K.
+/// Returns the largest error of a job along X with this K.
 fn worst_of(lines: usize, length: f64, jerk: f32, k: f64) -> f64 {
     let (mut rig, lines) = (rig(jerk, k), along_x(lines, length, &SPEEDS, RATIO));
     run(&mut rig, &lines);
@@ -153,7 +154,8 @@ fn the_extruder_is_ahead_by_k_times_its_velocity() {
 
 #[test]
 fn ends_of_far_lines_are_whole_steps_and_the_lead_is_as_good_there() {
-    // Of more than 2,030 steps: so the line of the extruder is half a step off there, without a lead as well.
+    // The lines have more than 2,030 steps, so the line of the extruder is half a step off there, even without a
+    // lead.
     for k in ALL_K {
         let worst = worst_of(3, 50.0, 33_333.0, k);
         assert!(worst < 1.2, "K {k}: {worst:.2}");
@@ -165,8 +167,9 @@ fn without_a_jerk_limit_the_lead_follows_as_fast_as_its_motor_may() {
     for (lines, length) in [(6, 20.0), (40, 2.0), (400, 0.2)] {
         for k in ALL_K {
             let worst = worst_of(lines, length, 0.0, k);
-            // Where the machine begins to accelerate the lead's velocity jumps by K times that, which no motor can: it takes its own acceleration
-            // for it, and falls behind meanwhile. With K up to 0.1 that is less than half a step.
+            // Where the machine begins to accelerate, the lead's velocity jumps by K times the acceleration. A motor
+            // cannot jump, so it uses its own acceleration, and falls behind meanwhile. With K up to 0.1 that is less
+            // than half a step.
             let jump = k * 1_000.0 * RATIO * STEPS[E];
             let late = jump * jump / (2.0 * 960.0 * STEPS[E]);
             let most = if k <= 0.1 { 1.0 } else { 0.6 + late };
@@ -180,7 +183,7 @@ fn without_a_jerk_limit_the_lead_is_late_at_a_peak_of_velocity() {
     for k in ALL_K {
         let (mut rig, lines) = (rig(0.0, k), along_x(4, 2.0, &[100.0], RATIO));
         run(&mut rig, &lines);
-        // The velocity of the lead turns round: its jump is twice that of a ramp's end.
+        // The velocity of the lead reverses, so its jump is twice the jump at a ramp's end.
         let jump = 2.0 * k * 1_000.0 * RATIO * STEPS[E];
         let most = 0.6 + jump * jump / (2.0 * 960.0 * STEPS[E]);
         let worst = worst(&rig, k, &lines);
@@ -191,11 +194,11 @@ fn without_a_jerk_limit_the_lead_is_late_at_a_peak_of_velocity() {
 #[test]
 fn where_the_amount_of_filament_changes_the_lead_goes_over_as_fast_as_its_motor_may() {
     let k = 0.1;
-    // 1.9 steps of lead at 89,280 steps/s^2 take 9 ms. Of short lines a change by less than files with three decimals round them by comes with the
-    // mean: within 0.1 mm of filament, 3 mm of path.
+    // 1.9 steps of lead at 89,280 steps/s^2 take 9 ms. On short lines, files with three decimals round the amount of
+    // filament. A smaller change than this rounding comes with the mean, within 0.1 mm of filament, 3 mm of path.
     for (lines, length, most) in [(120, 1.0, 0.012), (600, 0.2, 0.04)] {
         let mut at = 0.0;
-        // By 10 % four times.
+        // The amount changes by 10 %, four times.
         let thick = |n: usize| 1.0 + 0.1 * ((n * 5 / lines) % 2) as f64;
         let line = |n| {
             at += RATIO * thick(n - 1) * length;
@@ -223,7 +226,7 @@ fn travels_and_retractions_have_no_lead() {
     let mut rig = rig(33_333.0, 0.1);
     run(&mut rig, &[([50.0, 0.0, 0.0, 0.0], 100.0), ([50.0, 0.0, 0.0, 3.0], 30.0)]);
     run(&mut rig, &[([50.0, 0.0, 0.0, 1.0], 30.0), ([20.0, 10.0, 0.0, 0.5], 60.0)]);
-    // Each step of the extruder goes where its line goes.
+    // Each step of the extruder goes in the direction of its line.
     let mut before = 0;
     let mut turns = 0;
     let mut direction = 0;

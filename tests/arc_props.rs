@@ -1,4 +1,4 @@
-//! Arcs, properties: chords lie on their circle and go its way in every plane, ends are exact, turns are
+//! Properties of arcs: chords lie on their circle and follow its direction in every plane, ends are exact, turns are
 //! counted, other axes advance evenly.
 
 use std::f64::consts::{PI, TAU};
@@ -10,16 +10,16 @@ use kerf::gcode::setup::Usual;
 use kerf::units::{Length, PerAxis};
 use proptest::prelude::*;
 
-/// A circle in one of the planes, as the numbers of an arc's line, in units.
+/// A circle in one of the planes, as the numbers of an arc's line, in units of length.
 #[derive(Clone, Copy, Debug)]
 struct Case {
     plane: usize,
     clockwise: bool,
     center: [i32; 2],
     radius: f64,
-    /// Where on the circle, in radians, counter-clockwise from the first axis.
+    /// Angle of the start, in radians, counter-clockwise from the first axis.
     from: f64,
-    /// How far, in radians, in the sense of the arc.
+    /// Length of the arc, in radians, in its direction.
     sweep: f64,
     across: i32,
 }
@@ -44,7 +44,7 @@ impl Case {
         Arc { first, second, linear, center, clockwise, extra_turns: 0 }
     }
 
-    /// How far points of a chord are outside the circle, in units.
+    /// Returns how far points of a chord are outside the circle, in units of length.
     fn offsets(&self, from: &PerAxis<Length>, to: &PerAxis<Length>, radius: f64) -> Vec<f64> {
         let [first, second, _] = self.axes();
         let at = |axis: usize, n: usize, part: f64| {
@@ -55,7 +55,7 @@ impl Case {
         parts.map(|part| at(first, 0, part).hypot(at(second, 1, part)) - radius).collect()
     }
 
-    /// Radius and angle (from the start, in the sense of the arc, 0 to 2 pi) of a point.
+    /// Returns the radius of a point and its angle from the start, in the direction of the arc, 0 to 2 pi.
     fn polar(&self, point: &PerAxis<Length>, start: f64) -> (f64, f64) {
         let [first, second, _] = self.axes();
         let x = f64::from(point[first].0 - self.center[0]);
@@ -66,7 +66,7 @@ impl Case {
     }
 }
 
-/// Units as text.
+/// Returns a number of units as text.
 fn print(units: i32) -> String {
     let sign = if units < 0 { "-" } else { "" };
     format!("{sign}{}.{:04}", units.unsigned_abs() / 10_000, units.unsigned_abs() % 10_000)
@@ -105,7 +105,7 @@ proptest! {
             f64::from(start[second].0 - case.center[1]).atan2(x)
         });
         let mut last = (0.0, start);
-        // Of the mean distance from the circle, inner chords only.
+        // Mean distance from the circle, of inner chords only.
         let (mut sum, mut inner) = (0.0, 0.0);
         for (i, point) in chords.enumerate() {
             let (_, angle) = case.polar(&point, begin);
@@ -133,7 +133,7 @@ proptest! {
         prop_assert_eq!(last.1, target);
     }
 
-    /// The centre that R gives is the centre, and the chords arrive.
+    /// The centre that R gives is the centre of the circle, and the chords reach the end.
     #[test]
     fn radius_form_finds_the_centre(case in case()) {
         // Near a half circle and near a full one the centre depends on the last digit: keep away.
@@ -163,8 +163,8 @@ proptest! {
         prop_assert_eq!(Chords::new(&start, &target, &arc, 0.01).last(), Some(target));
     }
 
-    /// From the line to the last chord: centre form, any plane, any sense, any number of turns, with
-    /// a helix and an axis that turns.
+    /// From the line to the last chord: centre form, any plane, any direction, any number of turns, with a helix and
+    /// a rotary axis.
     #[test]
     fn a_line_goes_round_as_often_as_it_says(
         case in case(), turns in 0u32..4, full: bool, angle in -3_600_000i32..3_600_000, incremental: bool,
@@ -193,7 +193,7 @@ proptest! {
         let Motion::Arc { arc, target: end, .. } = out.motion else { panic!("no arc") };
         prop_assert_eq!(end, target);
         prop_assert_eq!(arc.center, case.center.map(Length));
-        // P0 of a full circle is one turn all the same.
+        // P0 of a full circle also means one turn.
         let sweep = if full { TAU } else { case.sweep };
         let wanted = sweep + TAU * f64::from(if full { turns.saturating_sub(1) } else { turns });
         let chords = Chords::new(&start, &target, &arc, 0.05);

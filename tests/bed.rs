@@ -1,4 +1,5 @@
-//! Programs of printing hosts with a bed that is followed: whatever moves, and whatever ends a move, Z is on the step that the plane says.
+//! Programs of printing hosts on a machine that follows its bed. Whatever moves, and whatever ends a move, Z is on
+//! the step that the plane gives.
 
 use std::thread;
 
@@ -11,17 +12,17 @@ use proptest::prelude::*;
 
 use crate::cases::cases;
 
-/// Steps of X, Y and Z in a unit of length, as `{mch:3}` has them: 80 and 400 in a mm.
+/// Steps in a unit of length of X, Y and Z, as `{mch:3}` sets them: 80, 80 and 400 in a mm.
 const RATIOS: [StepRatio; 3] =
     [StepRatio { num: 1, den: 125 }, StepRatio { num: 1, den: 125 }, StepRatio { num: 1, den: 25 }];
 /// 10 um, in units of length.
 const HUNDREDTH: i32 = 100;
 
-/// A printer whose first port speaks to a printing host, and whose second one speaks TinyG's dialect.
+/// A printer whose first port speaks to a printing host, and whose second port speaks TinyG's dialect.
 struct Printer {
     machine: Machine,
     heard: String,
-    /// Its first two motors drive X and Y together.
+    /// Whether its first two motors drive X and Y together.
     shared: bool,
 }
 
@@ -31,7 +32,7 @@ impl Printer {
         let mut printer = Self { machine, heard: String::new(), shared };
         printer.machine.run_ms(100);
         printer.control("{mch:3}");
-        // As fast as the tests are to be.
+        // These settings make the tests fast.
         printer.control("{zvm:6000,zfr:6000,zjm:5000,zac:1000}");
         if shared {
             printer.control("{1ma:6}");
@@ -43,7 +44,7 @@ impl Printer {
         printer
     }
 
-    /// One that is homed, and has a bed 0.1 mm below the place that is called 0.
+    /// A printer that is homed, with a bed 0.1 mm below position 0.
     fn homed() -> Self {
         let mut printer = Self::boot(false);
         for (switch, step) in [(X_MIN, -80), (Y_MIN, -80), (Z_MIN, -400), (PROBE, -40)] {
@@ -53,7 +54,7 @@ impl Printer {
         printer
     }
 
-    /// What the second port hears to a line.
+    /// Sends a line on the second port and returns the answer.
     fn control(&mut self, line: &str) -> String {
         self.machine.received_aux();
         self.machine.send_aux(format!("{line}\n").as_bytes());
@@ -65,7 +66,7 @@ impl Printer {
         self.machine.send(format!("{line}\n").as_bytes());
     }
 
-    /// What is heard before the next `ok`, and that.
+    /// Returns what is heard up to the next `ok`, including that.
     fn hear(&mut self) -> String {
         for _ in 0..600_000 {
             if let Some(end) = self.heard.find("ok")
@@ -93,13 +94,13 @@ impl Printer {
         [at[0], at[1], at[2]]
     }
 
-    /// Where the motors are when the nozzle is there.
+    /// Returns the positions of the motors when the nozzle is at a place.
     fn steps_at(&self, [x, y, z]: [i32; 3]) -> [i64; 3] {
         let drives = if self.shared { [x + y, x - y, z] } else { [x, y, z] };
         [0, 1, 2].map(|n| i64::from(RATIOS[n].steps(Length(drives[n]))))
     }
 
-    /// X, Y and Z that the second port tells, in units of length: to 1 um.
+    /// Returns X, Y and Z that the second port reports, in units of length; exact to 1 um.
     fn told(&mut self) -> [i32; 3] {
         let told = self.control("{mpo:n}");
         ["\"x\":", "\"y\":", "\"z\":"].map(|name| {
@@ -110,36 +111,36 @@ impl Printer {
     }
 }
 
-/// On a thread of its own: a machine is a thread's.
+/// Runs a test in a thread of its own, because each thread has one machine. Returns whether it passed.
 fn alone(play: impl FnOnce() + Send + 'static) -> bool {
     thread::spawn(play).join().is_ok()
 }
 
-/// What a program does.
+/// An action of a program.
 #[derive(Clone, Debug)]
 enum Op {
-    /// To a place, in hundredths of a mm, at so many mm/s.
+    /// Moves to a place, in hundredths of a mm, at a speed in mm/s.
     Go([i32; 3], u32),
-    /// So far, with G91.
+    /// Moves by a distance, with G91.
     By([i32; 3]),
-    /// To a place in X and Y on a half circle, and Z on the way.
+    /// Moves to a place in X and Y on a half circle, with Z on the way.
     Arc([i32; 3], bool),
-    /// A place is called otherwise, with G92.
+    /// Gives the place other coordinates, with G92.
     Name([i32; 3]),
-    /// M420 S.
+    /// Follows the bed or not: M420 S.
     Follow(bool),
-    /// G29 S5 and three points: heights at the corners, and which of them comes first.
+    /// Sets the plane: G29 S5 and three points, with heights at the corners and the corner that comes first.
     Bed([i32; 3], usize),
-    /// ms, then a hold of 300 ms.
+    /// After some ms, holds for 300 ms.
     Hold(u64),
-    /// ms, then what is queued is dropped.
+    /// After some ms, drops what is queued.
     Flush(u64),
-    /// The place of X is called otherwise for good, with G28.3.
+    /// Gives the place of X another machine coordinate, with G28.3.
     Rename(i32),
     Inches,
-    /// Filament is drawn back and pushed forward, the nozzle lifted meanwhile.
+    /// Draws filament back and pushes it forward, with the nozzle lifted meanwhile.
     Hop,
-    /// The motors lose their power at rest.
+    /// Switches the motors off at rest.
     Off,
 }
 
@@ -164,20 +165,20 @@ fn any_op() -> impl Strategy<Value = Op> {
     ]
 }
 
-/// Where a machine should be.
+/// The expected state of a machine.
 struct Model {
     at: [i32; 3],
-    /// What G92 has it called: that less the place.
+    /// The shift of coordinates by G92: the coordinate minus the place.
     shift: [i32; 3],
-    /// How far motors are off what G28.3 has called them, in X.
+    /// How far motors are off the position that G28.3 has set, in X.
     base: i32,
-    /// How many steps X may be off: what is called otherwise is so to a step.
+    /// How many steps X may be off: G28.3 is exact to a step only.
     slack: i64,
     bed: Bed,
 }
 
 impl Model {
-    /// The place of the motors.
+    /// Returns the place of the motors.
     fn motors(&self) -> [i32; 3] {
         let [x, y, z] = self.at.map(Length);
         let lifted = if self.bed.follows() { self.bed.lifted_z(x, y, z) } else { z };
@@ -191,14 +192,14 @@ impl Model {
         self.at[2] = if self.bed.follows() { self.bed.lowered_z(x, y, Length(z)).0 } else { z };
     }
 
-    /// The words of a place.
+    /// Returns the words of a place.
     fn words(&self, at: [i32; 3]) -> String {
         let called = [0, 1, 2].map(|n| f64::from(at[n] + self.shift[n]) / 1e4);
         format!("X{:.4} Y{:.4} Z{:.4}", called[0], called[1], called[2])
     }
 }
 
-/// The corners by which a bed is named, in hundredths of a mm.
+/// The corners that define a bed, in hundredths of a mm.
 const CORNERS: [[i32; 2]; 3] = [[0, 0], [3_000, 0], [0, 3_000]];
 
 fn carry_out(printer: &mut Printer, model: &mut Model, op: &Op) {
@@ -219,7 +220,7 @@ fn carry_out(printer: &mut Printer, model: &mut Model, op: &Op) {
             }
         }
         Op::Arc(to, left) => {
-            // Even, so that the center is a whole unit.
+            // The distances are even, so that the centre is a whole unit.
             let to = to.map(|at| at * HUNDREDTH);
             let half = [0, 1].map(|n| f64::from(to[n] - model.at[n]) / 2e4);
             if half == [0.0; 2] {
@@ -274,7 +275,7 @@ fn carry_out(printer: &mut Printer, model: &mut Model, op: &Op) {
             printer.machine.run_ms(500);
             printer.control("~");
             let steps = printer.steps();
-            // It is told to 1 um, which is less than half a step.
+            // The report is exact to 1 um, which is less than half a step.
             model.at = printer.told();
             near(printer, model, steps);
         }
@@ -283,11 +284,11 @@ fn carry_out(printer: &mut Printer, model: &mut Model, op: &Op) {
             let (from, mut to) = (model.at, model.at);
             to[0] = x;
             let all = |at: [i32; 3]| [at[0], at[1], at[2], 0, 0, 0].map(Length);
-            // A flush drops it if it waits.
+            // A flush drops the line if it waits, so M400 comes first.
             printer.ask("M400");
             assert_eq!(printer.ask(&format!("G28.3 X{:.4}", f64::from(x) / 1e4)), "ok\n");
             printer.ask("M400");
-            // G28.3 names machine coordinates.
+            // G28.3 sets machine coordinates.
             model.bed.rename(&all(from), &all(to));
             model.base += from[0] - x;
             model.slack += 1;
@@ -316,7 +317,7 @@ fn carry_out(printer: &mut Printer, model: &mut Model, op: &Op) {
     }
 }
 
-/// The motors are where the model has them.
+/// Checks that the motors are where the model has them.
 fn near(printer: &Printer, model: &Model, steps: [i64; 3]) {
     let [x, y, z] = model.motors();
     let wanted = printer.steps_at([x + model.base, y, z]);
@@ -334,11 +335,11 @@ fn play(ops: &[Op], shared: bool) {
     }
     let steps = printer.steps();
     near(&printer, &model, steps);
-    // What is told is where it is.
+    // The reported position is the true one.
     let told = printer.told();
     let off = [0, 1, 2].map(|n| (told[n] - model.at[n]).abs());
     assert!(off.iter().all(|off| *off <= 150), "{told:?} {:?}", model.at);
-    // Without the plane no motor moves, and the way to Z 0 is as long as it is.
+    // When the plane is switched off no motor moves, and the move to Z 0 has its full length.
     model.follow(false);
     assert_eq!(printer.ask("M420 S0"), "ok\n");
     assert_eq!(printer.steps(), steps);
@@ -347,7 +348,7 @@ fn play(ops: &[Op], shared: bool) {
     near(&printer, &model, steps);
 }
 
-/// How long it takes, and a little more.
+/// Time of a G29, and a little more.
 const LEVELING_MS: u64 = 5_500;
 
 /// Ends G29 so many ms after its beginning.
@@ -383,7 +384,7 @@ fn whatever_ends_g29_early_leaves_no_plane() {
     }
 }
 
-/// The second port has the machine do something else so many ms after the beginning of G29.
+/// Makes the machine do something else, by a line on the second port, so many ms after the beginning of G29.
 fn interfere(ms: u64, line: &str) {
     let mut printer = Printer::homed();
     printer.send("G29 L0 R20 F0 B20 Z2");
@@ -456,7 +457,7 @@ fn a_height_beyond_the_travel_of_z_is_refused() {
 
 /// A printer that follows a bed which rises by 1 in 50 along X and falls by 1 in 40 along Y.
 fn following(shared: bool) -> Printer {
-    // Switches go by motors here, so that CoreXY cannot home.
+    // Simulated switches follow motors, not axes, so a CoreXY cannot home here.
     let mut printer = if shared { Printer::boot(true) } else { Printer::homed() };
     for line in ["G29 S1 X0 Y0 Z0", "G29 S1 X100 Y0 Z2", "G29 S1 X0 Y100 Z-2.5"] {
         assert_eq!(printer.ask(line), "ok\n", "{line}");

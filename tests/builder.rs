@@ -1,4 +1,4 @@
-//! From moves to blocks: limits of axes, motors and feed, corners, steps, against f64.
+//! From moves to blocks: limits of axes, motors and feed, corners, and steps, compared with f64.
 
 use kerf::boards::MOTORS;
 use kerf::config::StepRatio;
@@ -17,13 +17,13 @@ use proptest::sample::select;
 
 use crate::rig::{CORE_XY, Config, STRAIGHT, at};
 
-/// Limits are kept in two bytes, rounded down by at most so much.
+/// Limits are stored in two bytes, rounded down by at most this share.
 const SHORT: f64 = 1.0 / 256.0;
 
 /// Directions have 14 bits.
 const EXACT: f64 = 1.0005;
 
-/// The block of a move; there must be one.
+/// Returns the block of a move; there must be one.
 fn built(
     builder: &mut Builder,
     config: &Config,
@@ -73,7 +73,7 @@ fn any_moves() -> impl Strategy<Value = Vec<(PerAxis<Length>, Option<Feed>)>> {
     prop::collection::vec((prop::array::uniform6(place).prop_map(|to| to.map(Length)), feed), 1..20)
 }
 
-/// How far each axis goes for a unit of length, and the length, mm.
+/// Returns how far each axis moves for a unit of path length, and the path length, mm.
 fn unit(from: &PerAxis<Length>, to: &PerAxis<Length>) -> (PerAxis<f64>, f64) {
     let way: PerAxis<f64> =
         std::array::from_fn(|axis| (f64::from(to[axis].0) - f64::from(from[axis].0)) * 1e-4);
@@ -82,7 +82,7 @@ fn unit(from: &PerAxis<Length>, to: &PerAxis<Length>) -> (PerAxis<f64>, f64) {
     (way.map(|d| d.abs() / length), length)
 }
 
-/// No limit of an axis or the feed is exceeded, and some limit is the reason for the velocity.
+/// Checks that no limit of an axis or of the feed is exceeded, and that some limit is the reason for the velocity.
 fn check_limits(
     block: &Move,
     unit: &PerAxis<f64>,
@@ -109,7 +109,7 @@ fn check_limits(
         let most = f64::from(config.accel[axis]);
         if most > 0.0 {
             assert!(accel * unit[axis] <= most * EXACT, "axis {axis}: {accel} of {most}");
-            // Parts of a direction are rounded up.
+            // Components of a direction are rounded up.
             least = least.min(most / (unit[axis] + 3.0 / f64::from(ONE)));
         }
         let most = f64::from(config.jerk[axis]);
@@ -122,11 +122,11 @@ fn check_limits(
     if !limited && least.is_finite() {
         assert!(accel >= least.min(1e6) * (1.0 - 2.5 * SHORT), "{accel} of {least} mm/s^2");
     }
-    // The slowest there is.
+    // The lowest velocity there is.
     let cruise = cruise.max(1e-6);
     let got = f64::from(block.cruise);
     assert!(got <= cruise * EXACT, "{got} of {cruise} mm/s");
-    // Slower only for motors, and blocks too short for exec.
+    // A block is slower only because of its motors, or because it is too short for exec.
     let least = if block.extent.has_whole_steps() { 1 } else { 8 };
     let moves = block.way.iter().any(|&way| way.unsigned_abs() >= least);
     let shortest = length / f64::from(BLOCK_S_MIN);
@@ -136,7 +136,7 @@ fn check_limits(
     check_override(block, unit, feed.is_some(), config, shortest);
 }
 
-/// Checks the velocity under an override: the commanded one times the factor, as far as the axes can.
+/// Checks the velocity under an override: the commanded velocity times the factor, as far as the axes allow.
 fn check_override(block: &Move, unit: &PerAxis<f64>, is_feed: bool, config: &Config, most: f64) {
     let doubled = f64::from(block.velocity(&Factors { feed: 2.0, traverse: 1.0 }));
     let axes = (0..AXES).filter(|&axis| unit[axis] > 0.0);
@@ -150,7 +150,8 @@ fn check_override(block: &Move, unit: &PerAxis<f64>, is_feed: bool, config: &Con
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
 
-    /// No motor exceeds its step rate under any override, and a limit that only an override asks for is a seventh below it at most.
+    /// No motor exceeds its step rate under any override. A limit that applies only because of an override is at most
+    /// a seventh below it.
     #[test]
     fn overrides_keep_step_rates(
         config in any_config(), x in 0.02f64..300.0, y in -100f64..100.0, feed in 1e2f32..1e6,
@@ -197,7 +198,7 @@ proptest! {
             let mut block = Move::default();
             match builder.line(&line, &dynamics, &config, &mut block) {
                 Built::Nothing => prop_assert_eq!(from, to),
-                // As if it had not been asked for either: the next one begins where it did.
+                // The builder is as if it had not been called: the next move begins where this one did.
                 Built::Merge => {
                     prop_assert!(may_merge);
                     for (m, at) in motors.iter().enumerate() {
@@ -205,7 +206,7 @@ proptest! {
                     }
                     continue;
                 }
-                // Nothing has changed: as if it had not been asked for.
+                // Nothing has changed: the builder is as if it had not been called.
                 Built::Parts(parts) => {
                     let steps =
                         |m: usize| (i64::from(config.steps(m, &to)) - motors[m]).unsigned_abs();
@@ -222,12 +223,12 @@ proptest! {
                 }
                 Built::Line(entry) => {
                     let (unit, length) = unit(&from, &to);
-                    // What comes before it slows it down only where they are parts of a curve.
+                    // The moves before this one slow it down only where they are parts of a curve.
                     let mut alone = Builder::default();
                     let _ = alone.set_position(&from, &config);
                     let (alone, _) = built(&mut alone, &config, [from, to], feed);
                     check_limits(&alone, &unit, length, feed, &config);
-                    // Where it begins between two steps it may be half a step shorter, and parts are rounded.
+                    // A block that begins between two steps may be half a step shorter, and components are rounded.
                     let most = block.way.iter().map(|way| way.unsigned_abs()).max().unwrap();
                     let spare = 1.0 + 10.0 / f32::from(most.max(1));
                     prop_assert!(block.cruise <= alone.cruise * spare);
@@ -252,7 +253,7 @@ proptest! {
     fn junction_of_a_split_line_is_free(
         way in prop::array::uniform3(-2_000_000i32..2_000_000), parts in 2i32..50,
     ) {
-        // Long enough for the positions' unit not to matter.
+        // The line is long enough that the unit of positions does not matter.
         prop_assume!(way.iter().any(|d| d.abs() > 2_000 * parts));
         let config = Config::new(10.0, 500.0, 0.0);
         let mut builder = Builder::default();
@@ -271,15 +272,15 @@ proptest! {
 }
 
 proptest! {
-    /// Short lines on a circle keep to what the axes can on a curve, within a factor of 1.5, from the third on.
+    /// From the third on, short lines on a circle keep to the limits of the axes on a curve, within a factor of 1.5.
     #[test]
     fn short_lines_on_a_curve_keep_to_its_limits(
         radius in decades(0.2, 30.0), chord in decades(0.02, 1.0), accel in decades(50.0, 5e3),
         jerk in prop_oneof![Just(0.0), decades(1e3, 1e6)], start in 0.0..6.3f64, feed in decades(60.0, 2e4),
     ) {
-        // As coarse as a part of a turn: then it is a polygon.
+        // Chords this long compared with the radius make a polygon.
         prop_assume!(chord < 0.6 * radius);
-        // As flat as what three decimals leave of a straight line.
+        // A chord must differ from a straight line by more than three decimals can express.
         prop_assume!(chord * chord > 1.2e-3 * radius);
         let config = Config { deviation: 0.1, junction: accel, ..Config::new(500.0, accel, jerk) };
         let mut builder = Builder::default();
@@ -297,7 +298,7 @@ proptest! {
             prop_assert!(v * v / r <= 1.5 * f64::from(accel), "{v} mm/s: {} of {accel} mm/s^2", v * v / r);
             let most = if jerk > 0.0 { 1.5 * f64::from(jerk) } else { f64::MAX };
             prop_assert!(v.powi(3) / r.powi(2) <= most, "{v} mm/s: {} of {jerk} mm/s^3", v.powi(3) / r.powi(2));
-            // Nor slower than they have to.
+            // They are not slower than necessary either.
             let (accel, jerk) = (f64::from(accel), if jerk > 0.0 { f64::from(jerk) } else { f64::MAX });
             let best = (accel * r).sqrt().min((jerk * r * r).cbrt()).min(f64::from(feed) / 30.0).min(500.0);
             let best = best.min(f64::from(block.extent.length()) / f64::from(BLOCK_S_MIN));
@@ -305,7 +306,7 @@ proptest! {
         }
     }
 
-    /// A corner between long lines is no curve, nor is a chamfer of it.
+    /// A corner between long lines is no curve, nor is a corner with a chamfer.
     #[test]
     fn a_corner_is_no_curve(angle in 0.01..3.0f64, side in 5.0..50.0f64, chamfer in 0.05..1.5f64) {
         let config = Config::new(500.0, 500.0, 0.0);
@@ -357,7 +358,7 @@ fn junction_velocities() {
             (170.0, 21.85),
         ] {
             let limit = corner(angle);
-            // The deviation is kept in two bytes.
+            // The deviation is stored in two bytes.
             assert!(
                 limit <= velocity * 1.001 && limit >= velocity * (0.999 - SHORT as f32),
                 "{angle}: {limit}"
@@ -384,13 +385,13 @@ fn rotary_moves() {
     let (block, _) = built(&mut Builder::default(), &config, [zero, both], None);
     assert!((block.extent.length() - 90.0).abs() < 0.01, "{}", block.extent.length());
     assert!((block.cruise - 360.0).abs() < 0.05, "{}", block.cruise);
-    // The feed is that of the linear axis.
+    // The feed is the feed of the linear axis.
     let feed = Some(Feed::PerMinute(60.0));
     let (block, _) = built(&mut Builder::default(), &config, [zero, both], feed);
     assert!((block.cruise - 10.0).abs() < 0.01, "{}", block.cruise);
 }
 
-/// Stops and set positions are left at rest, and the move after goes on from there.
+/// Stops and set positions leave the builder at rest, and the next move begins there.
 #[test]
 fn stops() {
     let config = Config::new(100.0, 500.0, 0.0);

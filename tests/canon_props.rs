@@ -1,4 +1,4 @@
-//! Canonical commands, properties: written as plain G-code and read again they are the same.
+//! Properties of canonical commands: written as plain G-code and read again they are unchanged.
 
 use kerf::canon::{Canon, Reader, commands};
 use kerf::gcode::command::Feed;
@@ -8,7 +8,7 @@ use proptest::sample::{select, subsequence};
 
 use crate::plain::plain;
 
-/// A number of two decimals, so that no arc is of a radius beyond what a float tells apart.
+/// A number with two decimals, so that no arc has a radius beyond the precision of a float.
 fn number() -> impl Strategy<Value = String> {
     (-200i32..200, 0u32..100).prop_map(|(whole, part)| format!("{whole}.{part:02}"))
 }
@@ -28,12 +28,12 @@ fn words(letters: &'static str) -> impl Strategy<Value = String> {
     )
 }
 
-/// One of the parts between bars.
+/// One of the parts between the bars.
 fn any_of(parts: &'static str) -> impl Strategy<Value = &'static str> {
     select(parts.split('|').collect::<Vec<_>>())
 }
 
-/// A move, as often as not in modes of its own.
+/// A move, in half of the cases in modes of its own.
 fn movement() -> impl Strategy<Value = String> {
     let modes = any_of("||||G90|G91|G20|G21|G93|G94|G95 M3 S50|G53|G61.1|G64|G17|G18|G19");
     let straight =
@@ -42,7 +42,7 @@ fn movement() -> impl Strategy<Value = String> {
         .prop_map(|(plane, center, more)| format!("{plane} G2 {center} {more}"));
     let radius = (any_of("G2|G3"), words("XYZ"), 150u16..999, any_of("|-"), any_of("|P2|C5"))
         .prop_map(|(code, to, radius, sign, more)| format!("{code} {to} R{sign}{radius} {more}"));
-    // Half a circle, and a little over one.
+    // Half a circle, and a little more than half.
     let half = (-90i16..90, 1i16..90, any_of("G2|G3"), any_of("|P1|Z3|.001")).prop_map(
         |(i, j, code, more)| {
             let [more, slack] = if more == ".001" { ["", "1"] } else { [more, "0"] };
@@ -76,7 +76,7 @@ fn line() -> impl Strategy<Value = String> {
     prop_oneof![5 => movement(), 2 => cycle(), 3 => others.prop_map(String::from)]
 }
 
-/// A command with the rate and the stop at its end, if it is a move; `None` if it only sets them.
+/// A command; for a move, with its rate and whether it stops at its end. A command that only sets these is left out.
 type Told = (Canon, Option<Feed>, bool);
 
 fn told(commands: Vec<Canon>) -> Vec<Told> {
@@ -94,7 +94,7 @@ fn told(commands: Vec<Canon>) -> Vec<Told> {
     told
 }
 
-/// Rates have eight decimals; everything else is exact.
+/// Whether two commands agree. Rates have eight decimals; everything else is exact.
 fn same(a: &Told, b: &Told) -> bool {
     let near = |a: f32, b: f32| (a - b).abs() <= 1e-5 * a;
     let rates = match (a.1, b.1) {
@@ -105,7 +105,7 @@ fn same(a: &Told, b: &Told) -> bool {
     a.0 == b.0 && a.2 == b.2 && rates
 }
 
-/// The commands of the lines that are not refused, and how many are.
+/// Returns the commands of the lines that are accepted, and how many lines are refused.
 fn accepted(lines: &[String]) -> (Vec<Canon>, usize) {
     let mut reader = Reader::new(Usual);
     let (mut all, mut refused) = (Vec::new(), 0);
@@ -136,7 +136,7 @@ proptest! {
         prop_assert_eq!(first.len(), again.len());
     }
 
-    /// Else the property above would say nothing.
+    /// Most lines must be accepted, because otherwise the property above would say nothing.
     #[test]
     fn most_lines_are_taken(lines in prop::collection::vec(line(), 60)) {
         let (_, refused) = accepted(&lines);

@@ -1,5 +1,6 @@
-//! What an image lacks is refused by its name, and what it has is carried out. Built with and without capabilities:
-//! `cargo test --test capabilities --no-default-features --features std,dialect-tinyg` is the machine without any.
+//! A code whose capability the image lacks is refused by the name of the capability; all others are executed. The
+//! tests run with and without capabilities: `cargo test --test capabilities --no-default-features --features
+//! std,dialect-tinyg` builds the machine without any.
 
 use kerf::capability::Capability;
 use kerf::gcode::Interpreter;
@@ -11,7 +12,7 @@ use kerf::hal::imp::Machine;
 use kerf::protocol::tinyg::number;
 use kerf::status::Status;
 
-/// A line for each code that needs one.
+/// Returns a line for each code that needs a capability.
 fn lines() -> Vec<(Capability, String)> {
     let rows = G.get();
     let modes = rows.iter().filter_map(|row| match row.action {
@@ -34,7 +35,7 @@ fn lines() -> Vec<(Capability, String)> {
     modes.map(|(capability, number)| (capability, own(capability, number))).collect()
 }
 
-/// What a new interpreter says of a line, of which it drops the words that its code does not take.
+/// Returns a new interpreter's answer to a line, from which words that its code does not take have been removed.
 fn said_of(line: &str) -> Result<(), Status> {
     let mut line = String::from(line);
     loop {

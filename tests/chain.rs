@@ -1,4 +1,5 @@
-//! Lines that are merged: whatever a program draws, the path driven and the path programmed are no farther apart than the tolerance.
+//! Merging of lines: whatever a program draws, the path that is driven and the path that is programmed are no further
+//! apart than the tolerance.
 
 use kerf::gcode::command::Feed;
 use kerf::motion::chain::{Chain, TIME_MS};
@@ -7,7 +8,7 @@ use proptest::prelude::*;
 
 type Place = PerAxis<Length>;
 
-/// The lines, as straight ways: the numbers of the points where they begin and end.
+/// Merges the lines. Returns each straight move as the indices of the points where it begins and ends.
 fn merged(points: &[Place], feed: f32, blend: u8) -> Vec<(usize, usize)> {
     let feed = Feed::PerMinute(feed);
     let (mut chain, mut ways, mut start) = (Chain::default(), Vec::new(), 0);
@@ -36,7 +37,7 @@ fn place(point: &Place) -> [f64; 3] {
     [0, 1, 2].map(|axis| f64::from(point[axis].0))
 }
 
-/// Distance of a point from the straight way between two.
+/// Distance of a point from the straight line between two others.
 fn distance(point: [f64; 3], from: [f64; 3], to: [f64; 3]) -> f64 {
     let way = [0, 1, 2].map(|i| to[i] - from[i]);
     let off = [0, 1, 2].map(|i| point[i] - from[i]);
@@ -47,7 +48,8 @@ fn distance(point: [f64; 3], from: [f64; 3], to: [f64; 3]) -> f64 {
     dot(rest, rest).sqrt()
 }
 
-/// How far two paths are apart: each point of the one that is drawn in many lines from the straight one, and the other way round.
+/// Returns how far two paths are apart: the largest distance of a point of the drawn path from the straight one, and
+/// the other way round.
 fn apart(points: &[Place], (from, to): (usize, usize)) -> f64 {
     const PARTS: usize = 16;
     let (start, end) = (place(&points[from]), place(&points[to]));
@@ -65,7 +67,7 @@ fn apart(points: &[Place], (from, to): (usize, usize)) -> f64 {
     back.fold(far, f64::max)
 }
 
-/// A curve of lines: some even, as chords of a circle, some that turn at random, some on a straight line but for what is rounded.
+/// Curves of lines: some even, as chords of a circle, some that turn at random, some straight except for rounding.
 fn curve() -> impl Strategy<Value = Vec<Place>> {
     let turns = prop_oneof![Just(0.0f64), -0.02..0.02f64, -0.3..0.3f64];
     let piece = (turns, 0.0..0.02f64, 1..3_000i32, 1..30usize, -0.2..0.2f64);
@@ -107,7 +109,7 @@ proptest! {
             at
         }).collect();
         let ways = merged(&points, feed, tolerance + 1);
-        // One behind the other, and all of it.
+        // The moves follow each other and cover the whole path.
         prop_assert_eq!((ways[0].0, ways[ways.len() - 1].1), (0, points.len() - 1));
         prop_assert!(ways.windows(2).all(|pair| pair[0].1 == pair[1].0));
         for way in ways {
@@ -148,7 +150,7 @@ fn nothing_is_merged_that_must_not_be() {
     let mut chain = Chain::default();
     let mut begins = |to: &Place, feed, blend| chain.begin(&from, to, feed, blend);
     assert!(begins(&first, Some(&feed), 11));
-    // G61, traverses, inverse time, and what takes too long or goes nowhere.
+    // No merging with G61, for traverses, in inverse time mode, and for moves that take too long or have no length.
     assert!(!begins(&first, Some(&feed), 0));
     assert!(!begins(&first, None, 11));
     assert!(!begins(&first, Some(&Feed::Minutes(0.1)), 11));
@@ -164,7 +166,7 @@ fn nothing_is_merged_that_must_not_be() {
         chain.go_on(&from, to, feed, blend)
     };
     assert!(goes_on(&second, Some(&feed), 11));
-    // Another feed, another tolerance, back, too far off, too long.
+    // A merge ends with another feed, another tolerance, a move back, a point too far off, or too long a move.
     assert!(!goes_on(&second, Some(&Feed::PerMinute(6_001.0)), 11));
     assert!(!goes_on(&second, Some(&feed), 21));
     assert!(!goes_on(&second, Some(&feed), 0));

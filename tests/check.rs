@@ -1,10 +1,11 @@
-//! `kerf check`, and files as the posts of CAM programs write them.
+//! `kerf check`, with files as the post-processors of CAM programs write them.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-/// The folder of this build, in which the program lies. It is worked out at run time: the checkout may have been moved.
+/// Returns the folder of this build, in which the program lies. It is computed at run time, because the checkout may
+/// have been moved.
 fn target() -> PathBuf {
     let test = std::env::current_exe().expect("a path");
     test.ancestors().nth(2).expect("target/debug/deps/check").to_owned()
@@ -19,7 +20,7 @@ fn said(output: &Output) -> String {
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
-/// A job in a file of its own.
+/// Writes a job to a file of its own.
 fn job(name: &str, text: &str) -> PathBuf {
     let folder = target().join("check");
     fs::create_dir_all(&folder).expect("a folder");
@@ -53,7 +54,7 @@ fn it_tells_time_and_room() {
     assert_eq!(x, ["X", "0.000", "81.500", "81.500", "0.000", "to", "290.000"]);
     let turned = ["--machine", "router", "--set", "{1po:1}"];
     assert_eq!(said(&check(Path::new("examples/bracket.gcode"), &turned)), text);
-    // 60 mm at 600 mm/min, and two short ramps.
+    // 60 mm at 600 mm/min, plus two short ramps.
     let output = check(&job("time.gcode", "G1 X60 F600\n"), &["--machine", "router"]);
     assert!(said(&output).contains("time 0:00:06.0"), "{}", said(&output));
 }

@@ -1,5 +1,5 @@
-//! Control gets through whatever data does, on the host: what is crowded and how is in `tests/support/crowd.rs`;
-//! `tests/sim/tests/control.rs` has the same with the image.
+//! Control gets through whatever data does, on the host. `tests/support/crowd.rs` says which ports are crowded and
+//! how; `tests/sim/tests/control.rs` runs the same tests with the image.
 
 use kerf::hal::imp::Machine;
 
@@ -7,7 +7,7 @@ use crate::crowd;
 
 crowd::tests!(boot);
 
-/// In a thread of its own, for there is one machine in each.
+/// Boots a machine. Each test has a thread of its own, because each thread has one machine.
 fn boot() -> Machine {
     Machine::boot(115_200).expect("one machine for each thread")
 }

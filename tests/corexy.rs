@@ -1,5 +1,5 @@
-//! A CoreXY machine: its first motor drives the sum of X and Y, the second their difference. Whatever moves, and whatever ends a
-//! move, both are where the position says.
+//! A CoreXY machine: its first motor drives the sum of X and Y, the second their difference. Whatever moves, and
+//! whatever ends a move, both motors are where the position says.
 
 use kerf::boards::inputs::X_MIN;
 use kerf::hal::imp::Machine;
@@ -7,7 +7,7 @@ use proptest::prelude::*;
 
 use crate::cases::cases;
 
-/// Steps in a mm, as motors are set up by default.
+/// Steps in a mm with the default setup of motors.
 const STEPS: f64 = 1_280.0;
 
 struct Sender {
@@ -51,7 +51,7 @@ impl Sender {
         }
     }
 
-    /// The position of X and Y that it tells.
+    /// Returns the position of X and Y that the machine reports.
     fn told(&mut self) -> [f64; 2] {
         self.heard.clear();
         self.say("{pos:n}");
@@ -63,12 +63,12 @@ impl Sender {
     }
 }
 
-/// Where the motors are to be.
+/// Returns where the motors must be.
 fn steps([x, y, z]: [f64; 3]) -> [i64; 3] {
     [x + y, x - y, z].map(|mm| (mm * STEPS).round() as i64)
 }
 
-/// On a thread of its own: a machine is a thread's.
+/// Runs a test in a thread of its own, because each thread has one machine. Returns whether it passed.
 fn alone(play: impl FnOnce() + Send + 'static) -> bool {
     std::thread::spawn(play).join().is_ok()
 }
@@ -95,11 +95,11 @@ fn both_motors_turn_with_either_axis() {
 fn an_axis_homes_with_both_motors() {
     assert!(alone(|| {
         let mut sender = Sender::boot();
-        // The simulated switch goes by the first motor, which is X while Y is at 0.
+        // The simulated switch follows the first motor, which moves like X while Y is at 0.
         sender.machine.set_near(X_MIN, -5_120, false);
         sender.say("g28.2 x0");
         let home = sender.rest();
-        // It opens a step off where it closes; from there it is 1 mm.
+        // The switch opens one step away from where it closes. From there the axis moves 1 mm.
         assert_eq!(home, [-5_119 + 1_280, -5_119 + 1_280, 0], "{}", sender.heard);
         assert_eq!(sender.told(), [0.0, 0.0]);
         sender.say("g0 x1 y1");
@@ -150,7 +150,7 @@ fn any_place() -> impl Strategy<Value = [i32; 3]> {
     prop::array::uniform3(mm)
 }
 
-/// A job of many places ends at the last.
+/// Runs a job of many places, and checks that it ends at the last.
 fn run_through(places: &[[i32; 3]]) {
     let mut sender = Sender::boot();
     sender.say("{xvm:5000,yvm:5000,zvm:3000}");
@@ -162,7 +162,7 @@ fn run_through(places: &[[i32; 3]]) {
     assert_eq!(sender.told(), [end[0], end[1]]);
 }
 
-/// Moves that are held, or ended, at any moment: the way back to 0 is as far as it was there.
+/// Runs moves that are held or ended at any moment, and checks that the way back to 0 is as long as the way there.
 fn come_back(places: &[([i32; 3], u64)], by: &str) {
     let mut sender = Sender::boot();
     for ([x, y, _], ms) in places {
@@ -171,7 +171,7 @@ fn come_back(places: &[([i32; 3], u64)], by: &str) {
         sender.machine.send(by.as_bytes());
         let stands = sender.rest();
         let [x, y] = sender.told();
-        // What is told is rounded to 0.001 mm, which is more than a step.
+        // The report is rounded to 0.001 mm, which is more than a step.
         let told = steps([x, y, 0.0]);
         let near = told.iter().zip(stands).all(|(told, is)| (told - is).abs() <= 3);
         assert!(near, "{x} {y}: {stands:?}, {}", sender.heard);

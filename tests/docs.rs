@@ -1,4 +1,4 @@
-//! The documents that are made from tables are as the tables are.
+//! Documents that are generated from tables agree with the tables.
 
 use std::collections::HashSet;
 use std::fs;
@@ -10,7 +10,7 @@ use kerf::protocol::tinyg::names;
 
 use crate::{codes, schema, tables, wiring};
 
-/// The documents, and what they should be.
+/// Returns the documents and their expected text.
 fn documents() -> Vec<(String, String)> {
     let pages = [
         ("gcode.md", gcode::markdown()),
@@ -36,7 +36,7 @@ fn the_documents_are_up_to_date() {
     }
 }
 
-/// What `cargo xtask docs` runs.
+/// Writes the documents; `cargo xtask docs` runs this.
 #[test]
 #[ignore = "writes the documents"]
 fn write() {
@@ -51,7 +51,7 @@ fn every_name_is_told_somewhere() {
     assert!(untold.is_empty(), "in no document: {}", untold.join(" "));
 }
 
-/// The documents for those who use a machine.
+/// Returns the documents for users of a machine.
 fn pages() -> Vec<PathBuf> {
     let docs = fs::read_dir("docs").expect("docs").map(|entry| entry.expect("an entry").path());
     let docs = docs.filter(|path| path.extension().is_some_and(|e| e == "md"));
@@ -83,7 +83,7 @@ fn every_page_is_linked_from_the_readme() {
     assert!(missing.is_empty(), "{missing:?}");
 }
 
-/// Files that pages name: sources by their path, transcripts by their name.
+/// Files that pages name exist: sources by their path, transcripts by their name.
 #[test]
 fn what_the_pages_name_exists() {
     let mut missing = Vec::new();
@@ -112,7 +112,7 @@ fn what_the_pages_name_exists() {
     assert!(missing.is_empty(), "not there:\n{}", missing.join("\n"));
 }
 
-/// Sentences that were true once.
+/// No page has a sentence that is no longer true.
 #[test]
 fn no_page_tells_what_is_no_longer_so() {
     let gone = [
@@ -131,16 +131,18 @@ fn no_page_tells_what_is_no_longer_so() {
     }
 }
 
-/// Names in pages that are of no setting or value: groups, requests, keys of answers, words of G-code, signals, commands.
+/// Names in pages that belong to no setting or value: groups, requests, keys of answers, words of G-code, signals,
+/// commands.
 const OTHER: [&str; 34] = [
     "p1", "sq", "sys", "sr", "srs", "ax", "err", "ok", "xmin", "xmax", "ymin", "ymax", "zmin",
     "zmax", "amin", "amax", "g10", "z0", "z12", "dir1", "step1", "steps", "load", "save", "grbl",
     "jobs", "help", "er", "st", "msg", "sw", "lathe", "sd", "dr",
 ];
-/// Pages that are made from tables whole.
+/// Pages that are generated from tables as a whole.
 const MADE: [&str; 2] = ["docs/gcode.md", "docs/settings.md"];
 
-/// Pages name settings and values by the names that the machine knows: whole ones, or without axis, motor or group.
+/// Pages name settings and values by names that the machine knows: whole names, or names without axis, motor or
+/// group.
 #[test]
 fn names_in_pages_are_known() {
     let known: HashSet<String> = names().into_iter().collect();

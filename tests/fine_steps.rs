@@ -1,8 +1,8 @@
-//! Motors of more steps than a block holds in the length that lines are merged to.
+//! Motors whose steps, over the length that lines are merged to, are more than a block holds.
 
 use kerf::hal::imp::Machine;
 
-/// Where motor 1, of 12,800 steps a mm, ends, and how far it has been.
+/// Returns where motor 1, of 12,800 steps a mm, ends, and how far it has been.
 fn driven(last: &str) -> (i64, i64) {
     let machine = Machine::boot(115_200).expect("one machine for each thread");
     machine.run_ms(100);

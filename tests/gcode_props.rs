@@ -1,4 +1,4 @@
-//! G-code, properties: nothing panics, a refused line leaves no trace, numbers and units are exact.
+//! Properties of G-code: nothing panics, a refused line leaves no trace, numbers and units are exact.
 
 use kerf::gcode::Interpreter;
 use kerf::gcode::arc::Chords;
@@ -9,7 +9,7 @@ use kerf::gcode::steps::{Step, Steps};
 use kerf::units::{Length, PerAxis};
 use proptest::prelude::*;
 
-/// Lines that come close to being G-code, and often are.
+/// Lines that are nearly G-code, and often are G-code.
 fn line() -> impl Strategy<Value = String> {
     let word = prop_oneof![
         8 => "[GgXYZIJ](0|1|2|3|-?[0-9]{1,3}(\\.[0-9]{0,6})?)",
@@ -23,9 +23,9 @@ fn line() -> impl Strategy<Value = String> {
     prop::collection::vec(word, 0..7).prop_map(|words| words.join(" "))
 }
 
-/// Interprets a line and checks what holds for every line.
+/// Interprets a line and checks what must hold for every line.
 fn interpret(interpreter: &mut Interpreter, line: &[u8]) -> Commands {
-    // Who carries lines out takes it, so that a line that is refused finds none.
+    // The caller takes the lack before each line, so that a refused line finds none.
     interpreter.take_lack();
     let before = *interpreter;
     let mut out = Commands::default();
@@ -36,7 +36,7 @@ fn interpret(interpreter: &mut Interpreter, line: &[u8]) -> Commands {
             }
         }
         Err(_) => {
-            // Which axis is to blame is told by it.
+            // A refused line may change only the axis that is to blame.
             let mut expected = before;
             expected.blame(interpreter.blamed());
             assert_eq!(*interpreter, expected);
@@ -46,7 +46,8 @@ fn interpret(interpreter: &mut Interpreter, line: &[u8]) -> Commands {
     out
 }
 
-/// Where the steps of a line lead, and whether these were all: some holes are drilled in a million pecks.
+/// Returns where the steps of a line lead, and whether all steps were executed: some holes are drilled in a million
+/// pecks.
 fn carried_out(commands: &Commands, mut at: PerAxis<Length>) -> (PerAxis<Length>, bool) {
     let mut steps = Steps::default();
     for _ in 0..10_000 {
@@ -111,7 +112,7 @@ proptest! {
         let (_, value) = decimal(text.as_bytes()).unwrap();
         let magnitude = i128::from(whole) * 10_000_000 + i128::from(decimals);
         let written = if negative { -magnitude } else { magnitude };
-        // Ten-thousandths of a unit: 10 in 1e-7 mm, 254 in 1e-7 inch.
+        // In ten-thousandths of a unit of length: 10 are 1e-7 mm, 254 are 1e-7 inch.
         for (exact, scale) in [(value.mm(), 10), (value.inch(), 254)] {
             let exact = exact.unwrap();
             prop_assert_eq!(i128::from(exact.units.0) * 10_000 + i128::from(exact.rest), written * scale);

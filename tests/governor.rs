@@ -1,4 +1,4 @@
-//! The governor under a jerk limit, over random paths, alone: its limits, its time, and its work for a stretch.
+//! The governor alone, under a jerk limit, over random paths: its limits, its time, and its work for a stretch.
 //!
 //! `KERF_SEED=n` plays one path and prints what happens.
 
@@ -11,14 +11,14 @@ use kerf::motion::speed_constraints;
 
 use crate::optimum::rest_to_rest;
 
-/// Nominal time of a slice.
+/// Nominal time of a slice, s.
 const SLICE: f64 = 0.002;
 
-/// Constraints that may be asked for in one stretch: those that are looked at exactly, those that are passed, one that stands
-/// for the rest, each for three velocities.
+/// Most constraints that may be asked for in one stretch: those that are checked exactly, those that are passed, and
+/// one that stands for the rest, each for three velocities.
 const ASKED_MOST: u32 = 16;
 
-/// Numbers that look random.
+/// A generator of pseudo-random numbers.
 struct Dice(u64);
 
 impl Dice {
@@ -27,14 +27,14 @@ impl Dice {
         (0..5).for_each(|_| _ = dice.roll());
         dice
     }
-    /// From 0 to 1.
+    /// Returns a number from 0 to 1.
     fn roll(&mut self) -> f64 {
         self.0 ^= self.0 << 13;
         self.0 ^= self.0 >> 7;
         self.0 ^= self.0 << 17;
         (self.0 >> 11) as f64 / (1u64 << 53) as f64
     }
-    /// From `low` to `high`, each decade as likely as another.
+    /// Returns a number from `low` to `high`, with all decades equally likely.
     fn decades(&mut self, low: f64, high: f64) -> f64 {
         low * (high / low).powf(self.roll())
     }
@@ -51,12 +51,12 @@ struct Path {
     accel: f64,
     jerk: f64,
     blocks: Vec<Block>,
-    /// How many blocks are queued at most.
+    /// Most blocks in the queue.
     queue: usize,
     holds: bool,
 }
 
-/// What is queued behind the block that runs: velocities, and brake potentials from its end.
+/// The blocks queued behind the block that runs: their velocities, and their brake potentials from its end.
 struct Queue<'a> {
     constraints: Vec<(f32, f32)>,
     asked: &'a Cell<u32>,
@@ -106,7 +106,8 @@ impl Path {
         Self { accel, jerk, blocks, queue, holds }
     }
 
-    /// The constraints behind block `at`, of blocks up to `end`, with rising keys as the speed constraints keep them.
+    /// Returns the constraints behind block `at`, of the blocks up to `end`, with rising keys as in the speed
+    /// constraints.
     fn ahead<'a>(&self, at: usize, end: usize, asked: &'a Cell<u32>) -> Queue<'a> {
         let kappa = speed_constraints::kappa(self.accel as f32, self.jerk as f32);
         let key = |w: f32, ahead: f32| speed_constraints::key(w, kappa) + ahead;
@@ -136,24 +137,24 @@ impl Path {
 struct State {
     clock: f64,
     velocity: f64,
-    /// The machine has stood still before it.
+    /// Whether the machine has stood still before it.
     restarted: bool,
 }
 
-/// What happened on a path.
+/// The results of a path.
 #[derive(Debug, Default)]
 struct Outcome {
     seconds: f64,
-    /// Shares of the limits, at worst.
+    /// Acceleration and jerk over their limits, the largest of the path.
     accel: f64,
     jerk: f64,
     corner: f64,
     cruise: f64,
-    /// Constraints asked for in a stretch, at worst.
+    /// Most constraints that were asked for in a stretch.
     asked: u32,
     /// Most stretches in a row that end no block and are together shorter than a slice.
     tiny: u32,
-    /// Stretches, those that looked ahead, and all constraints that were asked for.
+    /// Number of stretches, number of stretches that looked ahead, and number of constraints that were asked for.
     work: [u64; 3],
 }
 
@@ -226,7 +227,7 @@ fn run(path: &Path, dice: &mut Dice, trace: bool) -> Outcome {
             states.push(next);
         }
         let mean = f64::from(stretch.distance) / f64::from(stretch.seconds);
-        // At a stop 0.5 um are gone at once.
+        // At a stop 0.5 um are made at once.
         let at_once = if governor.velocity() == 0.0 { 5.1e-4 } else { 1e-5 };
         let over = (mean - at_once / f64::from(stretch.seconds)) / block.cruise;
         if trace && over > out.cruise && over > 1.0 {
@@ -244,7 +245,7 @@ fn run(path: &Path, dice: &mut Dice, trace: bool) -> Outcome {
         }
     }
     out.seconds = clock;
-    // Rounding may leave 0.01 um of the last ramp: d = J t^3 / 6, v = J t^2 / 2.
+    // Rounding may leave over 0.01 um of the last ramp: d = J t^3 / 6, v = J t^2 / 2.
     let rounding = 0.5 * path.jerk * (6.0 * 1e-5 / path.jerk).powf(2.0 / 3.0);
     let little = rounding.max(2.0 * path.jerk * SLICE * SLICE);
     assert!(f64::from(governor.velocity()) <= little, "it ends at {}", governor.velocity());
@@ -252,7 +253,7 @@ fn run(path: &Path, dice: &mut Dice, trace: bool) -> Outcome {
     out
 }
 
-/// Changes and corners, from the states.
+/// Checks changes of velocity and corners, from the states.
 fn check(
     path: &Path,
     states: &[State],
@@ -260,7 +261,7 @@ fn check(
     out: &mut Outcome,
     trace: bool,
 ) {
-    // What a slice makes unavoidable.
+    // The change of velocity that a slice makes unavoidable.
     let little = path.jerk * SLICE * SLICE * 1.01;
     let worse = |value: f64, worst: &mut f64, what: &str, clock: f64| {
         if value > *worst {
@@ -302,7 +303,8 @@ fn check(
     }
 }
 
-/// One path after the other, or that of `KERF_SEED`.
+/// Returns the seeds of the paths: `count` of them, or the one of `KERF_SEED`. Also returns whether it is a single
+/// one.
 fn seeds(count: u64) -> (Vec<u64>, bool) {
     let one = std::env::var("KERF_SEED").ok().map(|seed| seed.parse().expect("a number"));
     let cases = std::env::var("KERF_CASES").ok().map(|n| n.parse().expect("a number"));
@@ -317,7 +319,7 @@ fn any_path_is_within_its_limits_and_work() {
     let (seeds, trace) = seeds(3_000);
     let (mut bad, count) = (Vec::new(), seeds.len() as f64);
     let (mut worst, mut most_tiny) = (0, 0);
-    // Means over all paths: of the logarithm of the time, looks in a stretch, constraints in a stretch.
+    // Means over all paths: the logarithm of the time, looks ahead in a stretch, constraints in a stretch.
     let mut means = [0.0; 3];
     for seed in seeds {
         let dice = &mut Dice::new(seed);

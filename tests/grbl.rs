@@ -1,11 +1,11 @@
-//! grbl's dialect as a sender sees it that counts characters: whatever it does, nothing is lost.
+//! grbl's dialect with a sender that counts characters: whatever it does, nothing is lost.
 
 use std::collections::VecDeque;
 use std::thread;
 
 use kerf::hal::imp::{Machine, eeprom};
 
-/// A sender that keeps as many bytes in flight as it has been told that there is room for.
+/// A sender that keeps as many bytes in flight as the machine has reported room for.
 struct Sender {
     machine: Machine,
     /// The lengths of the lines that have not been answered.
@@ -52,7 +52,7 @@ impl Sender {
         self.waits.iter().sum()
     }
 
-    /// Sends a line if it fits.
+    /// Sends a line if it fits. Returns whether it did.
     fn send(&mut self, line: &str) -> bool {
         let fits = self.in_flight() + line.len() <= self.room;
         if fits {
@@ -62,7 +62,7 @@ impl Sender {
         fits
     }
 
-    /// The blocks and bytes that the last report says are free.
+    /// Returns the free blocks and bytes of the last report.
     fn free(&self) -> (usize, usize) {
         let report = self.reports.last().expect("a report");
         let field = report.split('|').find_map(|field| field.strip_prefix("Bf:")).expect("Bf");
@@ -104,7 +104,7 @@ fn a_sender_that_counts_characters_overruns_nothing() {
         }
         sender.run_ms(1 + u64::from(random(30)));
         if random(200) == 0 {
-            // A long hold, with everything full, and a sender that asks all the time.
+            // A long hold, with all buffers full, and a sender that asks continually.
             sender.machine.send(b"!");
             for _ in 0..300 {
                 sender.machine.send(b"?");
@@ -142,7 +142,7 @@ fn the_room_that_a_report_tells_is_there() {
             break;
         }
     }
-    // Whatever it says may be sent, and is answered in the end.
+    // A sender that obeys the reports loses nothing, and all its lines are answered in the end.
     for _ in 0..5 {
         sender.machine.send(b"!?");
         sender.run_ms(50);
@@ -162,7 +162,8 @@ fn the_room_that_a_report_tells_is_there() {
     assert_eq!(sender.in_flight(), 0);
 }
 
-/// What the two ports say at a start with this setting of `dia`, and to these bytes: the second, and the first.
+/// Returns what the two ports send at a start with this setting of `dia`, and in answer to these bytes: the second
+/// port, then the first.
 fn spoken(dia: u8, bytes: &'static [u8]) -> [String; 2] {
     let set = move || {
         let machine = Machine::boot(115_200).expect("one machine for each thread");
@@ -209,7 +210,7 @@ fn each_port_has_the_dialect_that_is_set_for_it() {
 #[test]
 fn each_port_tells_what_has_decided_for_its_dialect() {
     let questions = ["$I\n", "{dia:n}\n"];
-    // What each answers: in which dialect, and why.
+    // The answer of each dialect, and the reason for the dialect.
     let told = ["[MSG:grbl's dialect, ", "\"msg\":\"TinyG's dialect on this port, "];
     for (dia, question, dialect, why) in [
         (0, 0, 0, "for it was said first"),

@@ -1,8 +1,9 @@
-//! Random conversations in grbl's dialect with the whole firmware on the host, in mocked time: lines, bytes that act anywhere in them,
-//! resets, and TinyG's dialect on the second port. What is judged is in `tests/support/grbl_session.rs`; `tests/sim/tests/grbl.rs` has the
-//! same conversations with the image, and shorter ones.
+//! Random conversations in grbl's dialect with the whole firmware on the host, in mocked time: lines, real-time bytes
+//! anywhere in them, resets, and TinyG's dialect on the second port. `tests/support/grbl_session.rs` judges them;
+//! `tests/sim/tests/grbl.rs` plays shorter conversations of this kind with the image.
 //!
-//! One that fails is made as small as it can be, and its seed is told: `KERF_SEED=4711 KERF_CASES=1 cargo test -p kerf --test host grbl_random::`.
+//! A conversation that fails is shrunk, and its seed is printed: `KERF_SEED=4711 KERF_CASES=1 cargo test -p kerf
+//! --test host grbl_random::` plays it again.
 
 use std::thread;
 
@@ -15,7 +16,7 @@ use crate::seeds;
 /// See [`Session`].
 const REPORT_MS: u64 = 20;
 
-/// Has a conversation, with a machine in a thread of its own.
+/// Plays a conversation, with a machine in a thread of its own.
 fn play(ops: &[Op]) -> Result<(), String> {
     let life = || {
         let mut session =

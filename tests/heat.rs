@@ -1,4 +1,4 @@
-//! Heaters of the whole firmware, on simulated plants in mocked time.
+//! The heaters of the whole firmware, on simulated plants in mocked time.
 
 use kerf::capability::Capability;
 use kerf::hal::imp::Machine;
@@ -6,13 +6,13 @@ use kerf::heat::sensor::{Kind, SAMPLES, reading};
 
 use crate::plant::{AIR, Plant};
 
-/// What is wrong with a sensor.
+/// The state of a sensor's wire.
 #[derive(Clone, Copy, PartialEq)]
 enum Wire {
     Well,
     Open,
     Short,
-    /// It has fallen out of its heater.
+    /// The sensor has fallen out of its heater.
     Loose,
 }
 
@@ -21,20 +21,20 @@ struct Printer {
     hot_end: Plant,
     bed: Plant,
     wire: Wire,
-    /// The transistor of the hot end conducts whatever it is told.
+    /// Whether the transistor of the hot end conducts whatever the firmware does.
     stuck: bool,
     noise: u32,
     loose: f64,
-    /// The hot end's sensor, and what a MAX6675 has converted last.
+    /// The kind of the hot end's sensor.
     kind: Kind,
     word: u16,
     ms: u64,
     said: String,
 }
 
-/// How often the plants are worked out, ms.
+/// Time between two computations of the plants, ms.
 const STEP: u64 = 10;
-/// How long a MAX6675 takes, ms.
+/// Time that a MAX6675 takes for a conversion, ms.
 const CONVERTS: u64 = 220;
 
 impl Printer {
@@ -42,7 +42,7 @@ impl Printer {
         Self::at(AIR)
     }
 
-    /// With the hot end that hot at power-up.
+    /// A printer whose hot end has this temperature at power-up; `None` without the capability.
     fn at(degrees: f64) -> Option<Self> {
         if !Capability::Printer.is_built_in() {
             return None;
@@ -73,7 +73,8 @@ impl Printer {
         f64::from(self.noise >> 16) / 65_536.0 - 0.5
     }
 
-    /// What the converter reads: half a count of noise in each conversion, of which the sum keeps a sixth.
+    /// Returns the reading of the converter. Each conversion has half a count of noise, of which the sum keeps a
+    /// sixth.
     fn read(&mut self, kind: Kind, degrees: f64) -> u16 {
         if kind == Kind::Max6675 {
             if self.ms.is_multiple_of(CONVERTS) {
@@ -85,7 +86,7 @@ impl Printer {
         (reading(kind, degrees) + noise).clamp(0.0, full) as u16
     }
 
-    /// Runs for a time, and looks at each step.
+    /// Runs for a time, and calls `look` at each step.
     fn run(&mut self, ms: u64, mut look: impl FnMut(&Self)) {
         for _ in 0..ms / STEP {
             let on = self.machine.heaters_on();
@@ -114,7 +115,7 @@ impl Printer {
         self.machine.send(b"\n");
     }
 
-    /// Sends a line and runs until it has been answered.
+    /// Sends a line and runs until it is answered.
     fn ask(&mut self, line: &str) -> String {
         self.said.clear();
         self.send(line);
@@ -122,7 +123,7 @@ impl Printer {
         self.said.clone()
     }
 
-    /// How long it takes until all heaters are off, at most `ms`.
+    /// Returns how long it takes until all heaters are off; `None` if it takes longer than `ms`.
     fn off_after(&mut self, ms: u64) -> Option<u64> {
         let (from, mut off) = (self.ms, None);
         self.run(ms, |printer| match printer.machine.heaters_on() & 3 {
@@ -132,7 +133,7 @@ impl Printer {
         off
     }
 
-    /// With the hot end at 200 degrees.
+    /// A printer with the hot end at 200 degrees.
     fn hot() -> Option<Self> {
         let mut printer = Self::new()?;
         let answer = printer.ask("m104 s200");
@@ -247,7 +248,7 @@ fn a_transistor_that_stays_on_is_told() {
     printer.run(120_000, |_| {});
     assert!(printer.said.contains("\"st\":50"), "{}", printer.said);
     printer.said.clear();
-    // And once it has got hotter than it may be, on top of that nothing more: they are locked.
+    // When the hot end has become too hot, no heater works any more: they are locked.
     printer.run(120_000, |_| {});
     assert!(printer.hot_end.block > 275.0);
 }
@@ -276,7 +277,7 @@ fn nothing_is_waited_for_where_nothing_is_to_be_hot() {
     for line in ["m109", "m109 s0", "m190 r0", "m116"] {
         let join = std::thread::spawn(move || {
             let Some(mut printer) = Printer::new() else { return };
-            // Not even with a sensor that is broken, which is no fault of a heater that is off.
+            // Nothing waits even if the sensor is broken, because that is no fault while its heater is off.
             printer.wire = Wire::Open;
             printer.send(line);
             printer.send("g0 x1");
@@ -315,7 +316,7 @@ fn the_end_of_a_program_switches_off() {
     assert_eq!(on, 0);
 }
 
-/// Of a printing host, with the hot end at so many degrees.
+/// A printer in the dialect of printing hosts, with the hot end at this temperature.
 fn prints(at: f64) -> Option<Printer> {
     let mut printer = Printer::at(at)?;
     printer.ask("M105");
@@ -337,7 +338,7 @@ fn filament_moves_where_it_is_hot_enough() {
     }
 }
 
-/// What has been planned hot is stopped where it begins cold.
+/// A move that was planned while the hot end was hot is stopped if the hot end is cold when the move begins.
 #[test]
 fn filament_that_gets_cold_in_the_queue_is_not_moved() {
     let Some(mut printer) = prints(180.0) else { return };
@@ -354,7 +355,7 @@ fn filament_that_gets_cold_in_the_queue_is_not_moved() {
     assert!(printer.ask("G1 X2").contains("ok"));
 }
 
-/// A temperature that swings around the limit stops nothing that is under way.
+/// A temperature that swings around the limit does not stop a move under way.
 #[test]
 fn a_few_degrees_less_stop_nothing() {
     let Some(mut printer) = prints(174.0) else { return };
@@ -366,7 +367,7 @@ fn a_few_degrees_less_stop_nothing() {
     assert!(printer.machine.emitted().position[3] > 9_000);
 }
 
-/// Runs until a text has been said, at most so long.
+/// Runs until a text has come, at most `ms`. Returns whether it has come.
 fn until(printer: &mut Printer, text: &str, ms: u64) -> bool {
     for _ in 0..ms / 100 {
         if printer.said.contains(text) {
@@ -450,11 +451,12 @@ fn a_bed_is_tuned_as_well() {
     assert!(until(&mut printer, "PID Autotune finished!", 1_200_000), "{}", printer.said);
     printer.run(500, |_| {});
     assert!(printer.said.contains("echo:  M304 P"), "{}", printer.said);
-    // Nobody has asked for it to be used.
+    // The result is not used, because nobody has asked for that.
     assert!(printer.ask("M304").contains("M304 P0.00 I0.00 D0.00"), "{}", printer.said);
 }
 
-/// A line behind an autotune that is ended has its effect: what the tuning leaves off is off before.
+/// A line behind an autotune that is ended takes effect: the heater that the tuning leaves off is off before that
+/// line.
 #[test]
 fn what_comes_behind_an_ended_autotune_heats() {
     let Some(mut printer) = prints(AIR) else { return };
@@ -468,7 +470,7 @@ fn what_comes_behind_an_ended_autotune_heats() {
     assert!(answer.contains("/100.00"), "{answer}");
 }
 
-/// With every sensor the hot end gets as hot as with a thermistor, and stays so.
+/// With every kind of sensor the hot end reaches and holds the temperature that it reaches with a thermistor.
 #[test]
 fn every_sensor_holds_the_temperature() {
     let kinds = [Kind::Epcos, Kind::Ad595, Kind::Pt100, Kind::Ad8495, Kind::Max6675];

@@ -1,4 +1,5 @@
-//! Printing hosts and broken sensors while a printer heats, at many moments: what has to be off is off, and hosts get through.
+//! Printing hosts and broken sensors while a printer heats, at many moments. Whatever must be off is off, and hosts
+//! get through.
 
 use kerf::capability::Capability;
 use kerf::hal::imp::Machine;
@@ -6,14 +7,14 @@ use kerf::heat::sensor::{Kind, SAMPLES, reading};
 
 use crate::plant::Plant;
 
-/// How often the plants are worked out, ms.
+/// Time between two computations of the plants, ms.
 const STEP: u64 = 10;
 
 /// A printer whose port speaks to a printing host.
 struct Printer {
     machine: Machine,
     plants: [Plant; 2],
-    /// What a broken wire has its sensor read.
+    /// What each sensor with a broken wire reads; `None` for a whole wire.
     broken: [Option<u16>; 2],
     said: String,
 }
@@ -54,7 +55,7 @@ impl Printer {
         self.machine.send(b"\n");
     }
 
-    /// Sends a line; what is said within 200 ms.
+    /// Sends a line, and returns what is heard within 200 ms.
     fn ask(&mut self, line: &str) -> String {
         self.said.clear();
         self.send(line);
@@ -62,7 +63,7 @@ impl Printer {
         self.said.clone()
     }
 
-    /// Whether everything is off from 100 ms after now on, for some seconds.
+    /// Whether everything is off within 100 ms, and stays off for some seconds.
     fn goes_off(&mut self) -> bool {
         self.run(100);
         (0..300).all(|_| {
@@ -72,12 +73,12 @@ impl Printer {
     }
 }
 
-/// Runs a test on a thread of its own, as a machine wants it.
+/// Runs a test in a thread of its own, because each thread has one machine.
 fn alone(test: impl FnOnce() + Send + 'static) {
     std::thread::spawn(test).join().expect("no panic");
 }
 
-/// What a printer is doing when a wire breaks, and the ms that it has been at it.
+/// What a printer is doing when a wire breaks, as lines that are sent before.
 const DOINGS: [&[&str]; 6] = [
     &["M104 S200"],
     &["M140 S60", "M104 S40"],
@@ -104,14 +105,14 @@ fn a_wire_that_breaks_at_any_moment_switches_off_for_good() {
             printer.said.clear();
             let label = format!("{doing:?} for {ms} ms, sensor {which} short {short}");
             if !heats {
-                // A sensor of a heater that is off is nobody's business.
+                // The sensor of a heater that is off is not watched.
                 printer.run(3_000);
                 assert!(!printer.said.contains("Error:"), "{label}: {}", printer.said);
                 return;
             }
             assert!(printer.goes_off(), "{label}");
             assert!(printer.said.contains("Error:temperature sensor"), "{label}: {}", printer.said);
-            // It is mended, and nothing heats before M999.
+            // The wire is mended, and still nothing heats before M999.
             printer.broken = [None; 2];
             printer.ask("M104 S200");
             assert!(printer.said.contains("Error:"), "{label}: {}", printer.said);
@@ -145,7 +146,7 @@ fn hosts_get_through_while_a_line_waits_for_a_temperature() {
     });
 }
 
-/// An `ok` that comes too early tells a host that it is hot.
+/// An `ok` tells a host that the temperature is reached, so it must not come too early.
 #[test]
 fn a_wait_for_a_temperature_is_answered_when_it_is_over() {
     alone(|| {
@@ -157,7 +158,7 @@ fn a_wait_for_a_temperature_is_answered_when_it_is_over() {
         printer.run(60_000);
         assert!(printer.said.ends_with("ok\n"), "{}", printer.said);
         assert!(printer.plants[0].sensor > 57.0);
-        // Homing behind it keeps nobody waiting: M105 is answered, and M108 ends the wait.
+        // Homing behind M109 delays nothing: M105 is answered, and M108 ends the wait.
         printer.send("M109 S200");
         printer.send("G28");
         printer.run(1_000);
@@ -205,7 +206,7 @@ fn a_quick_stop_that_is_not_known_and_a_reset_character_change_nothing() {
         printer.machine.send(b"\x04");
         printer.run(2_000);
         assert!(printer.is_on(), "damage of a wire switches nothing off: {}", printer.said);
-        // It is answered in its turn.
+        // M410 is answered in its turn.
         printer.ask("M410");
         assert!(printer.is_on() && !printer.said.contains("Error"), "{}", printer.said);
     });

@@ -1,5 +1,5 @@
-//! Random jobs with feedholds at random times: they come to rest within the limits, go on, and end exactly;
-//! and what is dropped leaves the motors where they are.
+//! Random jobs with feedholds at random times: they come to rest within the limits, go on, and end exactly. When the
+//! queue is dropped the motors stay where they are.
 
 use kerf::boards::MOTORS;
 use kerf::dda::SEGMENTS;
@@ -12,11 +12,11 @@ use crate::jobs::{Job, any_job, plan_held};
 use crate::keeps::check_limits;
 use crate::rig::{Config, Rig, at};
 
-/// A stop under any limits takes no more turns of exec: 300 mm/s at 20 mm/s^2, in stretches of 2 ms, and
-/// blocks without end.
+/// Most turns of exec that a stop takes under any limits: 300 mm/s at 20 mm/s^2, in stretches of 2 ms, with any
+/// number of blocks.
 const PATIENCE: usize = 20_000;
 
-/// When to hold: turns of exec since the last one, and whether to drop what is queued.
+/// The holds: turns of exec since the last one, and whether the queue is dropped.
 type Holds = Vec<(u16, bool)>;
 
 fn any_holds(drops: bool) -> impl Strategy<Value = Holds> {
@@ -102,7 +102,7 @@ fn run(job: &Job, holds: &Holds) -> Rig {
     player.rig
 }
 
-/// Runs a job that is stopped by force: after turns of exec, with segments queued, some ticks later.
+/// Runs a job that is stopped by force: after some turns of exec, with some segments queued, some ticks later.
 fn run_stopped(job: &Job, stops: &[(u16, usize, usize)]) {
     let mut rig = Rig::new(job.config.clone());
     rig.keep = false;
@@ -245,7 +245,7 @@ fn it_stops_in_the_middle_and_goes_on_to_the_end() {
             until_held(&mut rig);
             let there = rig.pins.position;
             assert!(there[0] >= 0 && there[0] < 16_000, "{there:?}");
-            // On the line.
+            // The motors are on the line.
             assert!((there[1] * 20 - there[0] * 7).abs() <= 40, "{there:?}");
             rig.hold(false);
             rig.finish();

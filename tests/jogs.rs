@@ -1,4 +1,5 @@
-//! G-code behind a jog of grbl's senders: neither keeps it from being ended, nor is it dropped with it.
+//! G-code behind a jog of grbl's senders: the G-code does not keep the jog from being ended, and is not dropped with
+//! it.
 
 use kerf::hal::imp::Machine;
 
@@ -10,7 +11,7 @@ fn say(machine: &Machine, text: &str, ms: u64) -> String {
     String::from_utf8_lossy(&machine.received()).into_owned()
 }
 
-/// A machine that a sender of grbl's talks to.
+/// A machine that speaks grbl's dialect.
 fn boot() -> Machine {
     let machine = Machine::boot(115_200).expect("one machine for each thread");
     machine.run_ms(100);
@@ -19,15 +20,15 @@ fn boot() -> Machine {
     machine
 }
 
-/// How far X has come when a jog to 20 mm is ended behind a line.
+/// Returns how far X has come when a jog to 20 mm is ended after a line was sent behind it.
 fn ended_behind(line: &str) -> i64 {
     let machine = boot();
     assert_eq!(say(&machine, "$J=G91 X20 F600\n", 100), "ok\r\n");
-    // It waits.
+    // The line waits.
     assert_eq!(say(&machine, line, 100), "");
     machine.send(&[0x85]);
     machine.run_ms(5_000);
-    // It came before the end of the jog, and is refused.
+    // The line came before the end of the jog, and is refused.
     let heard = String::from_utf8_lossy(&machine.received()).into_owned();
     assert!(heard.starts_with("error:9\r\n"), "{line:?}: {heard:?}");
     assert!(say(&machine, "?", 20).starts_with("<Idle"));
@@ -47,7 +48,7 @@ fn a_jog_ends_whatever_waits_behind_it() {
     }
 }
 
-/// Where X ends when moves come behind a jog, and then what would end that.
+/// Returns where X ends when moves come behind a jog, and then the byte that would end a jog.
 fn ends_behind(first: &str) -> i64 {
     let machine = boot();
     assert_eq!(say(&machine, "$J=G91 X2 F600\n", 50), "ok\r\n");
@@ -67,7 +68,7 @@ fn what_is_answered_behind_a_jog_is_no_jog() {
     }
 }
 
-/// `{"jogx":..}` is a jog as well: its end is told, whatever comes behind it.
+/// `{"jogx":..}` is a jog as well: its end is reported, whatever comes behind it.
 #[test]
 fn a_jog_of_tinyg_is_over_before_the_next_line_begins() {
     let machine = Machine::boot(115_200).expect("one machine for each thread");

@@ -1,7 +1,9 @@
-//! Every setting at the limits of its documented range, alone and three at a time, each followed by short moves: the steps that are made are
-//! held against the ways that were sent. What is accepted is made; what is beyond is refused.
+//! Every setting at the limits of its documented range, alone and three at a time, each followed by short moves. The
+//! steps that are made are compared with the distances that were sent. Values within the range take effect; values
+//! beyond it are refused.
 //!
-//! Each case is with a machine of its own. `KERF_SEED` and `KERF_CASES` choose those of three settings, as in `tests/streams.rs`.
+//! Each case has a machine of its own. `KERF_SEED` and `KERF_CASES` choose the cases of three settings, as in
+//! `tests/streams.rs`.
 
 use std::thread;
 
@@ -13,7 +15,7 @@ use proptest::sample::select;
 use crate::extremes::{self, Case};
 use crate::seeds;
 
-/// Settings that keep the machine from moving, or from answering as others do.
+/// Settings that keep the machine from moving, or change how it answers.
 const APART: [&str; 6] = ["saf", "est", "jv", "ej", "dia", "js"];
 
 fn name(case: &Case) -> String {
@@ -42,7 +44,7 @@ fn each_setting_at_its_limits_moves_as_it_says() {
     assert!(failed.is_empty(), "{} fail:\n{}", failed.len(), failed.join("\n"));
 }
 
-/// Three settings of motors and axes.
+/// Three settings of motors and axes together have the effect that they are documented to have.
 #[test]
 fn settings_at_their_limits_together_move_as_they_say() {
     let moves = |case: &Case| matches!(case.setting.owner(), Owner::Motor(_) | Owner::Axis(_));

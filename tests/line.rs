@@ -5,14 +5,14 @@ use std::collections::BTreeMap;
 use kerf::hal::imp::{Machine, eeprom};
 use kerf::protocol::Checksum;
 
-/// What a machine says within some milliseconds of being sent something.
+/// Sends a text, and returns what the machine sends within some milliseconds.
 fn ask(machine: &Machine, text: &str, ms: u64) -> String {
     machine.send(text.as_bytes());
     machine.run_ms(ms);
     String::from_utf8(machine.received()).expect("ASCII")
 }
 
-/// What is in memory after a machine was told some lines.
+/// Returns the EEPROM contents after a machine was sent some lines.
 fn kept_after(lines: &'static str) -> Vec<u8> {
     let told = std::thread::spawn(move || {
         let machine = Machine::boot(115_200).expect("one machine for each thread");
@@ -22,7 +22,7 @@ fn kept_after(lines: &'static str) -> Vec<u8> {
     told.join().expect("no panic")
 }
 
-/// What a machine says that finds this in its memory, before its first report.
+/// Returns what a machine with these EEPROM contents sends, before its first report.
 fn greeting_with(contents: Vec<u8>) -> String {
     let greeted = std::thread::spawn(move || {
         eeprom::put(&contents);
@@ -30,7 +30,7 @@ fn greeting_with(contents: Vec<u8>) -> String {
         let mut greeting = ask(&machine, "", 300);
         let report = greeting.find("{\"sr\"").or(greeting.find("posx:")).expect("a report");
         greeting.truncate(report);
-        // That of grbl's dialect comes first while nothing has decided between dialects.
+        // The greeting of grbl's dialect comes first while no dialect is settled.
         greeting.trim_start_matches("\r\nGrbl 1.1h ['$' for help]\r\n").to_string()
     });
     greeted.join().expect("no panic")
@@ -38,7 +38,7 @@ fn greeting_with(contents: Vec<u8>) -> String {
 
 const WHO: &str = "{\"r\":{\"fv\":0.970,\"fb\":440.20,\"hp\":1,\"hv\":8,\"id\":\"0000-KERF\"";
 
-/// What a machine says that is ready, from its version on to `end`.
+/// Returns the greeting of a machine that is ready, from its version on to `end`.
 fn ready(end: &str) -> String {
     format!(",\"kerf\":\"{}\",\"msg\":\"SYSTEM READY\"}},\"f\":[1,0,{end}", kerf::config::VERSION)
 }
@@ -76,7 +76,7 @@ fn a_memory_full_of_rubbish_is_told() {
     assert_eq!(greeting_with(vec![0xFF; 4_096]), format!("{WHO}{ready}"));
 }
 
-/// Random numbers, the same everywhere: xorshift64*.
+/// Pseudo-random numbers, the same on every computer: xorshift64*.
 struct Dice(u64);
 
 impl Dice {
@@ -88,7 +88,7 @@ impl Dice {
     }
 }
 
-/// The length that the footer of a response tells, if it is one.
+/// Returns the length in the footer of a response; `None` for other lines.
 fn length(response: &str) -> Option<usize> {
     response.starts_with("{\"r\":").then(|| {
         let footer = response.rsplit_once("\"f\":[").expect("a footer").1;
@@ -96,12 +96,12 @@ fn length(response: &str) -> Option<usize> {
     })
 }
 
-/// A sender that counts characters, fills the window of 254 as far as it can and never waits for anything else loses
-/// nothing, whatever its lines look like; and `rx` never promises more than there is.
+/// A sender that counts characters fills the window of 254 as far as it can, and waits for nothing else. It loses
+/// nothing, whatever its lines look like, and `rx` never promises more room than there is.
 #[test]
 fn a_sender_that_counts_characters_never_overruns_the_machine() {
     let machine = Machine::boot(115_200).expect("one machine for each thread");
-    // Without XON/XOFF: counting has to do.
+    // Without XON/XOFF, counting must be enough.
     ask(&machine, "{ex:0}\n{rxm:0}\n{sv:0}\n", 200);
     let mut dice = Dice(1);
     let (mut sent, mut told, mut answered) = (0, 0, 0);
@@ -141,32 +141,33 @@ fn a_sender_that_counts_characters_never_overruns_the_machine() {
     answered += rest.lines().filter_map(length).count();
     assert!(!rest.contains("\"er\""), "{rest}");
     assert_eq!(answered, LINES);
-    // A line feed behind the last return is told with the next line.
+    // A line feed behind the last return counts with the next line.
     assert!(sent - told <= 1, "{sent} bytes were sent and {told} told");
     assert!(most > 250, "{most} bytes at once");
 }
 
-/// Every setting, as groups tell them.
+/// Returns every setting, by groups.
 fn all_settings(machine: &Machine) -> BTreeMap<&'static str, String> {
     let groups = ["sys", "1", "2", "3", "4", "x", "y", "z", "a", "b", "c", "ofs", "tof"];
     groups.map(|group| (group, ask(machine, &format!("{{{group}:n}}\n"), 200))).into()
 }
 
-/// Bytes of noise: as many of any value as of the kind that requests are made of.
+/// Bytes of noise: half of them have any value, half are characters that requests are made of.
 ///
-/// What may mean something on purpose is changed, so that none of it is asked for by chance: without the letter G no
-/// line moves anything, for no motion is modal at first; M is left out for outputs; nothing that reads as a value
-/// follows a separator in a line that begins with a brace or a dollar sign, so that nothing is set; and what acts at
-/// once (`!`, `~`, `%`, ^d, ^x, XOFF, overrides, the end of a jog) is tested on its own. No line is empty, so that each is to be answered, in either
-/// mode: the second end of a line, or one behind nothing but blanks, is left out.
+/// Bytes that might mean something are changed, so that nothing is requested by chance. G is left out, so that no
+/// line moves anything, because no motion mode is in force at first. M is left out because of outputs. In a line that
+/// begins with a brace or a dollar sign nothing that reads as a value follows a separator, so that nothing is set.
+/// Characters that act at once (`!`, `~`, `%`, ^d, ^x, XOFF, overrides, the end of a jog) are tested on their own. No
+/// line is empty, so that each must be answered in either mode: the second byte of a line end, and a line end behind
+/// nothing but blanks, are left out.
 struct Noise {
     dice: Dice,
-    /// The line so far: how it began, and its last byte that was no blank.
+    /// The line so far: its first byte, and its last byte that is not blank.
     first: Option<u8>,
     last: u8,
-    /// The last byte of all.
+    /// The last byte, blank or not.
     before: u8,
-    /// Question marks that other lines came right behind.
+    /// Number of question marks with another line directly behind them.
     asked: usize,
 }
 
@@ -184,7 +185,7 @@ impl Noise {
             }
             match byte {
                 b'\r' | b'\n' => (self.first, self.last) = (None, 0),
-                // Blanks, and what never comes to be part of a line.
+                // Blanks, and bytes that never become part of a line.
                 b' ' | b'\t' | 0x05 | 0x11 => {}
                 _ => {
                     if self.first == Some(b'?') {
@@ -215,7 +216,7 @@ impl Noise {
     }
 }
 
-/// A megabyte of noise. `KERF_NOISE` is another seed.
+/// A megabyte of noise. `KERF_NOISE` selects another seed.
 #[test]
 fn noise_is_answered_and_changes_nothing() {
     const BYTES: usize = 1 << 20;
@@ -230,7 +231,7 @@ fn noise_is_answered_and_changes_nothing() {
     let (mut bytes, mut lines, mut answers, mut enquiries) = (0, 0, 0, 0);
     let mut heard = Vec::new();
     while bytes < BYTES || noise.first.is_some() {
-        // A line at a time, which is never lost.
+        // A line at a time, so that no line is lost.
         let mut line = Vec::new();
         loop {
             line.push(noise.byte());
@@ -243,7 +244,7 @@ fn noise_is_answered_and_changes_nothing() {
         bytes += line.len();
         lines += 1;
         enquiries += usize::from(acks > 0);
-        // As long as the bytes take, and the answer.
+        // Time for the bytes and for the answer.
         let mut left = 3_000;
         while answers < lines + noise.asked && left > 0 {
             machine.run_ms(2);

@@ -1,13 +1,13 @@
-//! The whole firmware on the host, over mocked time: bytes in, responses and steps out.
+//! The whole firmware on the host, in mocked time: bytes in, responses and steps out.
 
 use kerf::boards::inputs;
 use kerf::hal::imp::Machine;
 use kerf::motion::queue::{self, CAPACITY};
 
-/// The greeting of grbl's dialect, which comes first while nothing has decided between dialects.
+/// The greeting of grbl's dialect, which comes first while no dialect is settled.
 const GRBL: &str = "\r\nGrbl 1.1h ['$' for help]\r\n";
 
-/// What it says besides in an alarm.
+/// What the greeting adds in an alarm.
 const LOCKED: &str = "[MSG:'$H'|'$X' to unlock]\r\n";
 
 /// A sender's end of the line, and all it has heard.
@@ -27,7 +27,7 @@ impl Sender {
         sender
     }
 
-    /// What the machine says within some milliseconds of being sent something.
+    /// Sends a text, and returns what the machine sends within some milliseconds.
     fn ask(&mut self, text: &str, ms: u64) -> String {
         let before = self.heard.len();
         self.machine.send(text.as_bytes());
@@ -36,7 +36,7 @@ impl Sender {
         self.heard[before..].to_string()
     }
 
-    /// How long these lines take until the machine stops, in ms, to a multiple of `step`.
+    /// Returns the time that these lines take until the machine stops, in ms, to a multiple of `step`.
     fn time(&mut self, lines: &str, step: u64) -> u64 {
         self.machine.send(lines.as_bytes());
         let mut heard = Vec::new();
@@ -49,7 +49,7 @@ impl Sender {
         ms
     }
 
-    /// Responses so far, not counting the greeting.
+    /// Number of responses so far, without the greeting.
     fn answered(&self) -> usize {
         self.heard.matches("{\"r\":").count() - 1
     }
@@ -92,10 +92,10 @@ fn back_pressure_reaches_the_sender() {
     assert!(sent >= CAPACITY, "it takes all blocks first");
     assert!(queue::used() >= CAPACITY - 1, "{} blocks", queue::used());
     // ...a control line is still answered...
-    // CNCjs passes over the response to a line if it is paused while it knows of less than six.
+    // CNCjs ignores the response to a line if it is paused while fewer than six blocks are reported free.
     let told = sender.ask("{qr:n}\n", 50);
     assert!(told.contains("{\"r\":{\"qr\":6},"), "control lines overtake: {told}");
-    // ...and every line is answered once in the end, and carried out.
+    // ...and in the end every line is answered once, and executed.
     sender.ask("", 60_000);
     assert_eq!(sender.answered(), sent + 1);
     assert_eq!(sender.machine.emitted().position[0], 4 * 1280);
@@ -119,7 +119,7 @@ fn a_flood_of_lines_that_end_in_returns_is_answered_too() {
 
 fn flood(end: &str) {
     let mut sender = Sender::boot();
-    // No flow control at all: 600 lines as fast as the line goes. What does not fit is refused.
+    // No flow control at all: 600 lines at the full speed of the line. Lines that do not fit are refused.
     let job: String = (0..600).map(|n| format!("g1 f800 x{}{end}", n % 2 * 10)).collect();
     sender.ask(&job, 400_000);
     assert!(sender.heard.contains("{\"er\":{\"fb\":440.20,\"st\":13,"), "loss is reported");
@@ -150,7 +150,7 @@ fn over_long_lines_are_refused_whole() {
 #[test]
 fn enquiry_and_reset_act_at_once() {
     let mut sender = Sender::boot();
-    // A sender that begins with a reset is greeted; one that has spoken TinyG's dialect restarts the board.
+    // A sender that begins with a reset is greeted. After a line in TinyG's dialect a reset restarts the board.
     sender.ask("{fv:n}\n", 20);
     assert_eq!(sender.ask("g1\x05", 20), "{\"ack\":true}\n");
     sender.ask("\x18", 20);
@@ -169,8 +169,8 @@ fn a_damaged_byte_behind_a_return_damages_one_line_only() {
     assert_eq!(sender.machine.emitted().position[0], 2 * 1_280);
 }
 
-/// A response that waits for room, an exception and an acknowledgement: each of the two that wait is told
-/// when it is its turn, and neither keeps waking the other until then.
+/// A response waits for room, and an exception and an acknowledgement wait for the response. Each of the two is sent
+/// in its turn, and neither keeps waking the other until then.
 #[test]
 fn an_enquiry_and_an_exception_wait_for_a_response() {
     let mut sender = Sender::boot();
@@ -203,7 +203,7 @@ fn a_rotary_axis_keeps_its_limit_beside_the_smallest_linear_travel() {
         })
         .join()
         .expect("no panic");
-        // 360 degrees at 600 a minute, and a ramp.
+        // 360 degrees at 600 a minute, plus a ramp.
         assert!((36_000..38_000).contains(&ms), "{line:?} took {ms} ms");
     }
 }
@@ -222,7 +222,7 @@ fn exact_stop_stops_between_moves_and_not_within_an_arc() {
     let (exact_path, _) = time("g61 g1 f600 x2\nx4\nx6\n");
     let (exact_stop, stop_end) = time("g61.1 g1 f600 x2\nx4\nx6\n");
     assert_eq!(continuous, exact_path);
-    // Two more stops: half of the ramp down and half of the ramp up are lost at each.
+    // There are two more stops. Each costs half of the ramp down and half of the ramp up.
     assert!(exact_stop > continuous + 100, "{exact_stop} and {continuous} ms");
     let (one, _) = time("g1 f600 x2\n");
     assert!(exact_stop + 50 > 3 * one, "each of {exact_stop} ms is from rest to rest, {one} ms");
@@ -237,14 +237,14 @@ fn the_steppers_are_told_what_the_drivers_want() {
     let mut sender = Sender::boot();
     sender.ask("{spw:5,2sp:1}\n", 50);
     assert_eq!(kerf::hal::imp::stepper::step_output(), (5, 0b0010));
-    // Not while something moves.
+    // The setting is refused while something moves.
     sender.ask("g1 f500 x1\n{spw:7}\n", 50);
     assert_eq!(kerf::hal::imp::stepper::step_output(), (5, 0b0010));
 }
 
 #[test]
 fn settings_and_offsets_survive_a_reset() {
-    // The whole machine: what one boot leaves, the next finds.
+    // The whole machine: what is stored after one boot is found at the next.
     let contents = {
         let mut sender = Sender::boot();
         for line in ["{xvm:1234}", "{1mi:16}", "{gun:0}", "g10 l2 p1 x1.5", "g28.1", "{si:200}"] {
@@ -277,17 +277,17 @@ fn a_kill_at_rest_is_no_hold() {
         }
     }
     assert!(sender.heard.contains("{\"sr\":{\"stat\":4,"), "{}", sender.heard);
-    // One that stops something is.
+    // A kill that stops something is reported.
     sender.ask("g1 x10 f500\n", 200);
     let heard = sender.ask("!\x04", 500);
     assert!(heard.contains("\"stat\":6"), "{heard}");
-    // And a program stop that waits for nobody stands still.
+    // A program stop that does not wait also stands still.
     sender.ask("{psw:0}\nm0\n", 200);
     let heard = sender.ask("!\x04", 200);
     assert!(heard.contains("\"st\":207") && !heard.contains("\"stat\":6"), "{heard}");
 }
 
-/// What EEPROM holds when the machine starts anew because these lines asked for it.
+/// Returns the EEPROM contents when the machine restarts because these lines asked for it.
 fn left_by(lines: &'static str) -> Vec<u8> {
     let play = move || {
         let sender = Sender::boot();
@@ -338,7 +338,7 @@ fn defaults_and_the_mode_survive_a_reset() {
 #[test]
 fn xoff_stops_a_sender_that_heeds_it_before_anything_is_lost() {
     let mut sender = Sender::boot();
-    // Slow moves keep the planner busy: lines pile up.
+    // Slow moves keep the planner busy, so that lines pile up.
     let lines: String = (0..120).map(|i| format!("N{i} g1 f100 x{}.25\n", i % 7)).collect();
     let mut bytes = lines.as_bytes().chunks(1);
     let (mut stopped, mut stops) = (false, 0);
@@ -369,7 +369,7 @@ fn xoff_stops_a_sender_that_heeds_it_before_anything_is_lost() {
 fn xoff_and_xon_stand_between_lines() {
     let mut sender = Sender::boot();
     sender.ask("{sv:0}\n", 100);
-    // Slow moves, so that lines pile up, and requests, so that the transmitter is busy.
+    // Slow moves make lines pile up, and requests keep the transmitter busy.
     let line = |i| format!("N{i} g1 f600 x{}.25\n{{xvm:n,yvm:n}}\n{{xvm:n}}\n", i % 7);
     let lines: Vec<u8> = (0..150).flat_map(|i| line(i).into_bytes()).collect();
     let mut bytes = lines.chunks(1);
@@ -403,7 +403,7 @@ fn xoff_from_the_sender_holds_answers_back() {
     let mut sender = Sender::boot();
     assert_eq!(sender.ask("\u{13}{fb:n}\n", 500), "");
     assert!(sender.ask("\u{11}", 500).starts_with("{\"r\":{\"fb\":440.20}"));
-    // Without flow control they are like other bytes that do not print.
+    // Without flow control they are like other bytes that are not printable.
     sender.ask("{ex:0}\n", 100);
     assert_ne!(sender.ask("\u{13}{fb:n}\n", 500), "");
 }
@@ -411,7 +411,7 @@ fn xoff_from_the_sender_holds_answers_back() {
 #[test]
 fn a_report_tells_of_one_moment() {
     let mut sender = Sender::boot();
-    // Longer than the transmit ring: exec has many turns until the last value has been put.
+    // Longer than the transmit ring: exec has many turns until the last value has been sent.
     let between =
         "ofsx:t,ofsy:t,ofsz:t,posa:t,posb:t,posc:t,mpoa:t,mpob:t,mpoc:t,homx:t,homy:t,homz:t";
     sender.ask("{sv:2,si:100,xjm:5000}\n", 50);
@@ -456,7 +456,7 @@ fn the_watchdog_is_fed_whatever_the_machine_does() {
             late = late.max(now() - watchdog::fed());
         }
     }
-    // A limit stops the steps for good, and is no reason for a reset.
+    // A limit switch stops the steps for good, but is no reason for a reset.
     sender.machine.set_input(kerf::boards::inputs::X_MIN, true);
     sender.ask("", 1_000);
     assert!(sender.heard.contains("\"st\":204"), "{}", sender.heard);
@@ -479,7 +479,7 @@ fn a_jog_whose_line_is_cut_by_its_end_does_not_begin() {
 
 #[test]
 fn a_probing_may_fail_while_its_alarm_is_being_cleared() {
-    // The move takes about so long.
+    // The move takes about this long.
     for ms in 0..150 {
         let play = move || {
             let mut sender = Sender::boot();
@@ -508,7 +508,7 @@ fn a_reset_that_nobody_wanted_is_told() {
             watchdog::set_cause(cause);
             let mut sender = Sender::boot();
             sender.ask("{rst:n}\n", 100);
-            // Whoever was sending a program is not to go on with it.
+            // A sender that is in the middle of a program must not go on with it.
             sender.ask("g1 f100 x1\n", 100);
             sender.ask("{clear:n}\n", 100);
             sender.ask("g1 f100 x1\n", 100);
@@ -524,7 +524,7 @@ fn a_reset_that_nobody_wanted_is_told() {
 
 #[test]
 fn a_move_of_several_blocks_stops_exactly_at_its_end() {
-    // 25.6 mm are a block at most.
+    // A block is 25.6 mm at most.
     let time = |mode: &str, to: [u8; 2]| {
         let lines = format!("{mode}\ng1 f3000 x{}\nx{}\n", to[0], to[1]);
         let timed = move || {

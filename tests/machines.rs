@@ -1,4 +1,4 @@
-//! Machines chosen while the firmware runs, and every built-in job on the stock settings of each, on the host.
+//! Machines that are selected at run time, and every built-in job with the default settings of each, on the host.
 
 use kerf::boards::inputs;
 use kerf::config::machines::ALL;
@@ -7,7 +7,7 @@ use kerf::jobs::{Job, STORED};
 
 use crate::apart::apart;
 
-/// The machine just switched on, with a switch at each end of X, Y and Z, half a turn of the motor away.
+/// A machine that was just switched on, with a switch at each end of X, Y and Z, half a turn of the motor away.
 fn boot() -> Machine {
     let machine = Machine::boot(115_200).expect("one machine for each thread");
     for end in 0..6 {
@@ -24,7 +24,7 @@ fn ask(machine: &Machine, line: &str) -> String {
     String::from_utf8(machine.received()).expect("ASCII")
 }
 
-/// Runs a job, and says with which status it has ended. At most an hour.
+/// Runs a job for at most an hour, and returns the status with which it has ended.
 fn run(machine: usize, job: u8) -> String {
     let chip = boot();
     let chosen = ask(&chip, &format!("{{mch:{machine},sv:0}}"));
@@ -45,10 +45,10 @@ fn run(machine: usize, job: u8) -> String {
 
 const END: &str = "8,\"msg\":\"End of file\"";
 
-/// What a job needs that a machine does not have.
+/// Returns the error of a job that a machine cannot run; `None` if it can.
 fn lacks(machine: &str, job: u8) -> Option<&'static str> {
     match (machine, job) {
-        // G28.2 Y, and arcs in XY.
+        // The job needs G28.2 Y, and arcs in XY.
         ("lathe", 2) => Some("241,\"msg\":\"Homing Error - Bad or no axis specified\""),
         ("lathe", 4 | 9) => Some("137,\"msg\":\"Axis is disabled\""),
         _ => None,
@@ -87,7 +87,7 @@ fn a_machine_is_chosen_at_rest_only_and_kept() {
         let router = "{\"mch\":1,\"xvm\":5000,\"4ma\":1,\"ja\":1800000,\"si\":200,\"posx\":1.000}";
         let answer = ask(&chip, "{mch:n,xvm:n,4ma:n,ja:n,si:n,posx:n}");
         assert!(answer.contains(router), "{answer}");
-        // 40 steps/mm, from where the motor is; both motors of Y.
+        // 40 steps/mm, from where the motor is. Both motors of Y move.
         let before = chip.emitted().position;
         ask(&chip, "g0 x3 y1");
         chip.run_ms(1_000);

@@ -1,9 +1,10 @@
-//! The firmware and its parts on the host. All files are one program: each of its own would be optimised and linked apart,
-//! which took longer than the tests.
+//! The firmware and its parts on the host. All files are one program. As separate programs each would be optimised
+//! and linked on its own, which took longer than the tests.
 //!
-//! Each test has a thread, and what a machine has one of is the thread's (`avr_embassy::machine_static`): tests share no machine.
+//! Each test has a thread, and each thread has its own machine (`avr_embassy::machine_static`), so tests share no
+//! machine.
 //!
-//! A name in front of `::` is a file here: `cargo test --test host hold::` are the tests of `hold.rs`.
+//! A name before `::` is a file here: `cargo test --test host hold::` runs the tests of `hold.rs`.
 
 #[path = "support/apart.rs"]
 mod apart;

@@ -1,4 +1,5 @@
-//! Single moves on the host: their time against the optimum, their rate, and what takes time without steps.
+//! Single moves on the host: their time compared with the optimum, their rate, and blocks that take time without
+//! steps.
 
 use kerf::motion::block::{Block, QueuedAction};
 use kerf::motion::factors::Factors;
@@ -7,10 +8,10 @@ use crate::jobs::{Job, Move, plan};
 use crate::optimum::rest_to_rest;
 use crate::rig::{self, Config, Rig, at};
 
-/// What the length of stretches costs a move at most, s: three and a half of them.
+/// Most time that the length of stretches costs a move, s: three and a half stretches.
 const COST: f64 = 3.5 * kerf::motion::exec::SEGMENT_S as f64;
 
-/// Time of a move by itself, and the shortest with its limits, s.
+/// Returns the time of a single move, and the shortest time within its limits, s.
 fn lone(mm: f64, velocity: f32, accel: f32, jerk: f32) -> (f64, f64) {
     let config = Config::new(velocity, accel, jerk);
     let way = [(mm * 1e4) as i32, 0, 0, 0];
@@ -38,7 +39,7 @@ fn moves_take_little_longer_than_the_optimum() {
             }
         }
     }
-    // On the average less than a third of that.
+    // The average loss is less than a third of that.
     let moves = (LENGTHS.len() * limits.len() * 2) as f64;
     assert!(lost / moves <= COST / 3.0, "{} s on the average", lost / moves);
 }
@@ -62,8 +63,8 @@ fn a_high_jerk_is_the_exact_trapezoid() {
     }
 }
 
-/// Steps per second of motor X between a quarter and three quarters of what it did, and how many steps
-/// that is.
+/// Returns the steps per second of motor X between a quarter and three quarters of its steps, and the number of steps
+/// in between.
 fn rate(rig: &Rig) -> (f64, f64) {
     let edges = &rig.pins.edges[0];
     let middle = &edges[edges.len() / 4..edges.len() * 3 / 4];
@@ -82,10 +83,10 @@ fn cruises_at_the_commanded_rate() {
             rig.line(at([mm, mm / 3.0, 0.0, 0.0]), velocity, 1);
             rig.finish();
             assert_eq!(rig.pins.position, rig.target());
-            // X makes its share of the path's velocity.
+            // X has its share of the path's velocity.
             let wanted = f64::from(velocity) * 80.0 / (1.0f64 + 1.0 / 9.0).sqrt();
             let (got, steps) = rate(&rig);
-            // Stretches end on whole ticks: a step may come a quarter early or late.
+            // Stretches end on whole ticks, so a step may come a quarter of an interval early or late.
             let most = 1e-3 + 0.25 / steps;
             assert!((got / wanted - 1.0).abs() < most, "{got} steps/s, not {wanted}");
         }
@@ -132,7 +133,7 @@ fn a_dwell_lasts_as_long_as_asked() {
     assert!((ms - 1235.0).abs() < 1.5, "{ms} ms");
 }
 
-/// A dwell between moves: both come to rest, neither takes time from the other.
+/// A dwell between moves: the moves come to rest, and neither takes time from the dwell or gives it time.
 #[test]
 fn moves_stop_for_a_dwell() {
     let time = |dwell: bool| {
@@ -152,7 +153,7 @@ fn moves_stop_for_a_dwell() {
     assert!((more - 0.5).abs() < 0.003, "{more} s");
 }
 
-/// Motors are where the governor is, at all times: what a stretch carries over is less than a step.
+/// Motors are where the governor is, at all times. A stretch carries over less than a step.
 #[test]
 fn segments_follow_the_plan() {
     for (jerk, velocity) in [(0.0, 1.0f32), (0.0, 60.0), (1e5, 1.0), (1e5, 60.0), (1e6, 200.0)] {
@@ -169,7 +170,7 @@ fn segments_follow_the_plan() {
     }
 }
 
-/// Nothing adds up: rates from a step in a second to the highest, for a million segments.
+/// Errors do not accumulate: rates from a step in a second to the highest, for a million segments.
 #[test]
 fn a_million_segments_end_on_the_step() {
     let mut rig = Rig::new(Config::new(400.0, 8000.0, 2e6));
@@ -185,7 +186,7 @@ fn a_million_segments_end_on_the_step() {
         while rig.free() == 0 {
             rig.turn();
         }
-        // Around the middle, or it would wander off.
+        // The places stay around the middle, or the path would drift away.
         let size = [0.03, 0.3, 3.0, 30.0][random(4.0) as usize];
         let to = [0, 1, 2, 3].map(|m| {
             let way = f64::from(random(size) - 0.5 * size);
@@ -202,7 +203,8 @@ fn a_million_segments_end_on_the_step() {
     assert_eq!(rig.pins.position, rig.target());
 }
 
-/// An acceleration that no ramp reaches under the jerk limit, by a factor of a thousand, leaves what is ahead as exact as it was.
+/// An acceleration that no ramp can reach under the jerk limit, by a factor of a thousand, does not make the planning
+/// ahead less exact.
 #[test]
 fn short_lines_keep_their_feed_under_a_low_jerk_and_a_high_acceleration() {
     for (accel, jerk) in [(20_000.0, 20.0), (1e6, 1.0), (1e6, 1_000.0)] {
@@ -224,7 +226,8 @@ fn short_lines_keep_their_feed_under_a_low_jerk_and_a_high_acceleration() {
     }
 }
 
-/// Long fast lines have brake potentials that are coarse for slow lines behind them: those count anew, and keep their feed.
+/// Long fast lines have brake potentials that are too coarse for slow lines behind them. The potentials of the slow
+/// lines are counted anew, so the slow lines keep their feed.
 #[test]
 fn slow_lines_behind_fast_ones_keep_their_feed() {
     for jerk in [0.0, 50_000.0] {
@@ -240,7 +243,7 @@ fn slow_lines_behind_fast_ones_keep_their_feed() {
             rig.line(at([x]), velocity, number);
             number
         };
-        // The second time some of the first are in the queue still, so that potentials go on.
+        // In the second round some lines of the first are still in the queue, so that potentials go on.
         for _ in 0..2 {
             for _ in 0..20 {
                 line(&mut rig, 20.0, 400.0);

@@ -1,4 +1,4 @@
-//! Kerf's motions against those of another interpreter: `tests/nist`.
+//! Kerf's motions compared with those of another interpreter: `tests/nist`.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,14 +10,14 @@ use kerf::units::Length;
 use crate::differences::{DIFFERENCES, Difference, edited};
 use crate::motion_text::MotionText;
 
-/// How far coordinates may be apart, mm: the other interpreter's are exact to half of its last decimal in
-/// the program's unit, and they are sums.
+/// Tolerance of coordinates, mm. The other interpreter's coordinates are exact to half of its last decimal in the
+/// program's unit, and they are sums.
 const MM: f64 = 0.000_101;
 const INCH: f64 = 0.002;
-/// Of many offsets, written in both units.
+/// Tolerance for sums of many offsets that are written in both units.
 const SUMS: f64 = 0.01;
 
-/// The machine of the other interpreter: as usual, but that it reads lines with a slash.
+/// The machine of the other interpreter: the usual one, but it executes lines with a slash.
 struct Other;
 
 impl Setup for Other {
@@ -43,7 +43,7 @@ fn motions_agree() {
     check(&programs, |program| if program.contains("G20") { INCH } else { MM });
 }
 
-/// `cargo xtask nist --random N` makes the programs.
+/// `cargo xtask nist --random N` makes these programs.
 #[test]
 #[ignore = "needs programs that are made at random"]
 fn random_motions_agree() {
@@ -57,7 +57,7 @@ fn check(programs: &[PathBuf], slack: impl Fn(&str) -> f64) {
     assert!(faults.is_empty(), "{} differ:\n{}", faults.len(), faults.join("\n"));
 }
 
-/// No difference is of a program that there is no more.
+/// Every difference belongs to a program that exists.
 #[test]
 fn differences_are_of_programs() {
     let programs = programs("tests/nist");
@@ -66,7 +66,7 @@ fn differences_are_of_programs() {
     }
 }
 
-/// The programs in a folder of the repository.
+/// Returns the programs in a folder of the repository.
 fn programs(folder: &str) -> Vec<PathBuf> {
     let files = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
     let mut programs: Vec<_> =
@@ -75,7 +75,7 @@ fn programs(folder: &str) -> Vec<PathBuf> {
     programs
 }
 
-/// In what the motions of a program differ, beyond what they are meant to.
+/// Returns how the motions of a program differ beyond the intended differences; `None` if they do not.
 fn fault(file: &Path, slack: impl Fn(&str) -> f64) -> Option<String> {
     let name = file.file_stem()?.to_str()?;
     let mut program = fs::read_to_string(file).unwrap();
@@ -104,7 +104,7 @@ fn fault(file: &Path, slack: impl Fn(&str) -> f64) -> Option<String> {
     None
 }
 
-/// The motion that Kerf makes of a program. After each line its state is what the motion has led to.
+/// Returns the motion that Kerf makes of a program. After each line Kerf's state must agree with the motion.
 fn motion(program: &str) -> Result<String, String> {
     let mut reader = Reader::new(Other);
     let mut motion = MotionText::default();
@@ -119,7 +119,7 @@ fn motion(program: &str) -> Result<String, String> {
     Ok(motion.text)
 }
 
-/// A motion without straight moves that rounding alone has made.
+/// Returns a motion without the straight moves that rounding alone has made.
 fn moves(motion: &str, slack: f64) -> Vec<&str> {
     let mut place = "0.0000 0.0000 0.0000 0.0000 0.0000 0.0000";
     let mut moves = Vec::new();
@@ -133,7 +133,7 @@ fn moves(motion: &str, slack: f64) -> Vec<&str> {
     moves
 }
 
-/// The end of a probing or an arc, which has plane and centre beside it.
+/// Returns the end of a probing move or an arc, without its plane and centre.
 fn end(line: &str) -> Option<&str> {
     if let Some(end) = line.strip_prefix("PROBE ") {
         return Some(end);
@@ -143,7 +143,7 @@ fn end(line: &str) -> Option<&str> {
     arc.get(..last)
 }
 
-/// Whether two lines say the same, their numbers within `slack`.
+/// Whether two lines agree, with numbers within `slack`.
 fn agree(our: &str, their: &str, slack: f64) -> bool {
     let (mut our, mut their) = (our.split(' '), their.split(' '));
     loop {

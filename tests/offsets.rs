@@ -1,10 +1,10 @@
-//! Tables of the interpreter, which are kept in EEPROM alone: the whole firmware on the host.
+//! Tables of the interpreter that are stored in EEPROM alone, with the whole firmware on the host.
 
 use std::thread;
 
 use kerf::hal::imp::{Machine, eeprom};
 
-/// A machine that finds this in its EEPROM, on a thread of its own; what is done with it.
+/// Does something with a machine that has these EEPROM contents, in a thread of its own.
 fn with<T: Send + 'static>(
     contents: Vec<u8>,
     run: impl FnOnce(&mut Sender) -> T + Send + 'static,
@@ -22,14 +22,14 @@ fn with<T: Send + 'static>(
 struct Sender(Machine);
 
 impl Sender {
-    /// What the machine says within some milliseconds of being sent something.
+    /// Sends a text, and returns what the machine sends within some milliseconds.
     fn ask(&mut self, text: &str, ms: u64) -> String {
         self.0.send(text.as_bytes());
         self.0.run_ms(ms);
         String::from_utf8(self.0.received()).expect("ASCII")
     }
 
-    /// A line is carried out, however long that takes.
+    /// Sends a line and waits until it is executed, however long that takes.
     fn carry_out(&mut self, line: &str) {
         let mut heard = self.ask(&format!("{line}\n"), 20);
         while !heard.contains("\"f\":") {
@@ -38,7 +38,7 @@ impl Sender {
         assert!(heard.contains("\"f\":[1,0,"), "{line}: {heard}");
     }
 
-    /// The numbers that the machine says of these tokens.
+    /// Returns the values of these tokens.
     fn values(&mut self, tokens: &[&str]) -> Vec<f64> {
         let asked: Vec<String> = tokens.iter().map(|token| format!("{token}:n")).collect();
         let answer = self.ask(&format!("{{{}}}\n", asked.join(",")), 50);
@@ -49,7 +49,7 @@ impl Sender {
         tokens.iter().map(|token| value(token).unwrap_or_else(|| panic!("{answer}"))).collect()
     }
 
-    /// The origin of the coordinate system in force.
+    /// Returns the origin of the coordinate system in force.
     fn origin(&mut self) -> Vec<f64> {
         self.values(&["ofsx", "ofsy", "ofsz", "ofsa", "ofsb", "ofsc"])
     }
@@ -63,7 +63,7 @@ fn system(number: usize) -> String {
 #[test]
 fn every_row_is_kept_however_fast_they_come() {
     let contents = with(Vec::new(), |sender| {
-        // Twice, and the second time counts.
+        // Each row is written twice, and the second time counts.
         let mut lines = String::new();
         for round in 1..=2 {
             for number in 1..=9 {
@@ -78,7 +78,7 @@ fn every_row_is_kept_however_fast_they_come() {
         for line in lines.split_inclusive('\n') {
             sent += 1;
             heard += &sender.ask(line, 1);
-            // As senders do: four lines in flight.
+            // Four lines are in flight, as with most senders.
             while heard.matches("\"f\":").count() + 4 < sent {
                 heard += &sender.ask("", 5);
             }
@@ -112,13 +112,13 @@ fn another_row_waits_and_control_lines_do_not() {
         let (fb, lines) = (heard.find("\"fb\"").unwrap(), heard.matches("\"f\":").count());
         assert!(fb > heard.find("\"f\":").unwrap() && lines == 2, "{heard}");
         assert_eq!(sender.ask("", 300).matches("\"f\":[1,0,").count(), 1);
-        // The same row does not wait.
+        // Writing the row that is being written already does not wait.
         let heard = sender.ask("g10l2p1x4\ng10l2p1y5\n", 10);
         assert_eq!(heard.matches("\"f\":[1,0,").count(), 2, "{heard}");
         assert_eq!(sender.origin()[..3], [4.0, 5.0, 3.0]);
-        // Nor do lines that read another.
+        // Lines that read another row do not wait either.
         assert_eq!(sender.ask("g55\n", 10).matches("\"f\":[1,0,").count(), 1);
-        // As part of a request.
+        // The line as part of a JSON request.
         let heard = sender.ask("{gc:\"g10l2p2x6\"}\n", 10);
         assert!(!heard.contains("\"f\":"), "{heard}");
         assert!(sender.ask("", 500).contains("\"f\":[1,0,"));
@@ -155,7 +155,7 @@ fn a_power_cut_leaves_each_offset_old_or_new() {
             (changed, sender.origin())
         });
         assert_eq!(other, old);
-        // One after the other, in the order of the axes.
+        // Values are written one after the other, in the order of the axes.
         let now = changed.iter().zip(&new).take_while(|(is, new)| is == new).count();
         assert_eq!(changed[now..], old[now..]);
         assert!(now >= arrived, "{now} after {arrived}");

@@ -1,5 +1,5 @@
-//! How senders that cannot run here open a conversation, with the firmware on the host: `tests/support/openings.rs` has them;
-//! `tests/sim/tests/openings.rs` has the same with the image.
+//! How senders that cannot run here open a conversation, with the firmware on the host. The openings are in
+//! `tests/support/openings.rs`; `tests/sim/tests/openings.rs` plays them with the image.
 
 #[path = "support/openings.rs"]
 mod by_sender;
@@ -13,7 +13,7 @@ fn every_sender_finds_its_own() {
     by_sender::all(boot);
 }
 
-/// A machine that begins with this value of `dia`: its memory is filled by one in a thread of its own.
+/// A machine that begins with this value of `dia`. Another machine, in a thread of its own, has stored the value.
 fn boot(dia: u8) -> Machine {
     let set = move || {
         let machine = Machine::boot(115_200).expect("one machine for each thread");

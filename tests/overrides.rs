@@ -12,7 +12,7 @@ use crate::jobs::{Job, Planned, any_job, plan_changed};
 use crate::keeps::{check_changes, check_corners};
 use crate::rig::{Config, Rig, at};
 
-/// What happens, and how many turns after the thing before.
+/// An event; each comes some turns after the event before it.
 #[derive(Clone, Copy, Debug)]
 enum Op {
     Feed(f32),
@@ -35,7 +35,7 @@ fn feed(factor: f32) -> Factors {
     Factors { feed: factor, ..Factors::ONE }
 }
 
-/// Does things when they are due.
+/// Plays the events when they are due.
 struct Script {
     ops: std::vec::IntoIter<(u16, Op)>,
     next: Option<(u16, Op)>,
@@ -104,11 +104,11 @@ fn run(job: &Job, ops: &[(u16, Op)]) -> Rig {
     rig
 }
 
-/// A brake whose limit an override has raised goes on with one that is softer from its beginning: the acceleration may change
-/// by so many times as much as where nothing is overridden.
+/// How many times as much the acceleration may change as without overrides. If an override raises the limit of a
+/// deceleration under way, the deceleration goes on softer from its beginning.
 const SOFTER: f64 = 2.0;
 
-/// The limits of the machine, whatever the feed.
+/// Checks the limits of the machine, whatever the feed.
 fn check_machine(planned: &[Planned]) {
     for (n, p) in planned.iter().enumerate() {
         assert!(p.after <= p.top.max(p.before) * 1.0011, "{n}: {p:?}");
@@ -145,7 +145,7 @@ proptest! {
         check_machine(&plan_changed(&job, held, change));
     }
 
-    /// The keys that are made anew are as good as those of blocks that come with the factors in force.
+    /// Keys that are computed anew are as good as the keys of blocks that were queued with the factors in force.
     #[test]
     fn once_planned_anew_feeds_are_kept(job in any_job(), factor in 0.3f32..2.0) {
         let mut planned = plan_changed(&job, |_, _| false, |n, rig| {
@@ -154,7 +154,7 @@ proptest! {
             }
             rig.replan();
         });
-        // What came before the first stretch was planned for more, or less.
+        // The blocks before the first stretch were planned for other factors.
         planned.retain(|p| p.line > 1);
         for (n, p) in planned.iter().enumerate() {
             prop_assert!(p.after <= p.cruise * 1.0011 + 1e-6, "{n}: {p:?}");
@@ -162,7 +162,7 @@ proptest! {
     }
 }
 
-/// Runs until the velocity is steady; returns it.
+/// Runs until the velocity is steady, and returns it.
 fn steady(rig: &mut Rig) -> f32 {
     let mut before = -1.0;
     while rig.snapshot.velocity != before {
@@ -185,7 +185,8 @@ fn a_long_move_follows_at_the_next_stretch_or_the_one_behind() {
             rig.replan();
             rig.turn();
             if jerk > 0.0 && velocity > before {
-                // Whether it may go on as fast is found out before whether it may go faster.
+                // The governor first finds out whether it may go on at this velocity, and only then whether it may go
+                // faster.
                 rig.turn();
             }
             assert!(rig.snapshot.velocity != before, "{factor}");

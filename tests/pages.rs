@@ -16,7 +16,8 @@ fn the_machine_does_what_the_pages_show() {
     transcript::play_all(shown::read_all(Path::new("docs")), 16, boot);
 }
 
-/// What pages name that looks like a request: the machine's own lines, grbl's settings, what is told to be unknown, a part of `srs`.
+/// Names in pages that look like requests: the machine's own lines, grbl's settings, names shown as unknown, a part
+/// of `srs`.
 const NONE: [&str; 9] = [
     "$100=80",
     "$H",
@@ -29,7 +30,8 @@ const NONE: [&str; 9] = [
     "{set:{vel:t,posa:f}}",
 ];
 
-/// Requests that pages name, in JSON or by a dollar, with the page: complete ones, that are for Kerf.
+/// Returns the requests that pages name, in JSON or with a dollar, each with its page. Only complete requests to Kerf
+/// count.
 fn requests() -> Vec<(String, String)> {
     let mut all = Vec::new();
     for entry in fs::read_dir("docs").expect("docs") {
@@ -41,7 +43,7 @@ fn requests() -> Vec<(String, String)> {
         let mut fenced = false;
         for line in page.lines() {
             fenced ^= line.starts_with("```");
-            // What another firmware has stands in a first column.
+            // The first column has the settings of other firmwares.
             let own = line.strip_prefix("| `$").and_then(|rest| rest.split_once('|'));
             let line = own.map_or(line, |(_, rest)| rest);
             let spans = line.split('`').skip(1).step_by(2).filter(|_| !fenced);
@@ -60,7 +62,7 @@ fn requests() -> Vec<(String, String)> {
     all
 }
 
-/// What the machine answers to a line that it does not know.
+/// Whether the machine answers that it does not know a request.
 fn is_unknown(request: &str) -> bool {
     let machine = Machine::boot(115_200).expect("one machine for each thread");
     machine.run_ms(200);

@@ -8,12 +8,12 @@ use kerf::units::{Length, PerAxis};
 
 use crate::rig::{Config, Rig, at};
 
-/// Steps in a unit of length: `Config` has 80 a mm.
+/// Steps in a unit of length: `Config` has 80 in a mm.
 const STEPS: f64 = 1.0 / 125.0;
 
 type Point = [f64; MOTORS];
 
-/// A random number from 0 to 1, of a linear congruence.
+/// A generator of random numbers from 0 to 1 (linear congruence).
 struct Random(u64);
 
 impl Random {
@@ -28,17 +28,17 @@ impl Random {
     }
 }
 
-/// What a path is made of.
+/// The properties of a path.
 #[derive(Clone, Copy, Debug)]
 struct Kind {
     axes: usize,
-    /// The way of each line, mm: the least, and the most.
+    /// Length of each line, mm: least and most.
     way: (f64, f64),
-    /// How far a line may turn from the one before, rad.
+    /// Most that a line may turn from the line before it, rad.
     turn: f64,
 }
 
-/// Off the path: the most and, over the time, the root of the mean square, steps.
+/// Distance from the path, steps: the largest, and the root mean square over time.
 #[derive(Clone, Copy, Debug, Default)]
 struct Off {
     most: f64,
@@ -58,7 +58,7 @@ impl Off {
     }
 }
 
-/// How far a point is off a line.
+/// Returns the distance of a point from a line.
 fn distance(point: &Point, a: &Point, b: &Point) -> f64 {
     let along: Point = std::array::from_fn(|m| b[m] - a[m]);
     let off: Point = std::array::from_fn(|m| point[m] - a[m]);
@@ -68,7 +68,7 @@ fn distance(point: &Point, a: &Point, b: &Point) -> f64 {
     (0..MOTORS).map(|m| (off[m] - along[m] * part).powi(2)).sum::<f64>().sqrt()
 }
 
-/// Points of a random path, from the origin on.
+/// Returns the points of a random path that begins at the origin.
 fn path(random: &mut Random, kind: &Kind, lines: usize) -> Vec<PerAxis<Length>> {
     let mut place = [0.0; MOTORS];
     let mut heading: Point = std::array::from_fn(|_| random.part() - 0.5);
@@ -88,7 +88,8 @@ fn path(random: &mut Random, kind: &Kind, lines: usize) -> Vec<PerAxis<Length>> 
     points
 }
 
-/// Runs a path, and measures how far motors are from the nearest point of it, wherever they should be at that time.
+/// Runs a path, and measures how far the motors are from the nearest point of the path, whatever their planned place
+/// at that time.
 fn off(points: &[PerAxis<Length>], velocity: f32, accel: f32, jerk: f32) -> Off {
     let mut rig = Rig::new(Config::new(500.0, accel, jerk));
     rig.pins.keep_trail = true;
@@ -109,7 +110,7 @@ fn off(points: &[PerAxis<Length>], velocity: f32, accel: f32, jerk: f32) -> Off 
         let time = (to - from) as f64;
         let point = point.map(|x| x as f64);
         let to = |n: usize| distance(&point, &ideal[n], &ideal[n + 1]);
-        // No loop of a path is so small that a later part of it could be taken for this one.
+        // Loops of a path are large enough that no later part of it can be mistaken for this part.
         let last = (near + 4).min(ideal.len() - 2);
         let best = (near..=last).min_by(|a, b| to(*a).total_cmp(&to(*b))).unwrap();
         off.add(to(best), time);
@@ -118,7 +119,7 @@ fn off(points: &[PerAxis<Length>], velocity: f32, accel: f32, jerk: f32) -> Off 
     off
 }
 
-/// The worst of several.
+/// The worst of several paths.
 #[derive(Clone, Copy, Debug, Default)]
 struct Worst {
     most: f64,
@@ -132,7 +133,7 @@ impl Worst {
     }
 }
 
-/// Short and long lines of so many axes, with corners and almost without, slow and fast.
+/// Short and long lines of `axes` axes, with sharp and slight corners, slow and fast.
 fn lines(axes: usize) -> Worst {
     let mut random = Random(axes as u64);
     let mut worst = Worst::default();
@@ -148,7 +149,7 @@ fn lines(axes: usize) -> Worst {
     worst
 }
 
-/// The ends of so many chords of a circle that begins at the origin; each turns by so much, rad.
+/// Returns the ends of `chords` chords of a circle that begins at the origin; each turns by `turn`, rad.
 fn circle(radius: f64, turn: f64, chords: u32) -> Vec<PerAxis<Length>> {
     let angles = (1..=chords).map(|n| turn * f64::from(n));
     angles.map(|angle| at([radius * angle.sin(), radius * (1.0 - angle.cos())])).collect()
@@ -165,8 +166,9 @@ fn circles() -> Worst {
     worst
 }
 
-/// Near what rounding alone leaves, for positions on these paths that are rounded to the nearest step at all times are up to 0.71 steps
-/// off with two motors, 0.29 in the root mean square. Blocks that ended on whole steps were 1.36.
+/// The error is near the error of rounding alone. Positions on these paths that are rounded to the nearest step at
+/// all times are up to 0.71 steps off with two motors, 0.29 in the root mean square. Blocks that ended on whole steps
+/// had 1.36.
 #[test]
 fn steps_keep_to_the_path() {
     let worst = [lines(2), lines(3), lines(4), circles()];
@@ -176,7 +178,8 @@ fn steps_keep_to_the_path() {
     }
 }
 
-/// A line too long for parts of a step takes up what those before it have left, of motors too that have no part in it.
+/// A line too long for parts of a step makes up for the parts that the lines before it have left, even for motors
+/// that it does not move.
 #[test]
 fn long_lines_end_exactly() {
     let mut random = Random(7);
@@ -198,8 +201,9 @@ fn long_lines_end_exactly() {
     }
 }
 
-/// From one length of ticks to another the dominant motor's steps stay even, in lockstep and out of it: in ramps, at cruise, and
-/// where a feedhold begins and ends. Where it is fast, for near rest each step is a ramp of its own.
+/// When the length of ticks changes, the steps of the dominant motor stay even, in lockstep and out of it: in ramps,
+/// at cruise, and where a feedhold begins and ends. This holds where it is fast; near rest each step is a ramp of its
+/// own.
 #[test]
 fn steps_are_even_whatever_ticks_become() {
     for (jerk, minor) in [(0.0, 0.0), (0.0, 0.37), (1e5, 0.0), (1e5, 0.37)] {
@@ -228,14 +232,14 @@ fn steps_are_even_whatever_ticks_become() {
     }
 }
 
-/// Fine steps: so many times 80 a mm.
+/// A machine with fine steps: `num` times 80 in a mm.
 fn fine(num: u32) -> Config {
     let mut config = Config::new(500.0, 1e6, 0.0);
     (config.ratio, config.junction) = ([StepRatio { num, den: 125 }; MOTORS], 1e6);
     config
 }
 
-/// Runs lines at a feed without corners that count, and compares the velocity of each segment with it.
+/// Runs lines at a feed, without corners that limit it, and compares the velocity of each segment with the feed.
 fn check_velocity(config: &Config, points: &[PerAxis<Length>], velocity: f32) {
     let mut rig = Rig::new(config.clone());
     for (n, to) in points.iter().enumerate() {
@@ -253,12 +257,13 @@ fn check_velocity(config: &Config, points: &[PerAxis<Length>], velocity: f32) {
         let ticks = f64::from(e.segment.ticks);
         let way = ticks * steps.iter().sum::<f64>().sqrt();
         let ideal = ticks * f64::from(e.segment.period) / 16e6 * f64::from(velocity) / per_step;
-        // Time is made up for, and parts of steps.
+        // Segments make up for time and for parts of steps.
         assert!((way - ideal).abs() < 1.0 + ideal * 0.02, "{way} of {ideal}: {e:?}, {ratio:?}");
     }
 }
 
-/// No segment is slower than the feed, also where two motors take turns to be the dominant one, however fine the steps are.
+/// No segment is slower than the feed, even where two motors take turns as the dominant one, however fine the steps
+/// are.
 #[test]
 fn a_steady_feed_is_steady_in_all_directions() {
     for num in [1, 4, 8, 16] {

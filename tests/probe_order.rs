@@ -1,4 +1,5 @@
-//! The order in which grbl's dialect tells what a probing has come to, whatever else is told meanwhile: an alarm, what was found, `ok`.
+//! The order in which grbl's dialect reports the result of probing, whatever other reports come meanwhile: the alarm,
+//! the position that was found, `ok`.
 
 use std::thread;
 
@@ -17,7 +18,7 @@ fn booted() -> Machine {
     machine
 }
 
-/// What is heard of a probing line but status reports, while its sender asks for one again and again.
+/// Returns the answers to a probing line, without status reports, while its sender asks for reports continually.
 fn probe(machine: &Machine, line: &str, asks_every: impl Fn(u32) -> u64) -> Vec<String> {
     machine.send(format!("{line}\n").as_bytes());
     let mut heard = Vec::new();
@@ -33,7 +34,7 @@ fn probe(machine: &Machine, line: &str, asks_every: impl Fn(u32) -> u64) -> Vec<
     lines.map(str::to_owned).collect()
 }
 
-/// Probing over 0.3 mm in 0.2 s, with the contact at a step or without one: lines begin like this.
+/// Probes over 0.3 mm in 0.2 s, with the contact at a step or without one, and checks the beginnings of the lines.
 fn tells(line: &str, contact: Option<i64>, asks_every: impl Fn(u32) -> u64, wanted: &[&str]) {
     let machine = booted();
     if let Some(step) = contact {
@@ -44,7 +45,7 @@ fn tells(line: &str, contact: Option<i64>, asks_every: impl Fn(u32) -> u64, want
     assert!(heard.len() == wanted.len() && heard.iter().zip(wanted).all(like), "{heard:?}");
 }
 
-/// In each of the three ways that it can end.
+/// Checks all ways in which a probing can end.
 fn all(asks_every: impl Fn(u32) -> u64 + Copy + Send + 'static) {
     let all: [(&str, Option<i64>, &[&str]); 4] = [
         ("g38.2 z-0.3 f120", None, &["ALARM:5", "[PRB:", "ok"]),

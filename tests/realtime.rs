@@ -1,9 +1,9 @@
 //! Random conversations with the whole firmware on the host, in mocked time: lines and real-time characters on both
-//! ports, switches that change, resets. What is judged is in `tests/support/session.rs`; `tests/sim/tests/realtime.rs` has the
-//! same conversations with the image, and shorter ones.
+//! ports, switches that change, resets. `tests/support/session.rs` judges them; `tests/sim/tests/realtime.rs` plays
+//! shorter conversations of this kind with the image.
 //!
-//! Each is with a machine of its own. One that fails is made as small as it can be, and its seed is told:
-//! `KERF_SEED=4711 KERF_CASES=1 cargo test -p kerf --test host realtime::` has it again. A long run on all cores:
+//! Each conversation has a machine of its own. One that fails is shrunk, and its seed is printed: `KERF_SEED=4711
+//! KERF_CASES=1 cargo test -p kerf --test host realtime::` plays it again. A long run on all cores:
 //! `KERF_CASES=100000 cargo test --release -p kerf --test host realtime::`.
 
 use std::thread;
@@ -14,12 +14,12 @@ use crate::ops::{self, Op, Scale};
 use crate::seeds;
 use crate::session::Session;
 
-/// Up to a minute of the machine's time.
+/// A conversation takes up to a minute of the machine's time.
 const SCALE: Scale = Scale { ops: 40, way: 3_000, radius: 1.5, wait: 1_500 };
-/// What is left of a conversation after a reset, and of the machine the EEPROM.
+/// What remains after a reset: the rest of the conversation, and the EEPROM contents of the machine.
 type Rest<'a> = (&'a [Op], Vec<u8>);
 
-/// A conversation from power-up to its end, or to a reset.
+/// Plays a conversation from power-up to its end, or to a reset.
 fn live<'a>(ops: &'a [Op], stored: Option<&[u8]>) -> Result<Option<Rest<'a>>, String> {
     stored.into_iter().for_each(eeprom::put);
     let mut session = Session::new(Machine::boot(115_200).expect("one machine for each thread"));
@@ -39,7 +39,7 @@ fn live<'a>(ops: &'a [Op], stored: Option<&[u8]>) -> Result<Option<Rest<'a>>, St
     Ok(rest.map(|rest| (rest, eeprom::contents())))
 }
 
-/// Has a conversation, with a machine in a thread of its own each time it starts.
+/// Plays a conversation, with a machine in a thread of its own for each start.
 fn play(ops: &[Op]) -> Result<(), String> {
     let mut rest = Some((ops, None));
     while let Some((ops, stored)) = rest {
@@ -56,7 +56,7 @@ fn any_conversation_ends_where_it_is_to() {
     seeds::try_all(300, |seed| seeds::smallest(seed, &ops::conversation(SCALE), |ops| play(&ops)));
 }
 
-/// The second move is planned while the first is in the very last of its slow-down.
+/// The second move is planned while the first is at the very end of its deceleration.
 #[test]
 fn a_move_that_comes_at_the_last_moment_gets_going() {
     play(&[Op::Line(0, "g90 g0 x-3.202 y1.395".to_string())]).expect("an end");

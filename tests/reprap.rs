@@ -1,16 +1,16 @@
-//! The RepRap dialect as a printing host sees it: whatever becomes of its lines on their way, each is carried out once.
+//! The RepRap dialect with a printing host: whatever happens to its lines on their way, each is executed once.
 
 use std::thread;
 
 use kerf::hal::imp::Machine;
 
-/// A host that has one line in flight, as printcore has.
+/// A host that has one line in flight, like printcore.
 struct Host {
     machine: Machine,
     heard: String,
     lines: Vec<String>,
     seed: u32,
-    /// One of so many lines is damaged on its way; 0 for none.
+    /// One in so many lines is damaged on its way; 0 for none.
     damages: u32,
     resent: usize,
 }
@@ -24,7 +24,7 @@ impl Host {
         host.machine.received();
         host.machine.send(b"M105\n");
         host.hear();
-        // Nothing is hot.
+        // Extrusion is allowed although nothing is hot.
         assert_eq!(host.ask("M302 P1"), "ok\n");
         host
     }
@@ -34,7 +34,7 @@ impl Host {
         (self.seed >> 16) % below
     }
 
-    /// What is heard up to the next `ok`.
+    /// Returns what is heard up to the next `ok`.
     fn hear(&mut self) -> String {
         let mut all = String::new();
         for _ in 0..600_000 {
@@ -52,13 +52,13 @@ impl Host {
         panic!("no answer, but {all:?}");
     }
 
-    /// A line without number or checksum.
+    /// Sends a line without number or checksum, and returns the answer.
     fn ask(&mut self, line: &str) -> String {
         self.machine.send(format!("{line}\n").as_bytes());
         self.hear()
     }
 
-    /// Prints lines, the first with the number 0, and sends again what is asked for.
+    /// Prints lines, the first with the number 0, and sends a line again when the machine asks for it.
     fn print(&mut self, lines: &[String]) {
         self.lines = lines.to_vec();
         assert_eq!(self.send(-1, "M110 N-1"), "ok\n");
@@ -90,7 +90,7 @@ impl Host {
         self.hear()
     }
 
-    /// A byte is lost, doubled, or becomes another that ends no line.
+    /// Removes a byte, doubles it, or changes it to another that ends no line.
     fn damage(&mut self, bytes: &mut Vec<u8>) {
         let at = self.random(bytes.len() as u32) as usize;
         match self.random(4) {
@@ -107,7 +107,7 @@ impl Host {
         }
     }
 
-    /// Motors 1 to 4.
+    /// Returns the positions of motors 1 to 4.
     fn steps(&mut self) -> [i64; 4] {
         assert!(self.ask("M400").ends_with("ok\n"));
         let at = self.machine.emitted().position;
@@ -115,7 +115,7 @@ impl Host {
     }
 }
 
-/// A job of moves that go by what was before: a line that is left out or carried out twice shows.
+/// A job of relative moves: a line that is left out or executed twice shows in the end position.
 fn job(lines: usize) -> (Vec<String>, [f64; 4]) {
     let mut job = vec!["G21".to_string(), "G91".to_string(), "M83".to_string()];
     let mut end = [0.0; 4];
@@ -196,7 +196,7 @@ fn a_stop_of_the_program_waits_for_m108() {
     let heard = String::from_utf8(host.machine.received()).unwrap();
     assert!(heard.contains("echo:busy: paused for user\n"), "{heard}");
     assert!(heard.contains("echo:busy: processing\n") && !heard.contains("ok"), "{heard}");
-    // Its own answer, and those of the stop and the move.
+    // The answer to M108 itself comes first, then those of the stop and the move.
     assert_eq!(host.ask("M108"), "ok\n");
     assert_eq!(host.hear(), "ok\n");
     assert_eq!(host.hear(), "ok\n");

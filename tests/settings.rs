@@ -1,5 +1,5 @@
-//! `cargo xtask settings` against the firmware on the host: what is saved is loaded into another machine, whatever the units and the
-//! way it talks.
+//! `cargo xtask settings` with the firmware on the host: saved settings can be loaded into another machine, whatever
+//! its units and its dialect.
 
 #[path = "../xtask/src/settings/json.rs"]
 #[allow(dead_code)]
@@ -17,7 +17,7 @@ const ANSWER_MS: u64 = 2_000;
 struct Host {
     machine: Machine,
     heard: String,
-    /// From here on nothing is sent: the power has gone.
+    /// Number of lines that are still sent. When it is 0 the power has failed.
     lines_left: usize,
 }
 
@@ -58,7 +58,7 @@ impl Line for Host {
     }
 }
 
-/// Runs in a thread of its own: each has one machine.
+/// Runs something in a thread of its own, because each thread has one machine.
 fn with_machine<T: Send>(what: impl FnOnce(&mut Host) -> T + Send) -> T {
     std::thread::scope(|scope| {
         scope.spawn(|| what(&mut Host::boot())).join().expect("the machine works")
@@ -87,7 +87,7 @@ fn saved_machine(more: &[&str]) -> Json {
     })
 }
 
-/// All but what the machine is, which no file changes.
+/// Checks that two files agree, except for what the machine is, which no file changes.
 fn assert_same(a: &Json, b: &Json) {
     for (group, members) in a.members() {
         for (name, value) in members.members() {
@@ -143,7 +143,7 @@ fn a_power_cut_in_the_middle_leaves_each_value_old_or_new() {
             assert!(load(host, &file).is_err());
             host.lines_left = usize::MAX;
             let cut = save(host).expect("it can be saved");
-            // Once more, and all is well.
+            // A second load succeeds.
             let wrong = load(host, &file).expect("it can be loaded");
             assert!(wrong.is_empty(), "{wrong:?}");
             cut
@@ -153,7 +153,7 @@ fn a_power_cut_in_the_middle_leaves_each_value_old_or_new() {
                 let of = |file: &Json| file.get(group).and_then(|g| g.get(name)).cloned();
                 let is_one =
                     [of(&file), of(&factory)].iter().flatten().any(|one| one.is_same(value));
-                // A profile sets axes and motors at once.
+                // A machine profile sets axes and motors at once.
                 let of_profile = group.len() == 1;
                 assert!(is_one || of_profile, "{lines}: {group} {name} {value}");
             }

@@ -1,5 +1,5 @@
-//! Axes with two motors and a switch for each: however askew they stand, homing makes them square, and whatever ends it
-//! before, no motor jumps in the next move.
+//! Axes with two motors and a switch for each. However askew the motors stand, homing makes them square. Whatever
+//! ends homing early, no motor jumps in the next move.
 
 use kerf::boards::inputs::{X_MIN, Y_MIN};
 use kerf::hal::imp::Machine;
@@ -7,7 +7,7 @@ use proptest::prelude::*;
 
 use crate::cases::cases;
 
-/// Steps in a mm, as motors are set up by default.
+/// Steps in a mm with the default setup of motors.
 const STEPS: i64 = 1_280;
 
 struct Sender {
@@ -16,7 +16,7 @@ struct Sender {
 }
 
 impl Sender {
-    /// A machine whose motors 1 and 2 are on X, each with a switch at its own step.
+    /// A machine whose motors 1 and 2 drive X, each with a switch at its own step.
     fn with_switches(switches: [i64; 2]) -> Self {
         let machine = Machine::boot(115_200).expect("one machine for each thread");
         machine.set_near(X_MIN, switches[0], false);
@@ -59,7 +59,7 @@ impl Sender {
 
 /// The steps at which the switches close, below 0.
 fn any_switches() -> impl Strategy<Value = [i64; 2]> {
-    // The other one within the 5 mm that a motor goes alone.
+    // The other switch is within the 5 mm that a motor may move alone.
     (-20_000i64..-100, -6_300i64..6_300).prop_map(|(one, more)| [one, (one + more).min(-1)])
 }
 
@@ -68,14 +68,15 @@ fn home(switches: [i64; 2], speed: u32) {
     sender.say(&format!("{{x:{{fr:5000,vm:5000,sv:{speed}}}}}"));
     sender.say("g28.2 x0");
     let ends = sender.rest();
-    // A switch opens a step off where it closes; from there it is 1 mm.
+    // A switch opens one step away from where it closes. From there the axis moves 1 mm.
     assert_eq!(ends, switches.map(|at| at + 1 + STEPS), "{}", sender.heard);
     assert!(!sender.heard.contains("\"er\""), "{}", sender.heard);
     sender.say("g0 x2");
     assert_eq!(sender.rest(), ends.map(|at| at + 2 * STEPS));
 }
 
-/// The other motor does not find its switch in the way that it may go alone.
+/// Homes with switches so far apart that the other motor does not find its switch within the distance that it may
+/// move alone.
 fn fail(switches: [i64; 2]) {
     let mut sender = Sender::with_switches(switches);
     sender.say("g28.2 x0");
@@ -108,7 +109,7 @@ fn motors_of_axes_that_stand_still_are_not_a_pair() {
     assert!(alone(play));
 }
 
-/// On a thread of its own: a machine is a thread's.
+/// Runs a test in a thread of its own, because each thread has one machine. Returns whether it passed.
 fn alone(play: impl FnOnce() + Send + 'static) -> bool {
     std::thread::spawn(play).join().is_ok()
 }

@@ -1,4 +1,4 @@
-//! The transcripts, played to the firmware on the host: each on a machine of its own.
+//! The transcripts, played to the firmware on the host, each on a machine of its own.
 
 use std::collections::HashSet;
 use std::path::Path;
@@ -43,12 +43,12 @@ impl Setup for Built {
     }
 }
 
-/// Whether the firmware can refuse this for its reason.
+/// Whether the firmware can refuse something for this reason.
 fn can_happen(refusal: &&Refusal) -> bool {
     refusal.on(&Built(refusal.on)) == Some(refusal.status)
 }
 
-/// The codes of a line, in upper case and as the documents write them.
+/// Returns the codes of a line, in upper case and spelled as in the documents.
 fn codes(line: &str) -> Vec<String> {
     let line = line.to_ascii_uppercase();
     let mut codes: Vec<String> = Vec::new();
@@ -96,12 +96,12 @@ fn every_code_and_every_refusal_is_in_some_transcript() {
     assert!(missing.is_empty(), "in no transcript:\n{}", missing.join("\n"));
 }
 
-/// Of cutter compensation.
+/// Whether a code is always refused: cutter compensation.
 fn is_always_refused(doc: &Doc) -> bool {
     matches!(doc.number, 410 | 420)
 }
 
-/// A setting of one motor or axis stands for that of the others.
+/// Returns a setting's name without its motor or axis. One motor or axis stands for all.
 fn without_owner(name: &str) -> String {
     match Setting::find(&Name::new().with(name.as_bytes()).expect("short")) {
         Some(setting) if setting.owner() != Owner::System => format!("?{}", &name[1..]),
@@ -109,8 +109,8 @@ fn without_owner(name: &str) -> String {
     }
 }
 
-/// What the settings and values of the machine are asked for: read, or set and taken, or set and refused for they are
-/// read-only.
+/// Returns the settings and values that transcripts ask for, and how: read, or set and accepted, or set and refused
+/// because they are read-only.
 fn asked_for(transcripts: &[Transcript]) -> HashSet<(String, &'static str)> {
     let mut asked = HashSet::new();
     for (sent, heard) in transcripts.iter().flat_map(Transcript::exchanges) {
@@ -122,7 +122,7 @@ fn asked_for(transcripts: &[Transcript]) -> HashSet<(String, &'static str)> {
             match (pair.reads(), &*pairs) {
                 (true, _) if ok => asked.insert((name, "read")),
                 (false, _) if ok => asked.insert((name, "set")),
-                // Of one pair it is certain that it is the one that was refused.
+                // Only if a request has one pair is it certain which pair was refused.
                 (false, [Asked { .. }]) if fixed => asked.insert((name, "refused")),
                 _ => false,
             };
@@ -154,8 +154,8 @@ fn every_name_is_in_some_transcript() {
     assert!(missing.is_empty(), "in no transcript:\n{}", missing.join("\n"));
 }
 
-/// What grbl's documents have, each as a line of a transcript begins: what is sent, or what is heard. Numbers of errors and alarms that cannot occur
-/// are in docs/protocol.md, each with its reason.
+/// What grbl's documents define, each as the beginning of a transcript's line: what is sent, or what is heard.
+/// Numbers of errors and alarms that cannot occur are listed with their reasons in docs/protocol.md.
 fn contract() -> Vec<String> {
     let errors = [1, 2, 3, 4, 5, 8, 9, 10, 11, 14, 15, 16, 20, 21, 22, 24, 25, 26, 28, 29, 30, 31];
     let errors = errors.iter().chain(&[32, 33, 34, 35, 36, 38]).map(|n| format!("<- error:{n}"));

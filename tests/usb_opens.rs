@@ -1,4 +1,4 @@
-//! A program opens the first port of a chip that sees it, and another one has had it open before.
+//! A program opens the first port of a chip that notices it, after another program has had the port open.
 
 use std::thread;
 
@@ -15,14 +15,14 @@ fn booted() -> Machine {
     machine
 }
 
-/// What is heard within 50 ms after a line has been sent.
+/// Sends a line, and returns what is heard within 50 ms.
 fn say(machine: &Machine, line: &str) -> String {
     machine.send(line.as_bytes());
     machine.run_ms(50);
     String::from_utf8(machine.received()).unwrap()
 }
 
-/// What a program hears that opens the port.
+/// Opens the port as a program does, and returns what the program hears.
 fn open(machine: &Machine) -> String {
     machine.open_usb();
     say(machine, "")
@@ -84,7 +84,8 @@ fn a_dialect_that_is_set_stays() {
     assert_eq!(say(&machine, "g21\n"), "ok\r\n");
 }
 
-/// What a program hears that opens the port while a line is being carried out of one that speaks grbl's dialect.
+/// Returns what a program hears that opens the port while a line of another program, in grbl's dialect, is being
+/// executed.
 fn open_during(line: &str) {
     let machine = booted();
     say(&machine, "?");
@@ -145,7 +146,7 @@ fn a_line_that_is_being_answered_is_answered() {
 fn a_grbl_sender_hears_of_an_alarm() {
     let machine = booted();
     say(&machine, "?");
-    // Without a contact.
+    // The probing move finds no contact.
     say(&machine, "g38.2 z-1 f500\n");
     machine.run_ms(2_000);
     machine.received();

@@ -1,8 +1,9 @@
-//! The millisecond count wraps after 49.7 days of 2^32 ms: nothing is late then. The clock of each machine here starts 3 s before it.
+//! The millisecond count wraps after 49.7 days, at 2^32 ms, and nothing is late then. The clock of each machine here
+//! starts 3 s before the wrap.
 
 use kerf::hal::imp::{Machine, gpio};
 
-/// When the machines are started.
+/// The count of milliseconds when the machines start.
 const START_MS: u64 = (1 << 32) - 3_000;
 
 struct Sender {
@@ -17,14 +18,14 @@ impl Sender {
         sender
     }
 
-    /// What the machine says within some milliseconds of being sent something.
+    /// Sends a text, and returns what the machine sends within some milliseconds.
     fn ask(&mut self, text: &str, ms: u64) -> String {
         self.machine.send(text.as_bytes());
         self.machine.run_ms(ms);
         String::from_utf8(self.machine.received()).expect("ASCII")
     }
 
-    /// Lines that are answered with 0.
+    /// Sends lines that must be answered with status 0.
     fn set(&mut self, text: &str) {
         let answer = self.ask(text, 200);
         assert!(answer.contains("\"f\":[1,0,"), "{text}: {answer}");
@@ -38,7 +39,7 @@ fn idle() {
     sender.set("{xvm:700}\n");
     let answer = sender.ask("g1x1f500\n", 500);
     assert!(answer.contains("\"stat\":3"), "{answer}");
-    // The storage task waits for the memory, the parser for a line to drain.
+    // The storage task waits for the EEPROM, and the parser for a line to drain.
     let answer = sender.ask("{reset:1}\n", 500);
     assert!(answer.contains("\"reset\":"), "{answer}");
     assert!(kerf::hal::imp::was_reset());
@@ -54,7 +55,7 @@ fn in_a_move() {
     assert_eq!(sender.machine.emitted().position[0], 64_000);
 }
 
-/// No percent sign has ever come: an exclamation mark right behind the wrap is a hold and no flush.
+/// No percent sign has ever come, so an exclamation mark right after the wrap is a hold and no flush.
 #[test]
 fn in_a_hold() {
     let mut sender = Sender::boot();
@@ -98,7 +99,8 @@ fn motors_lose_their_power_in_time() {
     println!("{}", sender.ask("{pwr:n}\n", 100));
 }
 
-/// An exclamation mark right behind a percent sign drops what is queued. None has come here, at the time 0 or ever.
+/// An exclamation mark right behind a percent sign drops what is queued. No percent sign has come here, neither at
+/// time 0 nor ever.
 #[test]
 fn a_hold_is_no_flush() {
     let mut sender = Sender::boot();

@@ -5,16 +5,19 @@ mod text;
 use litrs::StringLit;
 use proc_macro::{Delimiter, Group, Literal, TokenStream, TokenTree};
 
-/// What is put in front of a function. The host's compiler is a stable one, and does not know `optimize`.
+/// The attribute that is put in front of a function. The host's compiler is a stable one and does not know
+/// `optimize`, so the attribute applies to AVR only.
 const OPTIMIZE_SIZE: &str = "#[cfg_attr(target_arch = \"avr\", optimize(size))]";
 
-/// Builds a function, or each function of an `impl`, for size: for what runs once in many lines or less.
+/// Builds a function, or each function of an `impl`, for size. It is for code that runs once in many lines, or less
+/// often.
 ///
-/// The image is built for speed, which unrolls every loop over axes and digits. That is worth its flash where each
-/// block or each segment goes, and nowhere else.
+/// The image is built for speed, which unrolls every loop over axes and digits. That is worth its flash only in code
+/// that runs for each block or each segment.
 ///
-/// A closure in the function is still built for speed, and so is what is inlined into it: a function with a loop that a closure
-/// calls wants `#[inline(never)]` as well, and a loop over motors or axes is better a `for` than a `fold`.
+/// A closure in the function is still built for speed, and so is code that is inlined into the closure. A function
+/// with a loop that a closure calls therefore needs `#[inline(never)]` as well, and a loop over motors or axes should
+/// be a `for`, not a `fold`.
 #[proc_macro_attribute]
 pub fn small(_: TokenStream, item: TokenStream) -> TokenStream {
     let first = item.clone().into_iter().find(|token| is(token, "fn") || is(token, "impl"));
@@ -30,7 +33,7 @@ pub fn small(_: TokenStream, item: TokenStream) -> TokenStream {
     item.into_iter().map(inside).collect()
 }
 
-/// Items, of which the functions are to be small.
+/// Marks each function among some items to be built for size.
 fn functions(items: TokenStream) -> TokenStream {
     let mut marked = TokenStream::new();
     let mut item: Vec<TokenTree> = Vec::new();
@@ -56,7 +59,7 @@ fn is(token: &TokenTree, word: &str) -> bool {
     matches!(token, TokenTree::Ident(ident) if ident.to_string() == word)
 }
 
-/// Packs a text: a literal, or `env!("NAME")`. What it makes is a literal of bytes.
+/// Packs a text: a literal, or `env!("NAME")`. Expands to a byte string literal.
 #[proc_macro]
 pub fn packed(text: TokenStream) -> TokenStream {
     let Some(text) = string(text) else { return error("a literal or an `env!` is wanted") };
@@ -64,13 +67,15 @@ pub fn packed(text: TokenStream) -> TokenStream {
     TokenTree::from(Literal::byte_string(&bytes)).into()
 }
 
-/// What the codes of [`packed!`] stand for, each two bytes or codes: an array of arrays of bytes.
+/// Expands to the pairs that the codes of [`packed!`] stand for, each two bytes or codes: an array of arrays of
+/// bytes.
 #[proc_macro]
 pub fn pairs(_: TokenStream) -> TokenStream {
     format!("{:?}", text::pairs()).parse().expect("an array of arrays of numbers")
 }
 
-/// What a literal says, or a variable of the environment that `env!` names. What another macro passes on is in a group.
+/// Returns the text of a literal, or of the environment variable that `env!` names. Tokens that another macro passes
+/// on are in a group.
 fn string(tokens: TokenStream) -> Option<String> {
     let tokens: Vec<_> = tokens.into_iter().collect();
     match &tokens[..] {

@@ -1,19 +1,19 @@
 //! Packs texts by byte pair encoding: `src/hal/progmem/text.rs` unpacks them on the chip.
 //!
-//! This is a program of the compiler's machine. A `const fn` took half of the time in which Kerf is compiled.
+//! This runs on the computer that compiles Kerf. A `const fn` took half of the compile time.
 
 use std::collections::HashMap;
 use std::sync::LazyLock;
 
-/// The code of the first of [`PARTS`]; what is below is ASCII.
+/// The code of the first of [`PARTS`]; codes below it are ASCII.
 const FIRST: u8 = 128;
 /// Number of codes.
 const CODES: usize = 128;
 
-/// What codes stand for, in order. Packed with the parts before it, a part is two bytes or codes.
+/// The texts that codes stand for, in order. Packed with the parts before it, each part is two bytes or codes.
 ///
-/// They were found by adding, again and again, the pair that occurred most often in all texts of the image. The table may change freely,
-/// and new texts need no change to it.
+/// They were found by adding, again and again, the pair that occurred most often in all texts of the image. The table
+/// may be changed freely, and new texts need no change of it.
 #[rustfmt::skip]
 const PARTS: [&str; CODES] = [
     "in", "e ", "  ", "er", "s ", "or", "d ", "st", "ing", "t ", "on", "an", "de", "is ", "at", "al", "se",
@@ -61,7 +61,7 @@ impl Pairs {
     }
 }
 
-/// `code` wherever `pair` is.
+/// Replaces each occurrence of `pair` by `code`.
 fn replaced(bytes: &[u8], pair: [u8; 2], code: u8) -> Vec<u8> {
     let mut replaced = Vec::with_capacity(bytes.len());
     let mut rest = bytes;
@@ -73,12 +73,12 @@ fn replaced(bytes: &[u8], pair: [u8; 2], code: u8) -> Vec<u8> {
     replaced
 }
 
-/// What each code stands for, in order.
+/// Returns the pair that each code stands for, in order.
 pub fn pairs() -> &'static [[u8; 2]] {
     &PAIRS.all
 }
 
-/// Packs ASCII text; `None` if it is not.
+/// Packs ASCII text; `None` if the text is not ASCII.
 pub fn pack(text: &str) -> Option<Vec<u8>> {
     text.is_ascii().then(|| PAIRS.pack(text.as_bytes()))
 }

@@ -1,7 +1,7 @@
-//! An image that does the chip's arithmetic with operands that a test, `tests/sim/tests/arithmetic.rs`, has put into its memory. `cargo xtask examples` makes
-//! it.
+//! An image that does the chip's arithmetic with operands that the test `tests/sim/tests/arithmetic.rs` has put into
+//! its memory. `cargo xtask examples` builds it.
 #![cfg_attr(target_os = "none", no_std, no_main)]
-#![allow(missing_docs)] // of what `avr_device::entry` makes
+#![allow(missing_docs)] // for the items that `avr_device::entry` generates
 
 #[cfg(target_arch = "avr")]
 mod image {
@@ -12,27 +12,27 @@ mod image {
 
     kerf::link_libraries!();
 
-    /// Marks and values that [`arithmetic::passed_over`] may look at.
+    /// Number of marks and values that [`arithmetic::passed_over`] may look at.
     const PAIRS: usize = 8;
-    /// Words that come out.
+    /// Number of words in the results.
     const WORDS: usize = 17;
 
-    // All of them are bytes, the lowest first. LLVM 22 may load an atomic word into the registers that hold its address (`ld r30, Z`, `ldd r31, Z+1`): the second
-    // byte comes from somewhere else.
-    /// 1 when operands are there, 0 when results are.
+    // All shared data are bytes, the lowest first. LLVM 22 may load an atomic word into the registers that hold its
+    // address (`ld r30, Z`, `ldd r31, Z+1`), so that the second byte comes from somewhere else.
+    /// 1 when the operands are ready, 0 when the results are.
     #[unsafe(no_mangle)]
     static TURN: AtomicU8 = AtomicU8::new(0);
-    /// Two operands, of 64 and of 32 bits.
+    /// Two operands: 64 bits and 32 bits.
     #[unsafe(no_mangle)]
     static OPERANDS: [AtomicU8; 12] = [const { AtomicU8::new(0) }; 12];
-    /// How many marks and how many values there are.
+    /// Number of marks and number of values.
     #[unsafe(no_mangle)]
     static COUNTS: [AtomicU8; 2] = [const { AtomicU8::new(0) }; 2];
     #[unsafe(no_mangle)]
     static MARKS: [AtomicU8; PAIRS] = [const { AtomicU8::new(0) }; PAIRS];
     #[unsafe(no_mangle)]
     static VALUES: [AtomicU8; 2 * PAIRS] = [const { AtomicU8::new(0) }; 2 * PAIRS];
-    /// What came out, in the order of [`results`].
+    /// The results, in the order of [`results`].
     #[unsafe(no_mangle)]
     static RESULTS: [AtomicU8; 2 * WORDS] = [const { AtomicU8::new(0) }; 2 * WORDS];
 
@@ -82,7 +82,7 @@ mod image {
             whole_low,
             whole_high,
             arithmetic::passed_over(marks, values, b as u16).into(),
-            // What an inlined division makes of it, in other registers.
+            // The result of an inlined division, which uses other registers.
             arithmetic::divide(a, b as u16).0,
             arithmetic::inverse_root(a as u16),
         ]

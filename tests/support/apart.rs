@@ -1,8 +1,8 @@
-//! A machine more than the one of the test's own thread.
+//! Runs a further machine beside the one of the test's own thread.
 
 use std::thread;
 
-/// Does something on a thread of its own, as each machine needs.
+/// Runs `job` on a thread of its own. On the host each machine needs its own thread.
 pub fn apart<T: Send>(job: impl FnOnce() -> T + Send) -> T {
     thread::scope(|scope| scope.spawn(job).join().expect("no panic"))
 }

@@ -1,9 +1,9 @@
-//! How many cases the properties are tried with, and which.
+//! The number and the choice of the random cases that properties are tested with.
 
 use proptest::prelude::ProptestConfig;
 use proptest::test_runner::RngSeed;
 
-/// A fixed set of cases, unless `PROPTEST_RNG_SEED` names others.
+/// Returns a configuration for a fixed set of cases, unless `PROPTEST_RNG_SEED` selects others.
 pub fn cases(count: u32) -> ProptestConfig {
     let wanted = std::env::var("KERF_CASES").ok().and_then(|n| n.parse().ok());
     let mut config = ProptestConfig::with_cases(wanted.unwrap_or(count));

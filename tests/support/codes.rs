@@ -1,4 +1,4 @@
-//! `docs/codes.md`: every number that the machine tells, from the tables.
+//! `docs/codes.md`: every number that the machine reports, from the tables.
 
 use kerf::canon::{advice, statuses};
 use kerf::config::{Name, Setting};
@@ -86,7 +86,7 @@ asked for as well: [settings.md](settings.md). Names that do something: [protoco
 |---|---|
 ";
 
-/// Values of the machine: their name, or the group's with `x`, `1` or `e`, and what they are.
+/// Values of the machine: the name, or the name within its group with `x`, `1` or `e` for the group; and the meaning.
 const VALUES: [(&str, &str); 62] = [
     ("n", "number (N) of the line that was finished last"),
     ("line", "number (N) of the line that moves"),
@@ -170,7 +170,7 @@ fn status_row(status: Status) -> String {
     format!("| {} | {there} | {text} | {cause} | {cure} |\n", number(status))
 }
 
-/// All of it.
+/// Returns the whole page.
 pub fn markdown() -> String {
     let mut text = PREFACE.to_string();
     text += "| status | g2core | text | why | do |\n|---|---|---|---|---|\n";
@@ -183,7 +183,8 @@ pub fn markdown() -> String {
     text
 }
 
-/// Names that can be asked for and are told nowhere: not here, not in settings.md, not in protocol.md.
+/// Returns the names that can be asked for but are documented nowhere: not here, not in settings.md, not in
+/// protocol.md.
 pub fn untold() -> Vec<String> {
     let protocol = std::fs::read_to_string("docs/protocol.md").expect("docs/protocol.md");
     let settings = std::fs::read_to_string("docs/settings.md").expect("docs/settings.md");
@@ -194,7 +195,7 @@ pub fn untold() -> Vec<String> {
         let spelled = |text: &str| {
             text.contains(&format!("`{name}`")) || text.contains(&format!("`{group}`"))
         };
-        // Of which only the first and the last are spelled out.
+        // Of these ranges only the first and the last name are spelled out.
         let ranges = ["g5", "tt", "jog"];
         let in_range = ranges.iter().any(|range| name.starts_with(range));
         own || in_range || setting.is_some() || spelled(&protocol) || spelled(&settings)

@@ -1,6 +1,7 @@
-//! Ports that are crowded with lines, stopped by their senders, or both: control gets through all the same.
+//! Crowded ports: ports that are full of lines, stopped by their senders, or both. Control must get through all the
+//! same.
 //!
-//! Each of these is had with a machine that has just booted, on the host and on the simulated chip.
+//! Each test starts with a machine that has just booted. They run on the host and on the simulated chip.
 
 use std::thread;
 
@@ -12,7 +13,7 @@ pub use stops::{
     a_stop_acts_behind_what_is_no_line, a_stop_acts_once, a_stop_acts_when_it_arrives,
 };
 
-/// A test of each crowd, with the machine that a function boots.
+/// Makes a test of each kind of crowd, with the machine that a function boots.
 macro_rules! tests {
     ($boot:ident) => {
         crowd::tests!($boot: xon_gets_through, all_that_has_come_is_dropped, data_does_not_hold_up_control,
@@ -30,9 +31,9 @@ macro_rules! tests {
 }
 pub(crate) use tests;
 
-/// Longest that the machine may take to answer or to act, ms, from the last bit of what asks for it.
+/// Longest time until the machine must answer or act, ms, counted from the last bit of the request.
 const PROMPT_MS: u64 = 20;
-/// A byte on the line takes less than a tenth of a ms.
+/// Bytes that arrive in a ms: a byte takes less than a tenth of a ms.
 const BYTES_MS: usize = 11;
 
 /// A slow move.
@@ -43,27 +44,27 @@ pub const AUX: usize = 1;
 pub const XOFF: char = '\x13';
 pub const XON: char = '\x11';
 
-/// A machine, and what its two ports have said.
+/// A machine, and what its two ports have sent.
 pub struct Crowd<S> {
     side: S,
     heard: [String; 2],
 }
 
 impl<S: Side> Crowd<S> {
-    /// Waits for the greeting.
+    /// Waits for the greeting and sets both ports to TinyG's dialect.
     pub fn new(mut side: S) -> Self {
         side.wire(&[], 0);
         let mut crowd = Crowd { side, heard: Default::default() };
         let greeted = crowd.hears(USB, "SYSTEM READY", 3_000) && crowd.hears(AUX, "READY", 1_000);
         assert!(greeted, "no greeting");
-        // JSON decides between dialects: a question mark would, too.
+        // A line of JSON settles the dialect of a port. A question mark would settle it, too.
         (USB..=AUX).for_each(|port| crowd.send(port, "{fv:n}\n"));
         crowd.pass(50);
         crowd.forget();
         crowd
     }
 
-    /// Puts text on the line of a port, and lets it arrive.
+    /// Sends text on the line of a port, and waits until it has arrived.
     pub fn send(&mut self, port: usize, text: &str) {
         self.put(port, text);
         self.pass((text.len() / BYTES_MS + 1) as u64);
@@ -87,7 +88,7 @@ impl<S: Side> Crowd<S> {
     pub fn pass(&mut self, ms: u64) {
         self.side.run_ms(ms);
         for (port, heard) in [self.side.heard(), self.side.heard_aux()].iter().enumerate() {
-            // The machine may hold its sender back.
+            // The machine may have sent XOFF and XON.
             let heard = String::from_utf8_lossy(heard).replace([XOFF, XON], "");
             self.heard[port] += &heard;
         }
@@ -97,12 +98,12 @@ impl<S: Side> Crowd<S> {
         self.heard.iter_mut().for_each(String::clear);
     }
 
-    /// Whether a port says this within so many ms.
+    /// Whether a port sends this text within so many ms.
     pub fn hears(&mut self, port: usize, text: &str, ms: u64) -> bool {
         self.comes(ms, |crowd| crowd.heard[port].contains(text))
     }
 
-    /// Whether a port says a whole line that contains this within so many ms.
+    /// Whether a port sends a whole line that contains this text within so many ms.
     fn hears_line(&mut self, port: usize, text: &str, ms: u64) -> bool {
         self.comes(ms, |crowd| {
             let mut lines = crowd.heard[port].split_inclusive('\n');
@@ -110,7 +111,7 @@ impl<S: Side> Crowd<S> {
         })
     }
 
-    /// Whether this is so within so many ms.
+    /// Whether a condition becomes true within so many ms.
     fn comes(&mut self, ms: u64, is_so: impl Fn(&Self) -> bool) -> bool {
         (0..=ms).any(|_| {
             let is_so = is_so(self);
@@ -121,12 +122,12 @@ impl<S: Side> Crowd<S> {
         })
     }
 
-    /// How many responses a port has heard that end with this status.
+    /// Number of responses with this status that a port has sent.
     pub fn responses(&self, port: usize, status: u16) -> usize {
         self.heard[port].matches(&format!("\"f\":[1,{status},")).count()
     }
 
-    /// A line on a port is answered at once: by this.
+    /// Checks that a line on a port is answered promptly, with this answer.
     pub fn prompt(&mut self, port: usize, line: &str, answer: &str) {
         self.forget();
         self.send(port, line);
@@ -146,7 +147,7 @@ impl<S: Side> Crowd<S> {
         self.side.outputs().0 & 1 != 0
     }
 
-    /// Fills the planner with slow moves, until a line waits.
+    /// Fills the planner with slow moves until a line has to wait.
     fn fill_planner(&mut self, port: usize) {
         let mut taken = true;
         while taken {
@@ -156,13 +157,13 @@ impl<S: Side> Crowd<S> {
         }
     }
 
-    /// Lets a sender take no more answers, or take them again.
+    /// Makes a sender stop taking answers, or take them again.
     fn hold_back(&mut self, port: usize, holds: bool) {
         self.send(port, if holds { "\x13" } else { "\x11" });
         self.pass(60);
     }
 
-    /// The spindle stops at once.
+    /// Checks that the spindle stops promptly.
     fn stops(&mut self, what: &str) {
         let turns = |crowd: &mut Self| {
             crowd.pass(1);
@@ -172,7 +173,7 @@ impl<S: Side> Crowd<S> {
     }
 }
 
-/// Has a machine of its own, in a thread of its own, for on the host there is one in each.
+/// Runs a test with a machine of its own in a thread of its own, because on the host each thread has one machine.
 fn alone<S: Side>(boot: &(impl Fn() -> S + Sync), play: impl Fn(Crowd<S>) + Sync) {
     thread::scope(|scope| {
         let played = scope.spawn(|| play(Crowd::new(boot()))).join();
@@ -180,7 +181,7 @@ fn alone<S: Side>(boot: &(impl Fn() -> S + Sync), play: impl Fn(Crowd<S>) + Sync
     });
 }
 
-/// Settings are asked for while the sender holds the machine back: it gets its answers when it lets go.
+/// A sender asks for settings while it holds the machine back. It gets its answers when it lets the machine go on.
 pub fn xon_gets_through<S: Side>(boot: impl Fn() -> S + Sync) {
     let many = format!("{{{}xvm:n}}", "xvm:n,xfr:n,".repeat(11));
     let pool = format!("{{{}xvm:n}}\n", "xvm:n,".repeat(5));
@@ -193,7 +194,7 @@ pub fn xon_gets_through<S: Side>(boot: impl Fn() -> S + Sync) {
         alone(&boot, |mut crowd| {
             crowd.set(USB, setting);
             crowd.send(port, &XOFF.to_string());
-            // Nobody heeds what the machine says of its short ring.
+            // The sender ignores the XOFF that the machine sends because its ring is short.
             for line in lines.split_inclusive('\n') {
                 crowd.send(port, line);
                 crowd.pass(if port == AUX { 15 } else { 0 });
@@ -209,7 +210,7 @@ pub fn xon_gets_through<S: Side>(boot: impl Fn() -> S + Sync) {
     }
 }
 
-/// A kill or a flush on one port drops what has come on the other, wherever it is.
+/// A kill or a flush on one port drops what has come on the other port, wherever it waits.
 pub fn all_that_has_come_is_dropped<S: Side>(boot: impl Fn() -> S + Sync) {
     for (cut, ends) in [("\x04", false), ("!%", true)] {
         alone(&boot, |mut crowd| {
@@ -229,7 +230,7 @@ pub fn all_that_has_come_is_dropped<S: Side>(boot: impl Fn() -> S + Sync) {
                 crowd.heard
             );
             assert_eq!((crowd.steps(), crowd.turns()), ([0; 4], ends), "{cut:?}");
-            // What comes later is carried out.
+            // What comes later is executed.
             crowd.send(USB, "g91g1x.1f500\n");
             crowd.pass(500);
             assert_eq!(crowd.steps(), [128, 0, 0, 0]);
@@ -237,7 +238,7 @@ pub fn all_that_has_come_is_dropped<S: Side>(boot: impl Fn() -> S + Sync) {
     }
 }
 
-/// Waiting lines are in nobody's way: however many and however long they are.
+/// Waiting lines do not hold up control, however many and however long they are.
 pub fn data_does_not_hold_up_control<S: Side>(boot: impl Fn() -> S + Sync) {
     let long = |n: usize| format!("g91g1x.1f10({})\n", "x".repeat(n - 14));
     let crowds =
@@ -267,7 +268,7 @@ pub fn data_does_not_hold_up_control<S: Side>(boot: impl Fn() -> S + Sync) {
     }
 }
 
-/// A port whose sender holds the machine back keeps the other from nothing.
+/// A port whose sender holds the machine back does not hold up the other port.
 pub fn a_stopped_port_does_not_stop_the_other<S: Side>(boot: impl Fn() -> S + Sync) {
     for (stopped, by_pin) in [(AUX, false), (AUX, true), (USB, false)] {
         alone(&boot, |mut crowd| {
@@ -300,7 +301,7 @@ pub fn a_stopped_port_does_not_stop_the_other<S: Side>(boot: impl Fn() -> S + Sy
     }
 }
 
-/// The room of a line that has overtaken is free again: whoever counts may ask as often as he likes.
+/// The room of a line that has overtaken is free again, so a sender that counts may ask any number of times.
 pub fn questions_leave_nothing_behind<S: Side>(boot: impl Fn() -> S + Sync) {
     for (port, waiting, ends) in [(USB, 48, "\n"), (USB, 48, "\r"), (AUX, 18, "\n")] {
         alone(&boot, |mut crowd| {
@@ -317,8 +318,9 @@ pub fn questions_leave_nothing_behind<S: Side>(boot: impl Fn() -> S + Sync) {
     }
 }
 
-/// Everything at once: the planner full or waiting for a tilde, pool and ring of the port that feeds it full, one of the ports held
-/// back with answers pending. Questions, holds, kills and alarms get through on the other, whichever that is.
+/// Everything at once: the planner is full or waits for a tilde, the pool and the ring of the port that feeds it are
+/// full, and one of the ports is held back with answers pending. Questions, holds, kills and alarms must get through
+/// on the other port, whichever that is.
 pub fn nothing_starves_control<S: Side>(boot: impl Fn() -> S + Sync) {
     for (feeder, waiting) in [(USB, 24), (AUX, 8)] {
         for (waits, speaker) in [(false, USB), (false, AUX), (true, USB), (true, AUX)] {
@@ -360,7 +362,8 @@ pub fn nothing_starves_control<S: Side>(boot: impl Fn() -> S + Sync) {
     }
 }
 
-/// Programs end with a percent sign. One that waits in the ring when a hold begins drops nothing; one that comes in the hold does.
+/// Programs end with a percent sign. A percent sign that waits in the ring when a hold begins drops nothing; one that
+/// comes during the hold does.
 pub fn a_percent_sign_before_a_hold_is_none<S: Side>(boot: impl Fn() -> S + Sync) {
     for (flush, steps) in [("", 12 * 128), ("%", 0)] {
         alone(&boot, |mut crowd| {

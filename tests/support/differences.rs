@@ -1,19 +1,19 @@
-//! Where Kerf makes something else of a program in `tests/nist` on purpose: what, and why.
+//! Programs of `tests/nist` that Kerf treats differently on purpose: what differs, and why.
 
-/// What is to be replaced, and by what; it must be there once.
+/// A text to be replaced, and its replacement. The text must occur exactly once.
 type Edit = [&'static str; 2];
 
-/// A program that Kerf takes otherwise.
+/// A program that Kerf treats differently.
 pub struct Difference {
     pub name: &'static str,
     pub why: &'static str,
-    /// The program, as Kerf takes it.
+    /// Edits that turn the program into one that Kerf accepts.
     pub program: &'static [Edit],
-    /// The motion that Kerf makes of it.
+    /// Edits that turn the expected motion into the motion that Kerf makes.
     pub motion: &'static [Edit],
 }
 
-/// All of them.
+/// All differences.
 pub const DIFFERENCES: &[Difference] = &[
     Difference {
         name: "cycle_73",
@@ -108,13 +108,13 @@ const SLANT: &str = "RS274/NGC: up to R at the old place, if it is below; across
                      `own_cycle_rise`)";
 
 impl Difference {
-    /// That of a program.
+    /// Returns the difference of a program; `None` if it has none.
     pub fn of(name: &str) -> Option<&'static Self> {
         DIFFERENCES.iter().find(|difference| difference.name == name)
     }
 }
 
-/// A text with its edits.
+/// Returns a text with its edits.
 pub fn edited(mut text: String, edits: &[Edit], why: &str) -> String {
     for [old, new] in edits {
         assert_eq!(text.matches(old).count(), 1, "{old:?} to {new:?}: {why}");

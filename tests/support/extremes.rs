@@ -1,4 +1,4 @@
-//! Every setting at the limits of its range, and what the motors are to do then.
+//! Every setting at the limits of its range, and what the motors must do then.
 
 use kerf::boards::MOTORS;
 use kerf::config::table::{CLAMP, JERK, Kind, MODE};
@@ -6,28 +6,28 @@ use kerf::config::{Owner, Setting};
 
 use crate::side::Side;
 
-/// Most steps of a move here, and longest that one may take, ms.
+/// Most steps of a move here, and the longest time of a move, ms.
 const STEPS: f64 = 100_000.0;
 const PATIENCE_MS: u64 = 20_000;
-/// Longest that an answer may take, ms: a killed move may come to rest slowly.
+/// Longest time of an answer, ms: a killed move may come to rest slowly.
 const ANSWER_MS: u64 = 60_000;
-/// Steps in a unit beyond which no move is accepted.
+/// Steps per unit above which no move is accepted.
 const FINEST: f64 = 163_840_000.0;
-/// The farthest place.
+/// The largest coordinate.
 const FARTHEST: f64 = 214_748.0;
-/// Ways of the moves, mm or degrees.
+/// Distances of the moves, mm or degrees.
 const WAYS: [f64; 4] = [0.0002, 0.013, 1.0, -0.7132];
 const AXES: [&str; 6] = ["x", "y", "z", "a", "b", "c"];
 
-/// A setting and a value of it.
+/// A setting and a value for it.
 #[derive(Clone, Copy, Debug)]
 pub struct Case {
     pub setting: Setting,
-    /// Scaled as kept; it may be beyond the range by one.
+    /// The value, scaled as it is stored. It may be one beyond the range.
     pub value: i64,
 }
 
-/// All settings that have a range, with its ends and what is beyond them.
+/// Returns all settings that have a range, each with the ends of the range and the values beyond the ends.
 pub fn cases() -> Vec<Case> {
     let mut cases = Vec::new();
     for setting in (0..Setting::NUMBERS).filter_map(Setting::from_number) {
@@ -41,27 +41,28 @@ pub fn cases() -> Vec<Case> {
     cases
 }
 
-/// What a motor makes of a way.
+/// How a motor turns a distance into steps.
 #[derive(Clone, Copy, Debug, Default)]
 struct Motor {
     axis: i64,
     angle: f64,
     travel: f64,
     micro: f64,
-    /// The host counts steps as they are meant, the chip's pins have them the other way round.
+    /// Whether the direction is unknown: the host counts steps as they are meant, but the chip's pins have them the
+    /// other way round.
     turned: bool,
 }
 
-/// What the machine does with the motors, as far as settings say it.
+/// The effect of the settings on the motors.
 #[derive(Clone, Debug)]
 struct Motion {
     motors: [Motor; MOTORS],
-    /// Of each axis: mode, and radius.
+    /// For each axis: its mode and its radius.
     axes: [(i64, f64); AXES.len()],
 }
 
 impl Motion {
-    /// A machine's.
+    /// The settings of a machine.
     fn of(machine: u8) -> Self {
         let mut motion = Self { motors: Default::default(), axes: [(0, 0.0); AXES.len()] };
         for setting in (0..Setting::NUMBERS).filter_map(Setting::from_number) {
@@ -101,13 +102,13 @@ impl Motion {
         }
     }
 
-    /// Steps in a unit of a motor.
+    /// Returns the steps of a motor in a unit.
     fn ratio(&self, motor: usize) -> f64 {
         let Motor { angle, travel, micro, .. } = self.motors[motor];
         360.0 / angle * micro / travel
     }
 
-    /// How far an axis goes, if its word is `way`.
+    /// Returns how far an axis moves if its word is `way`.
     fn way(&self, axis: usize, way: f64) -> f64 {
         let (mode, radius) = self.axes[axis];
         match mode {
@@ -117,13 +118,14 @@ impl Motion {
         }
     }
 
-    /// The steps that a motor makes then.
+    /// Returns the steps that a motor makes if the word of an axis is `way`.
     fn steps(&self, motor: usize, axis: usize, way: f64) -> f64 {
         let way = self.way(axis, way);
         if self.motors[motor].axis == axis as i64 { self.ratio(motor) * way } else { 0.0 }
     }
 
-    /// Whether no move can be accepted: a motor counts though it moves no axis.
+    /// Whether every move is refused, because some motor has too many steps in a unit. A motor counts even if it
+    /// moves no axis.
     fn is_too_fine(&self) -> bool {
         (0..MOTORS).any(|motor| self.ratio(motor) > FINEST)
     }
@@ -134,7 +136,7 @@ pub struct Bench<S> {
     side: S,
     motion: Motion,
     heard: String,
-    /// A move has been killed: the machine stands between two places of 0.0001.
+    /// Whether a move has been killed, so that the machine may stand between two multiples of 0.0001.
     between: bool,
 }
 
@@ -155,7 +157,7 @@ impl<S: Side> Bench<S> {
         self.heard += &String::from_utf8_lossy(&heard).replace(['\x11', '\x13'], "");
     }
 
-    /// The answer to a line, and its status.
+    /// Sends a line. Returns its status and its answer.
     fn ask(&mut self, line: &str) -> Outcome<(u16, String)> {
         self.heard.clear();
         self.side.send(format!("{line}\n").as_bytes());
@@ -174,7 +176,7 @@ impl<S: Side> Bench<S> {
         Err(format!("{line} is not answered: {:?}", self.heard))
     }
 
-    /// Sets a setting to a value. Whether that was accepted.
+    /// Sets a setting to a value. Returns whether the machine accepted the value; an error if that is wrong.
     pub fn set(&mut self, case: &Case) -> Outcome<bool> {
         let Case { setting, value } = *case;
         let row = setting.row();
@@ -193,7 +195,8 @@ impl<S: Side> Bench<S> {
             answered => answered?,
         };
         let within = (i64::from(row.min)..=i64::from(row.max)).contains(&value);
-        // A linear axis has no radius; a rate may be none that the line can have; a jerk is divided.
+        // These may refuse values within the range: the radius mode on a linear axis, and a rate that the line cannot
+        // have. A jerk is divided.
         let may_be_refused = row.is(MODE) || setting.is_baud();
         match (within, status) {
             (true, 0) => self.motion.set(setting, value),
@@ -211,7 +214,7 @@ impl<S: Side> Bench<S> {
         Ok(true)
     }
 
-    /// Moves an axis to and fro, and holds the steps made against the ways.
+    /// Moves an axis to and fro, and compares the steps with the distances.
     pub fn move_axis(&mut self, axis: usize) -> Outcome<()> {
         for way in WAYS {
             for code in ["g0", "g1 f1000"] {
@@ -257,7 +260,8 @@ impl<S: Side> Bench<S> {
         Ok(())
     }
 
-    /// Steps of the least way, where words are not degrees, or the last move ended elsewhere.
+    /// Returns the steps in 0.0001 of a unit if the words of the axis are not degrees or the last move was killed;
+    /// else 0.
     fn rounding(&self, motor: usize, axis: usize, between: bool) -> f64 {
         let turns = between
             || self.motion.axes[axis].0 == 3 && self.motion.motors[motor].axis == axis as i64;
@@ -268,7 +272,7 @@ impl<S: Side> Bench<S> {
         self.motion.ratio(motor).abs()
     }
 
-    /// Whether the machine is at rest in time; what takes longer is dropped.
+    /// Whether the machine comes to rest in time. A move that takes longer is dropped.
     fn comes_to_rest(&mut self) -> Outcome<bool> {
         let mut waited = 0;
         while waited < PATIENCE_MS {
@@ -285,7 +289,7 @@ impl<S: Side> Bench<S> {
     }
 }
 
-/// Sets a setting on a machine that has just booted, and moves what it is about.
+/// Sets a setting on a machine that has just booted, and makes the moves that the setting is about.
 pub fn play<S: Side>(side: S, cases: &[Case]) -> Outcome<()> {
     let mut bench = Bench::new(side)?;
     let mut axes = vec![0];

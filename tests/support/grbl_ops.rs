@@ -1,26 +1,27 @@
-//! What a sender of grbl's may do, and what may come in between: random, of a size that the side can bear.
+//! What a sender in grbl's dialect may do, and what may come in between: random, of a size that the machine under
+//! test can bear.
 
 use proptest::prelude::*;
 use proptest::sample::select;
 
-/// One thing that is done.
+/// One action of a conversation.
 #[derive(Clone, Debug)]
 pub enum Op {
-    /// A line, with bytes that act put in before these of its bytes.
+    /// A line. Real-time bytes are inserted before the bytes at these places.
     Line(String, Vec<(usize, u8)>),
-    /// Such bytes between lines.
+    /// Real-time bytes between lines.
     Bytes(Vec<u8>),
     /// A line in TinyG's dialect on the second port.
     Aside(&'static str),
     /// Time passes, ms.
     Wait(u64),
-    /// The sender waits until the machine is at rest, and looks where it is.
+    /// The sender waits until the machine is at rest, and checks its position.
     Rest,
-    /// `^x`, behind a line that has not come to its end.
+    /// `^x`, after a line without its end.
     Reset,
 }
 
-/// A conversation of so many ops at most, with waits of so many ms.
+/// A conversation of at most `ops` actions, with waits of at most `wait` ms.
 pub fn conversation(ops: usize, wait: u64) -> impl Strategy<Value = Vec<Op>> {
     prop::collection::vec(op(wait), 1..=ops)
 }
@@ -36,7 +37,7 @@ fn op(wait: u64) -> impl Strategy<Value = Op> {
     ]
 }
 
-/// Where bytes stand within a line.
+/// Real-time bytes at places within a line.
 fn within() -> impl Strategy<Value = Vec<(usize, u8)>> {
     prop_oneof![
         3 => Just(Vec::new()),
@@ -44,7 +45,7 @@ fn within() -> impl Strategy<Value = Vec<(usize, u8)>> {
     ]
 }
 
-/// Bytes that act, and some above 0x7F that do nothing.
+/// Real-time bytes, and some bytes above 0x7F that do nothing.
 const ACTS: &[u8] = &[
     b'?', b'?', b'?', b'?', b'!', b'~', b'~', 0x84, 0x85, 0x90, 0x91, 0x92, 0x93, 0x94, 0x95, 0x96,
     0x97, 0x99, 0x9A, 0x9B, 0x9C, 0x9D, 0x9E, 0xA0, 0xA1, 0x80, 0xC2, 0xFF,
@@ -54,7 +55,7 @@ const ACTS: &[u8] = &[
 const ASIDE: &[&str] =
     &["{stat:n}", "{posx:n,vel:n}", "{xvm:n}", "g91 g0 y0.2", "{\"sr\":null}", "{sys:n}"];
 
-/// Lines that may come at any time, with what is refused.
+/// Lines that may come at any time, including lines that are refused.
 const ANY: &[&str] = &[
     "",
     "  ",
@@ -144,7 +145,7 @@ const ANY: &[&str] = &[
 fn line() -> impl Strategy<Value = String> {
     let way = || (-1500..1500_i32).prop_map(|n| f64::from(n) * 1e-3);
     prop_oneof![
-        // Of these the way is counted.
+        // The distance of these moves is counted.
         10 => way().prop_map(|x| format!("G21G94G91G1F3000X{x}")),
         4 => (way(), way()).prop_map(|(x, y)| format!("G90 G0 X{x} Y{y} (go)")),
         2 => way().prop_map(|x| format!("N7 G91 G3 F3000 X{x} R2")),

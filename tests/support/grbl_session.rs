@@ -1,27 +1,30 @@
-//! A random conversation in grbl's dialect as it is had and judged, on the host or on the simulated chip: the first port
-//! speaks grbl's, the second TinyG's.
+//! Plays and judges a random conversation in grbl's dialect, on the host or on the simulated chip. The first port
+//! speaks grbl's dialect, the second TinyG's.
 //!
-//! What has to hold: the lines that are answered are answered once each, in their order, by `ok` or `error:N`; whatever else is heard
-//! keeps to grbl's grammar; each `?` is answered by a whole report `report_ms` later at most, also in a hold, an alarm, in sleep and in a
-//! list; bytes that act are no part of a line; a sender that counts characters for a buffer of [`BUFFER`] bytes
-//! loses nothing; `Bf` is true; at rest `MPos` is what the steps say, and X is where the moves that were taken lead.
+//! What must hold:
+//!
+//! - Each line is answered once, in order, by `ok` or `error:N`. All other output keeps to grbl's grammar.
+//! - Each `?` is answered by a whole report within `report_ms`, also in a hold, an alarm, in sleep and in a list.
+//! - Real-time bytes are no part of a line.
+//! - A sender that counts characters for a buffer of [`BUFFER`] bytes loses nothing, and `Bf` is true.
+//! - At rest `MPos` agrees with the steps, and X is where the accepted moves lead.
 
 use std::collections::VecDeque;
 
 use crate::grbl_ops::Op;
 use crate::side::Side;
 
-/// What a sender that counts characters takes for the size of the buffer.
+/// The size of the buffer that a sender which counts characters assumes.
 const BUFFER: usize = 128;
-/// How soon reports come, but for one in a hundred, ms.
+/// Time within which all reports but one in a hundred must come, ms.
 const PROMPT_MS: u64 = 20;
-/// The size that is told.
+/// The size of the buffer that the machine reports.
 const TOLD: usize = 254;
 /// Bytes that may be on their way to the sender.
 const RING: usize = 128;
-/// Blocks of an empty queue.
+/// Free blocks of an empty queue.
 const BLOCKS: usize = 61;
-/// Longest until the machine is at rest, ms.
+/// Longest time until the machine is at rest, ms.
 const REST_MS: u64 = 60_000;
 const STEPS: f64 = 1280.0;
 
@@ -35,49 +38,50 @@ struct Report {
     buffer: Option<(usize, usize)>,
 }
 
-/// A line whose answer has not come.
+/// A line that has not been answered.
 #[derive(Debug)]
 struct Sent {
     bytes: usize,
-    /// The way of X that it adds if it is taken; `None` if it may lead anywhere.
+    /// The distance that the line moves X if it is accepted; `None` if that is unknown.
     way: Option<f64>,
 }
 
-/// A sender's side of a conversation, and what is known of the machine.
+/// A sender's side of a conversation, and the known state of the machine.
 pub struct Session<S> {
     side: S,
-    /// Longest until a report has come, ms: 10 of these on the wire. What its port has been told before takes its time besides.
+    /// Longest time until a report has come, ms. A report takes about 10 ms on the wire. The time of bytes that were
+    /// queued for the port before the report does not count.
     report_ms: u64,
-    /// The longest so far, how many there were, and how many have taken more than [`PROMPT_MS`].
+    /// The longest time of a report so far, the number of reports, and the number that took more than [`PROMPT_MS`].
     longest_ms: u64,
     reports: usize,
     late: usize,
     ms: u64,
     partial: String,
     in_flight: VecDeque<Sent>,
-    /// When the oldest `?` was sent that is not answered.
+    /// The time at which the oldest unanswered `?` was sent.
     asked: Option<u64>,
-    /// Bytes that have come since, of what was on its way.
+    /// Bytes other than reports that have come since that `?`.
     before: usize,
-    /// A reset has been sent, and the greeting has not come.
+    /// Whether a reset has been sent and the greeting has not come.
     resets: bool,
-    /// The end of check mode has been told, which a greeting follows.
+    /// Whether the machine has reported the end of check mode, which a greeting follows.
     greets: bool,
     report: Report,
-    /// Tildes since the buffer was empty.
+    /// Tildes sent since the buffer was last empty.
     tildes: usize,
-    /// Where X is by what has been taken, mm; `None` if nobody can tell.
+    /// The position of X by the lines that were accepted, mm; `None` if it is unknown.
     x: Option<f64>,
-    /// Where it began, steps.
+    /// The positions at the beginning, steps.
     base: [i64; 4],
-    /// Lines on the second port whose answers have not come, and what has come there of the next.
+    /// Number of unanswered lines on the second port, and the part of the next answer that has come.
     aside: usize,
     heard_aside: String,
     log: Vec<String>,
 }
 
 impl<S: Side> Session<S> {
-    /// With a machine that is about to boot.
+    /// A session with a machine that is about to boot.
     pub fn new(side: S, report_ms: u64) -> Self {
         let base = side.steps();
         Session {
@@ -103,7 +107,7 @@ impl<S: Side> Session<S> {
         }
     }
 
-    /// Boots a machine that has never been used, and makes it fast.
+    /// Boots a machine with empty EEPROM, and makes it fast.
     pub fn begin(&mut self) -> Outcome<()> {
         self.side.run_ms(1_500);
         for setting in [
@@ -122,7 +126,7 @@ impl<S: Side> Session<S> {
         self.rest()
     }
 
-    /// Has the conversation, to a rest.
+    /// Plays the conversation, up to a rest.
     pub fn play(&mut self, ops: &[Op]) -> Outcome<()> {
         for op in ops {
             self.log.push(format!("{op:?}"));
@@ -143,12 +147,12 @@ impl<S: Side> Session<S> {
         Ok(())
     }
 
-    /// All that was done and heard.
+    /// Returns all that was done and heard.
     pub fn story(&self) -> String {
         self.log.iter().map(|line| format!("  {line}\n")).collect()
     }
 
-    /// Nearly all reports have come promptly.
+    /// Checks that nearly all reports have come promptly.
     #[allow(dead_code)]
     pub fn check_prompt(&self) {
         let Self { longest_ms, reports, late, .. } = self;
@@ -156,7 +160,8 @@ impl<S: Side> Session<S> {
         assert!(late * 100 <= *reports, "{late} of {reports} reports are late");
     }
 
-    /// A job fills the buffer, is held for a minute and asked eight times a second, as senders do, and goes on.
+    /// Plays a job that fills the buffer, is held for a minute while the sender asks eight times a second, as senders
+    /// do, and then goes on.
     #[allow(dead_code)]
     pub fn hold_long(&mut self) -> Outcome<()> {
         for line in ["G21G94G91G1F3000X0", "X5"] {
@@ -164,7 +169,7 @@ impl<S: Side> Session<S> {
         }
         self.run(50)?;
         self.side.send(b"!");
-        // The queue of blocks fills, and then the buffer.
+        // The queue of blocks fills first, and then the buffer.
         while self.in_flight.len() < BUFFER / 5 {
             self.line("X-.1", &[])?;
             self.run(10)?;
@@ -186,18 +191,18 @@ impl<S: Side> Session<S> {
             (self.asked, self.before) = (Some(self.ms), 0);
         }
         if matches!(byte, 0x84 | 0x85 | b'!') {
-            // A jog may end by it.
+            // The byte may end a jog.
             self.doubt();
         }
     }
 
-    /// Nobody can tell any more where the moves lead that have been taken.
+    /// Gives up the position of X: from now on it is unknown where the accepted moves lead.
     fn doubt(&mut self) {
         self.x = None;
         self.in_flight.iter_mut().for_each(|sent| sent.way = None);
     }
 
-    /// Sends a line when the buffer has room for it, and bytes that act within it.
+    /// Sends a line as soon as the buffer has room for it, with real-time bytes within it.
     fn line(&mut self, line: &str, within: &[(usize, u8)]) -> Outcome<()> {
         let bytes = line.len() + 1;
         let mut waited = 0;
@@ -225,7 +230,8 @@ impl<S: Side> Session<S> {
         }
     }
 
-    /// Waits until all lines are answered, and for the greeting if check mode ends by that: what comes before that is dropped.
+    /// Waits until all lines are answered. If the line ends check mode, also waits for the greeting, because lines
+    /// that come before the greeting are dropped.
     fn settle(&mut self) -> Outcome<()> {
         let end = self.ms + REST_MS;
         while self.greets || !self.in_flight.is_empty() {
@@ -252,7 +258,7 @@ impl<S: Side> Session<S> {
         Ok(())
     }
 
-    /// Lets time pass, and takes what comes.
+    /// Lets time pass, and handles what comes.
     fn run(&mut self, ms: u64) -> Outcome<()> {
         self.hear()?;
         for _ in 0..ms {
@@ -266,7 +272,8 @@ impl<S: Side> Session<S> {
         Ok(())
     }
 
-    /// How long a `?` has waited, beside what was on its way before it, ms.
+    /// Returns how long the oldest `?` has waited, ms, without the time of the bytes that were on their way before
+    /// its answer.
     fn waits(&self) -> Option<u64> {
         let before = self.before.min(RING) as u64 * 10 / 115;
         self.asked.filter(|_| !self.resets).map(|at| (self.ms - at).saturating_sub(before))
@@ -343,11 +350,12 @@ impl<S: Side> Session<S> {
         Ok(())
     }
 
-    /// What has not been answered takes as much of the buffer as it can at most.
+    /// Checks that the unanswered lines account for the buffer that is in use.
     fn check_buffer(&self, line: &str) -> Outcome<()> {
         let Some((blocks, free)) = self.report.buffer else { return Ok(()) };
         let waits: usize = self.in_flight.iter().map(|sent| sent.bytes).sum();
-        // A line that was dropped by a reset has not come to its end, and a tilde has its place among the lines.
+        // 12 bytes are allowed for a line without its end that a reset has dropped. A tilde takes a place among the
+        // lines.
         match blocks <= BLOCKS && free <= TOLD && free + waits + 12 + self.tildes >= TOLD {
             true => Ok(()),
             false => Err(format!("{line} while {waits} bytes wait")),
@@ -369,7 +377,7 @@ impl<S: Side> Session<S> {
         Ok(())
     }
 
-    /// Lets go of all that keeps the machine from moving.
+    /// Releases whatever keeps the machine from moving.
     fn relieve(&mut self) -> Outcome<()> {
         if self.in_flight.is_empty() {
             self.tildes = 0;
@@ -391,7 +399,8 @@ impl<S: Side> Session<S> {
         Ok(())
     }
 
-    /// Waits until the machine is at rest, and looks whether it is where it says, and where it has been told to go.
+    /// Waits until the machine is at rest. Then compares its position with what it reports, and with where the
+    /// accepted moves lead.
     fn rest(&mut self) -> Outcome<()> {
         let end = self.ms + REST_MS;
         loop {
@@ -434,7 +443,7 @@ const BRACKETS: &[&str] = &[
     "G28", "G30", "G92", "echo",
 ];
 
-/// Whether a line moves nothing, whatever comes of it, and changes no mode that a counted move goes by.
+/// Whether a line moves nothing, whatever its answer is, and changes no mode that affects a counted move.
 fn is_still(line: &str) -> bool {
     let stills = [
         "",
@@ -466,7 +475,7 @@ fn number(text: &str, range: std::ops::RangeInclusive<u32>) -> Outcome<()> {
     }
 }
 
-/// Reads a status report, if it keeps to the grammar.
+/// Parses a status report; `None` if it breaks the grammar.
 fn report(line: &str) -> Option<Report> {
     let mut fields = line.strip_prefix('<')?.strip_suffix('>')?.split('|');
     let state = fields.next()?.to_string();
@@ -485,7 +494,7 @@ fn report(line: &str) -> Option<Report> {
         let (name, value) = field.split_once(':')?;
         let at =
             ["Bf", "Ln", "FS", "Pn", "WCO", "Ov", "A"].iter().position(|known| *known == name)? + 1;
-        // Each once; the order is grbl's but for `Pn`, which no sender goes by.
+        // Each field comes once. The order is grbl's, except for `Pn`, whose place no sender relies on.
         (at > order || name == "Pn" || order == 4).then_some(())?;
         order = at;
         match name {
@@ -505,7 +514,7 @@ fn report(line: &str) -> Option<Report> {
     Some(report)
 }
 
-/// Numbers parted by commas, each with so many decimals.
+/// Parses numbers separated by commas, each with `decimals` decimals.
 fn numbers(text: &str, decimals: usize) -> Option<Vec<f64>> {
     let number = |text: &str| {
         let places = text.split_once('.').map_or(0, |(_, places)| places.len());

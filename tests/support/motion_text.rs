@@ -7,7 +7,7 @@ use kerf::gcode::Interpreter;
 use kerf::gcode::modal::{Coolant, Turn};
 use kerf::units::{AXES, Length, PerAxis};
 
-/// The motion so far, and where it has led to.
+/// The motion so far, and the position that it has led to.
 #[derive(Default)]
 pub struct MotionText {
     pub text: String,
@@ -17,7 +17,7 @@ pub struct MotionText {
 }
 
 impl MotionText {
-    /// Adds what a command does.
+    /// Adds the effect of a command.
     pub fn take(&mut self, command: &Canon) {
         match command {
             Canon::Traverse(to) => self.line("TRAVERSE", to),
@@ -45,7 +45,7 @@ impl MotionText {
         }
     }
 
-    /// The interpreter's state is what the motion has led to.
+    /// Checks that the interpreter's state agrees with the motion.
     pub fn check(&self, interpreter: &Interpreter) {
         assert_eq!(interpreter.position(), &self.place);
         let modal = interpreter.modal();
@@ -71,7 +71,7 @@ impl MotionText {
         self.turn = turn;
     }
 
-    /// Off is told when neither is left on.
+    /// Writes that coolant is off when neither kind is left on.
     fn switch(&mut self, which: Coolant, on: bool, name: &str) {
         let bit = which as u8;
         self.coolant = if on { self.coolant | bit } else { self.coolant & !bit };
@@ -87,7 +87,7 @@ impl MotionText {
     }
 }
 
-/// Each after a blank.
+/// Writes lengths, each after a blank.
 fn places(places: &[Length]) -> String {
     assert!(places.len() <= AXES);
     places.iter().map(|at| format!(" {at}")).collect()

@@ -1,11 +1,12 @@
-//! How senders that cannot run here open a conversation: what each says, byte for byte, and what it takes for an answer, by its own
-//! regular expressions and timeouts.
+//! How senders that cannot run here open a conversation: the bytes that each sends, and the answers that it accepts,
+//! by its own regular expressions and timeouts.
 //!
-//! Each is had on a port where nothing is decided and on one that is set to grbl's dialect, while the other port is quiet and while it is told reports
-//! in TinyG's. A [`Step`] is over when its expressions have been matched by lines in their order. Any other line has to match one of those that
-//! every sender of grbl's knows ([`KNOWN`]); the JSON of an undecided port may come until an answer shows that it is decided.
+//! Each opening is played on a port without a settled dialect and on one that is set to grbl's dialect, while the
+//! other port is quiet and while it receives reports in TinyG's. A [`Step`] is over when lines have matched its
+//! expressions in their order. Any other line must match an expression that every sender for grbl knows ([`KNOWN`]).
+//! On a port without a settled dialect JSON may come until an answer shows that the dialect is settled.
 //!
-//! Bytes and expressions are facts of the senders' sources: the names of their own are told at each.
+//! Bytes and expressions are facts from the senders' sources. Names in those sources are given with each sender.
 
 use std::thread;
 
@@ -13,20 +14,20 @@ use regex::Regex;
 
 use crate::side::Side;
 
-/// What is sent at once, what is to be heard, and within how many ms.
+/// What is sent at once, what must be heard, and within how many ms.
 struct Step {
     says: &'static [u8],
     hears: &'static [&'static str],
     within: u64,
 }
 
-/// A sender, and its steps.
+/// A sender and its steps.
 struct Sender {
     name: &'static str,
     steps: &'static [Step],
 }
 
-/// A step.
+/// Makes a step.
 const fn step(says: &'static [u8], hears: &'static [&'static str], within: u64) -> Step {
     Step { says, hears, within }
 }
@@ -34,7 +35,7 @@ const fn step(says: &'static [u8], hears: &'static [&'static str], within: u64) 
 const OK: &str = "^ok$";
 const GREETING: &str = r"^Grbl 1\.1[a-z]? \['\$' for help\]$";
 
-/// Lines that any of them passes over or shows.
+/// Lines that every sender ignores or shows.
 const KNOWN: [&str; 6] = [
     OK,
     GREETING,
@@ -44,14 +45,14 @@ const KNOWN: [&str; 6] = [
     r"^\$\d+=-?[\d.]+$",
 ];
 
-/// State, position in machine coordinates second, more fields behind it.
+/// A status report: the state, then the position in machine coordinates, then more fields.
 const REPORT: &str = r"^<(Idle|Run|Hold:[01]|Jog|Alarm|Door:[0-3]|Check|Home|Sleep)\|MPos:-?\d+\.\d{3},-?\d+\.\d{3},-?\d+\.\d{3}(,-?\d+\.\d{3})*\|";
 const VERSION: &str = r"^\[VER:[v]?([0-9]*)\.([0-9]*)(\w?).*:.*\]$";
-/// Letters, blocks, bytes: at least 128 of these.
+/// The options: letters, blocks, and bytes, which must be at least 128.
 const OPTIONS: &str = r"^\[OPT:[A-Z0-9+*$#]*,\d+,(1[2-9]\d|[2-9]\d\d)\]$";
 const MODES: &str = r"^\[(?:GC:)?((?:[a-zA-Z][0-9]+(?:\.[0-9]*)?\s*)+)\]$";
 const ERROR: &str = r"^error:\d+$";
-/// Settings that each of them looks for.
+/// Settings that every sender looks for.
 const SETTINGS: [&str; 8] = [
     r"^\$10=[0-3]$",
     r"^\$13=[01]$",
@@ -64,8 +65,9 @@ const SETTINGS: [&str; 8] = [
 ];
 
 const SENDERS: [Sender; 8] = [
-    // GrblControllerInitializer: a question until there is a status, an empty line, version and options, settings, modes; then `?` 5 times a
-    // second. `isOkResponse` is `ok` alone. It gives up 12 s after the port was opened, and 4 s after each line.
+    // GrblControllerInitializer: a question until there is a status, an empty line, version and options, settings,
+    // modes; then `?` 5 times a second. `isOkResponse` accepts `ok` alone. It gives up 12 s after the port was
+    // opened, and 4 s after each line.
     Sender {
         name: "Universal G-Code Sender",
         steps: &[
@@ -76,7 +78,7 @@ const SENDERS: [Sender; 8] = [
             step(b"$G\n", &[MODES, OK], 4_000),
             step(b"?", &[REPORT], 200),
             step(b"?", &[REPORT], 200),
-            // Its jog, the restoring of modes, and its way to zero an axis.
+            // Its jog, the restoring of modes, and the way it zeroes an axis.
             step(b"$J=G21G91X1F600\n", &[OK], 1_000),
             step(b"?", &[r"^<(Run|Jog)\|"], 200),
             step(b"\x85", &[], 500),
@@ -84,7 +86,8 @@ const SENDERS: [Sender; 8] = [
             step(b"?", &[r"^<Idle\|"], 200),
         ],
     },
-    // The one before the initializer: a reset, and nothing before the greeting, which has a version behind its first blank.
+    // The version before the initializer: a reset, and nothing before the greeting, whose version follows its first
+    // blank.
     Sender {
         name: "Universal G-Code Sender, older",
         steps: &[
@@ -93,8 +96,9 @@ const SENDERS: [Sender; 8] = [
             step(b"?", &[REPORT], 200),
         ],
     },
-    // frmMain: `grblReset` sends 18 and takes what begins so for the answer (`dataIsReset`); then what is shown, all at once, within 127
-    // characters; states have to be of its list; a question each 250 ms, of which the next waits for the report.
+    // frmMain: `grblReset` sends 18 and accepts any line with the right beginning as the answer (`dataIsReset`). Then
+    // come the lines that it shows, all at once, within 127 characters. States must be in its list. It asks every 250
+    // ms, and each question waits for the report before it.
     Sender {
         name: "Candle",
         steps: &[
@@ -103,15 +107,15 @@ const SENDERS: [Sender; 8] = [
             step(b"$$\n$#\n$G\n", &[SETTINGS[0], OK, r"^\[G54:", r"^\[G59:", r"^\[G28:", r"^\[G92:", r"^\[TLO:", r"^\[PRB:", OK, r"^\[GC:.*G5[4-9]", OK], 2_000),
             step(b"?", &[r"\|FS:([^,]*),([^,^|^>]*)"], 250),
             step(b"?", &[REPORT], 250),
-            // Its jog, its zero, and a probing that begins from its own program.
+            // Its jog, its zero, and a probing move that begins from its own program.
             step(b"$J=G21G91X1F300\n", &[OK], 1_000),
             step(b"\x85", &[], 500),
             step(b"G92X0Y0\n$#\n", &[OK, r"^\[G92:-?[\d.]+,-?[\d.]+,", OK], 2_000),
             step(b"G92.1\nG21G90\n", &[OK, OK], 1_000),
         ],
     },
-    // Of CNCjs's kind, whose GrblRunner it has: 18 half a second behind the opening, then all that it shows at once; `?` each 250 ms, and
-    // `$G` each 500.
+    // It uses the GrblRunner of CNCjs: 18 half a second after the opening, then all lines that it shows at once; `?`
+    // every 250 ms, and `$G` every 500 ms.
     Sender {
         name: "gSender",
         steps: &[
@@ -124,8 +128,9 @@ const SENDERS: [Sender; 8] = [
             step(b"G10 L20 P1 X0 Y0 Z0\n$#\n", &[OK, r"^\[G54:", OK], 2_000),
         ],
     },
-    // GrblCore: 18, up to the greeting, whose numbers and letter it reads; settings; then `?` each 200 ms. `ok` in small letters alone, an error by its
-    // beginning. Its programs begin with these lines, and are streamed within 127 characters.
+    // GrblCore: 18, up to the greeting, whose numbers and letter it reads; then settings, then `?` every 200 ms. It
+    // accepts `ok` in small letters only, and an error by its beginning. Its programs begin with these lines, and are
+    // streamed within 127 characters.
     Sender {
         name: "LaserGRBL",
         steps: &[
@@ -140,8 +145,9 @@ const SENDERS: [Sender; 8] = [
             step(b"G92.1\n", &[OK], 1_000),
         ],
     },
-    // Its back end: a line end, `$I` and 18 without an answer, then `$$`, `$I`, `$G` at once. The greeting begins a line, and its
-    // version is the four characters behind the blank. `?` each 250 ms; jogs have their words glued.
+    // Its back end: a line end, `$I` and 18 without an answer, then `$$`, `$I`, `$G` at once. The greeting begins a
+    // line, and its version is the four characters behind the blank. `?` every 250 ms; the words of jogs have no
+    // blanks between them.
     Sender {
         name: "OpenBuilds CONTROL",
         steps: &[
@@ -153,7 +159,8 @@ const SENDERS: [Sender; 8] = [
             step(b"G54\nG21 G90\nM3 S100\nM5\n", &[OK, OK, OK, OK], 2_000),
         ],
     },
-    // As its console shows: it waits for a greeting, asks for `$I` and `$$`, and takes the size of the buffer from `OPT`. A job begins so.
+    // As its console shows: it waits for a greeting, asks for `$I` and `$$`, and takes the size of the buffer from
+    // `OPT`. A job begins with these lines.
     Sender {
         name: "LightBurn",
         steps: &[
@@ -168,7 +175,8 @@ const SENDERS: [Sender; 8] = [
             step(b"\x85", &[], 1_000),
         ],
     },
-    // What is left for others: everything in one write, with errors in it, in CR LF, and lines that are nothing.
+    // Cases that other senders may bring: everything in one write, with errors in it, in CR LF, and with lines that
+    // are empty.
     Sender {
         name: "all at once",
         steps: &[
@@ -184,9 +192,9 @@ const SENDERS: [Sender; 8] = [
 struct Session<S> {
     side: S,
     heard: String,
-    /// The other port is told reports.
+    /// Whether the other port receives reports.
     aside: bool,
-    /// JSON may come still.
+    /// Whether JSON may still come.
     json: bool,
     known: Vec<Regex>,
 }
@@ -211,7 +219,7 @@ impl<S: Side> Session<S> {
                 self.heard = rest.to_string();
                 let line = line.strip_suffix('\r').unwrap_or(line);
                 if wanted.next_if(|one| one.is_match(line)).is_some() {
-                    // Neither decides.
+                    // `ok` and the greeting do not show that the dialect is settled.
                     self.json &= line == "ok" || line.starts_with("Grbl");
                 } else if !self.passes_over(line) {
                     return Err(format!("{said:?} is answered by {line:?}"));
@@ -237,7 +245,7 @@ impl<S: Side> Session<S> {
     }
 }
 
-/// Has all of them, each with machines that `boot` starts with this value of `dia`.
+/// Plays all senders, each with machines that `boot` starts with this value of `dia`.
 pub fn all<S: Side>(boot: impl Fn(u8) -> S + Sync) {
     let known = || KNOWN.iter().map(|text| Regex::new(text).expect("an expression")).collect();
     let mut failed = Vec::new();

@@ -1,34 +1,35 @@
-//! What a sender may do, and what may happen to the machine meanwhile: random, of a size that the side can bear.
+//! What a sender may do, and what may happen to the machine meanwhile: random, of a size that the machine under test
+//! can bear.
 
 use kerf::boards::inputs::{DOOR, PROBE, STOP, Y_MIN};
 use proptest::prelude::*;
 use proptest::sample::select;
 
-/// One thing that is done.
+/// One action of a conversation.
 #[derive(Clone, Debug)]
 pub enum Op {
     /// A line on a port.
     Line(usize, String),
     /// Bytes between lines on a port.
     Characters(usize, &'static [u8]),
-    /// Real-time characters in the midst of a line, on the first port.
+    /// Real-time characters within a line on the first port.
     Within(&'static str, &'static [u8], &'static str),
     /// The contact at an input closes, or opens.
     Input(usize, bool),
-    /// The second port's sender holds the machine back, or does so no more.
+    /// The second port's sender holds the machine back (true) or lets it go on.
     Hold(bool),
     /// Time passes, ms.
     Wait(u64),
-    /// The sender waits until the machine is at rest, and asks where it is.
+    /// The sender waits until the machine is at rest, and asks for its position.
     Rest,
-    /// `^x`, in the midst of a line.
+    /// `^x` within a line.
     Reset,
 }
 
-/// How long a conversation takes.
+/// The size of a conversation.
 #[derive(Clone, Copy, Debug)]
 pub struct Scale {
-    /// Most ops.
+    /// Most actions.
     pub ops: usize,
     /// Longest move of an axis, in 0.001 mm.
     pub way: i32,
@@ -61,7 +62,8 @@ fn op(scale: Scale) -> impl Strategy<Value = Op> {
     ]
 }
 
-/// Real-time characters, some with the end of a line. The last ones are overrides: 100 %, +10, -10; traverses 25 %.
+/// Real-time characters, some with the end of a line. The last ones are overrides: feed 100 %, +10, -10; traverse 25
+/// %.
 const CHARACTERS: &[&[u8]] = &[
     b"!",
     b"!",
@@ -87,7 +89,7 @@ const CHARACTERS: &[&[u8]] = &[
     b"\x85~",
 ];
 
-/// Lines in two halves.
+/// Lines in two halves, for real-time characters between the halves.
 const HALVES: &[(&str, &str)] = &[
     ("g91 g0 x", "0.5"),
     ("{pos", "x:n}"),
@@ -111,7 +113,7 @@ const ASIDE: &[&str] = &[
 
 /// Lines that may come at any time.
 const ANY_LINE: &[&str] = &[
-    // What stops, ends, or waits.
+    // Lines that stop, end, or wait.
     "m0",
     "m2",
     "{qf:1}",
@@ -144,11 +146,11 @@ const ANY_LINE: &[&str] = &[
     "{posx:n}",
     "{sr:n}",
     "{stat:n,vel:n}",
-    // What is refused.
+    // Lines that are refused.
     "g1 f3000 x",
     "{none:1}",
     "{jogx:300000}",
-    // Settings of what a switch is for, with a while in which they are stored.
+    // Settings of what a switch is for, with some time in which they are stored.
     "{xsn:3}",
     "{xsn:1}",
     "{ysn:3}",
@@ -159,7 +161,7 @@ const ANY_LINE: &[&str] = &[
     "{est:1}",
     "{est:0}",
     "{xjm:4000}",
-    // What positions are called.
+    // Coordinate systems and offsets.
     "g54",
     "g55",
     "g10 l20 p2 x0.5",
@@ -182,7 +184,7 @@ fn line(scale: Scale) -> impl Strategy<Value = String> {
         8 => (way(), way()).prop_map(|(x, y)| format!("g91 g1 f3000 x{x} y{y}")),
         4 => (way(), way(), way()).prop_map(|(x, y, z)| format!("g90 g0 x{x} y{y} z{z}")),
         1 => way().prop_map(|z| format!("g91 g1 f3000 z{z} a9")),
-        // More chords than there are blocks.
+        // More chords than the queue has blocks.
         2 => Just(format!("g91 g2 f3000 x0 i{radius} j0.3 p3")),
         1 => Just("g91 g81 f600 x0.5 y0.5 z-0.5 r0 l3".to_string()),
         1 => way().prop_map(|x| format!("{{\"gc\":\"g91 g1 f3000 x{x}\"}}")),

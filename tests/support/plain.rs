@@ -1,4 +1,4 @@
-//! Canonical commands as plain G-code: absolute, in millimetres, without offsets and cycles, every word on
+//! Writes canonical commands as plain G-code: absolute, in millimetres, without offsets and cycles, every word on
 //! every line.
 
 use kerf::canon::Canon;
@@ -6,7 +6,7 @@ use kerf::gcode::command::{Arc, Feed, Spindle};
 use kerf::gcode::modal::{MotionMode, Turn};
 use kerf::units::{AXES, AXIS_LETTERS, Length, PerAxis};
 
-/// What has been written, and what it leads to.
+/// The text so far, and the state that it leads to.
 struct Plain {
     text: String,
     place: PerAxis<Length>,
@@ -14,7 +14,7 @@ struct Plain {
     exact: bool,
 }
 
-/// The commands, a line for each that is not part of another's.
+/// Writes the commands, one line each. A command that is part of another command's line gets no line.
 pub fn plain(commands: &[Canon]) -> String {
     let mut plain =
         Plain { text: String::new(), place: [Length::ZERO; AXES], rate: None, exact: false };
@@ -40,19 +40,19 @@ impl Plain {
             Canon::Probe(to, mode) => {
                 let code = probing(*mode);
                 let words = self.go(to);
-                // Axes that turn do not probe.
+                // Rotary axes do not probe.
                 let linear = words.split(" A").next().unwrap();
                 format!("{}{} {code}{linear}", self.path(), self.feed())
             }
             Canon::Dwell(ms) => format!("G4 P{}.{:03}", ms / 1_000, ms % 1_000),
-            // The change of a tool does that.
+            // The tool change that follows does this.
             Canon::Spindle(_) if matches!(next, Some(Canon::Tool(_))) => return,
             Canon::Spindle(Spindle { turn, speed }) => match turn {
                 Turn::Off => "M5".into(),
                 Turn::Clockwise => format!("M3 S{speed}"),
                 Turn::Counterclockwise => format!("M4 S{speed}"),
             },
-            // M9 is for both.
+            // M9 switches both off.
             Canon::Flood(false) if matches!(before, Some(Canon::Mist(false))) => return,
             Canon::Mist(false) | Canon::Flood(false) => "M9".into(),
             Canon::Mist(true) => "M7".into(),

@@ -1,28 +1,29 @@
-//! Heaters that tests simulate: where the heat goes, and what the sensor sees of it.
+//! Heaters that tests simulate: where the heat goes, and what the sensor feels.
 
-/// A heater with its sensor: heat flows from the heater into the block, from the block to the air, and the sensor follows the block.
+/// A heater with its sensor. Heat flows from the heater into the block and from the block to the air, and the sensor
+/// follows the block.
 pub struct Plant {
-    /// Joules for a degree.
+    /// Heat capacity of the block, joules per degree.
     capacity: f64,
-    /// Of the heater.
+    /// Power of the heater.
     pub watts: f64,
-    /// Watts a degree to the air, and with the fan besides.
+    /// Loss to the air without the fan, watts per degree.
     loss: f64,
     fan: f64,
-    /// How far the heater is behind its current, and the sensor behind the block, seconds.
+    /// Time constants of the heater behind its current and of the sensor behind the block, seconds.
     delay: [f64; 2],
     heater: f64,
-    /// How hot the block is, degrees.
+    /// Temperature of the block, degrees.
     pub block: f64,
-    /// How hot the sensor is, degrees.
+    /// Temperature of the sensor, degrees.
     pub sensor: f64,
 }
 
-/// Degrees.
+/// Temperature of the air, degrees.
 pub const AIR: f64 = 22.0;
 
 impl Plant {
-    /// 40 W, 200 degrees in 90 s.
+    /// A hot end of 40 W that reaches 200 degrees in 90 s.
     pub fn hot_end() -> Self {
         let delay = [2.0, 1.5];
         Self {
@@ -37,7 +38,7 @@ impl Plant {
         }
     }
 
-    /// 120 W, 60 degrees in 4 minutes.
+    /// A bed of 120 W that reaches 60 degrees in 4 minutes.
     pub fn bed() -> Self {
         let delay = [5.0, 4.0];
         Self {
@@ -52,7 +53,7 @@ impl Plant {
         }
     }
 
-    /// Time passes with some part of the heater's power, or with it on or off, and of the fan's.
+    /// Lets time pass with a share of the heater's power and of the fan's; a `bool` is all or nothing.
     pub fn pass(&mut self, seconds: f64, power: impl Into<f64>, fan: impl Into<f64>) {
         let watts = self.watts * power.into();
         self.heater += (watts - self.heater) * seconds / self.delay[0];

@@ -1,23 +1,24 @@
-//! What is known of where the motors are: the position that the machine tells, less the steps that it has made.
+//! A model of where the motors are, kept as an offset: the position that the machine reports, minus the steps that it
+//! has made.
 //!
-//! That *offset* of an axis stays the same whatever moves. Only homing, a position that is set, and a reset change
-//! it; that of an axis which was homed at a switch that it works itself is known to the step.
+//! The *offset* of an axis stays constant whatever moves. Only homing, a position that is set, and a reset change it.
+//! If an axis was homed at a switch that the axis works itself, its offset is known to the step.
 
 use kerf::boards::inputs::{PROBE, X_MIN, Y_MIN, Z_MAX};
 
-/// Where switches are that the machine works itself: that of X at its lower end, of Z at the upper one. Y has one out
-/// of its reach, which is worked by hand. None opens when it is worked.
+/// The switches that the machine works itself: X has one at its lower end, Z at its upper end. Y has one out of its
+/// reach, which is worked by hand. None of them opens when it is worked.
 pub const SWITCHES: [(usize, i64, bool); 4] = [
     (X_MIN, -7_680, false),
     (Z_MAX, 7_680, false),
     (PROBE, -3_840, false),
     (Y_MIN, -1_000_000_000, false),
 ];
-/// The offset of an axis that has been homed. Its switch lets go a step off where it closes, 0.1 mm further on it is at
-/// the end of its travel, -6 mm and 6 mm.
+/// The offset of an axis after homing. The switch lets go one step away from where it closes, and 0.1 mm further on
+/// the axis is at the end of its travel, -6 mm or 6 mm.
 const HOMED: [Option<i64>; 4] =
     [Some(-7_680 - (-7_679 + 128)), None, Some(7_680 - (7_679 - 128)), None];
-/// How the machine is set up for that: fast, and with short ways.
+/// Settings of the machine for this model: it is fast, and distances are short.
 pub const SETTINGS: [&str; 6] = [
     "{x:{vm:3000,fr:3000,jm:2000,ac:0}}",
     "{y:{vm:3000,fr:3000,jm:2000,ac:0}}",
@@ -28,48 +29,49 @@ pub const SETTINGS: [&str; 6] = [
 ];
 
 const AXES: [&str; 4] = ["x", "y", "z", "a"];
-/// Steps in a unit of an axis: mm, or a degree.
+/// Steps in a unit of an axis, mm or degree.
 const STEPS: [f64; 4] = [1280.0, 1280.0, 1280.0, 1600.0 / 360.0];
-/// So many steps are so many units, without a rest.
+/// A number of steps that is a whole number of units, for each axis.
 const GRID: [(i64, f64); 4] = [(32, 0.025), (32, 0.025), (32, 0.025), (40, 9.0)];
-/// Where motors are put in the end.
+/// Position to which the motors go in the end, steps.
 const HOME: i64 = 640;
-/// Positions are told to 0.001 mm, 1.28 steps, and steps are rounded.
+/// Tolerance of a position, steps. Positions are reported to 0.001 mm, 1.28 steps, and steps are rounded.
 const CLOSE: f64 = 1.2;
-/// Steps of a homing axis until a switch is seen that changes while others do: 300 us at 10 mm/s, both ways.
+/// Steps that a homing axis may make until its switch is seen while other switches change: 300 us at 10 mm/s, both
+/// ways.
 const LATE: f64 = 10.0;
 
-/// What is known of an axis.
+/// The known state of an axis.
 #[derive(Clone, Copy, Debug)]
 struct Axis {
     offset: i64,
-    /// Whether that is to the step.
+    /// Whether the offset is known to the step.
     exact: bool,
-    /// It may have been homed at its switch since.
+    /// Whether the axis may have been homed at its switch since the last comparison.
     homed: bool,
-    /// It may be anything.
+    /// Whether the offset may be anything.
     doubted: bool,
 }
 
-/// What is known of all of them.
+/// The known state of all axes.
 #[derive(Clone, Debug)]
 pub struct PositionModel {
     axes: [Axis; 4],
-    /// Other switches have changed since.
+    /// Whether other switches have changed since the last comparison.
     disturbed: bool,
 }
 
-/// A place that is known to the step, as cells of the grid.
+/// A place that is known to the step, in cells of the grid.
 pub struct Place([i64; 4]);
 
 impl PositionModel {
-    /// Of a machine that has just started, and calls the place 0 to which its motors have made `steps`.
+    /// The model of a machine that has just started and gives the position 0 to the place where its motors are.
     pub fn at_start(steps: [i64; 4]) -> Self {
         let axis = |steps: i64| Axis { offset: -steps, exact: true, homed: false, doubted: false };
         Self { axes: steps.map(axis), disturbed: false }
     }
 
-    /// A line is sent, which may change them.
+    /// Takes note of a line that is sent, if it may change offsets.
     pub fn expect(&mut self, line: &str) {
         let homes_all = line.contains("{home:1}");
         for (m, axis) in self.axes.iter_mut().enumerate() {
@@ -80,12 +82,12 @@ impl PositionModel {
         }
     }
 
-    /// A switch is worked by hand: meanwhile others are seen later than by themselves.
+    /// Takes note that a switch is worked by hand. Meanwhile other switches are seen later than usual.
     pub fn disturb(&mut self) {
         self.disturbed = true;
     }
 
-    /// Compares what the machine tells as `mpo` with the steps that its motors have made.
+    /// Compares the position that the machine reports as `mpo` with the steps that its motors have made.
     pub fn compare(&mut self, told: &str, steps: [i64; 4]) -> Result<(), String> {
         for (m, steps) in steps.into_iter().enumerate() {
             let name = format!("\"{}\":", AXES[m]);
@@ -97,7 +99,7 @@ impl PositionModel {
         Ok(())
     }
 
-    /// Compares an axis that is reported `at` this offset, in steps, with where it is. The error is how far it is off.
+    /// Compares the reported offset of an axis, in steps, with the known one. The error is the difference.
     fn compare_axis(&mut self, m: usize, at: f64) -> Result<(), f64> {
         let disturbed = self.disturbed;
         let axis = &mut self.axes[m];
@@ -105,7 +107,8 @@ impl PositionModel {
         let within = |close: f64, offset: i64| (at - offset as f64).abs() < close;
         let near = |offset| within(if axis.exact { CLOSE } else { 2.0 * CLOSE }, offset);
         if near(axis.offset) && !axis.doubted {
-            // As it was. Unless it may be both.
+            // The offset has not changed. If it agrees with the offset after homing too, it is no longer known to the
+            // step.
             axis.exact &= homed.is_none_or(|offset| offset == axis.offset || !near(offset));
         } else if let Some(offset) = homed.filter(|offset| near(*offset)) {
             (axis.offset, axis.exact) = (offset, !axis.doubted && !disturbed);
@@ -118,7 +121,7 @@ impl PositionModel {
         Ok(())
     }
 
-    /// A place near where the motors were when they had made no step, and the line that goes there.
+    /// Returns a place near where the motors began, and the line that goes there.
     pub fn way_home(&self) -> (Place, String) {
         let cell = |m: usize| (self.axes[m].offset + HOME).div_euclid(GRID[m].0);
         let cells: [i64; 4] = std::array::from_fn(cell);
@@ -128,7 +131,7 @@ impl PositionModel {
         (Place(cells), format!("g21 g90 g94 g53 g0{}", words.collect::<String>()))
     }
 
-    /// The motors, that have made `steps`, rest at that place: all is known to the step from now on.
+    /// Takes note that the motors, after `steps`, rest at that place. From now on every offset is known to the step.
     pub fn arrive(&mut self, place: &Place, steps: [i64; 4]) -> Result<(), String> {
         for (m, axis) in self.axes.iter_mut().enumerate() {
             let offset = place.0[m] * GRID[m].0 - steps[m];
@@ -142,7 +145,7 @@ impl PositionModel {
     }
 }
 
-/// The number behind a text.
+/// Returns the number behind a text.
 pub fn number(line: &str, text: &str) -> Option<f64> {
     let rest = &line[line.find(text)? + text.len()..];
     rest.split([',', '}']).next()?.parse().ok()

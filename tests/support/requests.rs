@@ -1,4 +1,4 @@
-//! What lines of JSON ask for: names with their groups, and values, as far as transcripts write them.
+//! The requests in lines of JSON: names with their groups, and values, as far as transcripts use them.
 
 /// A pair of a request.
 #[derive(Debug, PartialEq)]
@@ -10,13 +10,14 @@ pub struct Asked {
 }
 
 impl Asked {
-    /// Whether it only reads.
+    /// Whether the pair only reads.
     pub fn reads(&self) -> bool {
         self.value.is_empty() || self.value.starts_with('n')
     }
 }
 
-/// The pairs of a line; none if it is no JSON. Groups that have no prefix of their own are left out of names.
+/// Returns the pairs of a line; none if the line is not JSON. Groups without a prefix of their own are left out of
+/// names.
 pub fn pairs(line: &str) -> Vec<Asked> {
     let mut pairs = Vec::new();
     let mut groups: Vec<String> = Vec::new();

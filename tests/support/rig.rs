@@ -18,7 +18,7 @@ use kerf::motion::queue::{BlockQueue, BlockSource, BlockStore};
 use kerf::motion::snapshot::Snapshot;
 use kerf::units::{AXES, Length, PerAxis};
 
-/// Limits and motors, the same for all axes unless changed; mm, s.
+/// Limits and motors, the same for all axes unless they are changed; mm, s.
 #[derive(Clone, Debug)]
 pub struct Config {
     pub velocity: PerAxis<f32>,
@@ -27,13 +27,13 @@ pub struct Config {
     pub deviation: f32,
     pub junction: f32,
     pub ratio: [StepRatio; MOTORS],
-    /// What each motor drives.
+    /// The axes that each motor drives.
     pub drives: [u8; MOTORS],
 }
 
-/// Each motor an axis.
+/// Each motor drives an axis of its own.
 pub const STRAIGHT: [u8; MOTORS] = [0, 1, 2, 3];
-/// The first two drive X and Y together.
+/// The first two motors drive X and Y together.
 pub const CORE_XY: [u8; MOTORS] = [SUM, DIFFERENCE, 2, 3];
 
 impl Config {
@@ -50,7 +50,7 @@ impl Config {
         }
     }
 
-    /// The step of a motor when the axes are there.
+    /// Returns the position of a motor, in steps, when the axes are at `place`.
     pub fn steps(&self, motor: usize, place: &PerAxis<Length>) -> i32 {
         let place = kinematics::place(self.drives[motor], place);
         self.ratio[motor].steps(place.unwrap_or_default())
@@ -87,14 +87,15 @@ impl Motors for Config {
     }
 }
 
-/// What the pins do.
+/// Records what the pins do.
 #[derive(Default)]
 pub struct Recorder {
     pub position: [i64; MOTORS],
-    /// Cycle of each step of each motor, if wanted.
+    /// Cycle of each step of each motor, if `keep_edges`.
     pub edges: [Vec<u64>; MOTORS],
     pub keep_edges: bool,
-    /// Where the motors are after each tick in which any steps, and from which cycle on, if wanted.
+    /// Positions of the motors after each tick with a step, each with the cycle from which on it holds, if
+    /// `keep_trail`.
     pub trail: Vec<([i64; MOTORS], u64)>,
     pub keep_trail: bool,
     pub now: u64,
@@ -130,15 +131,16 @@ impl Pins for Recorder {
     }
 }
 
-/// A segment as it went out, with what exec said of it.
+/// A segment as it was sent out, with exec's data about it.
 #[derive(Clone, Copy, Debug)]
 pub struct Emitted {
     pub segment: Segment,
     /// Velocity at its end, mm/s.
     pub velocity: f32,
-    /// The block it belongs to: the line number given with the move.
+    /// The block that it belongs to: the line number given with the move.
     pub line: u32,
-    /// How far the motors are ahead of where the governor is at its end, steps of the one that moves most.
+    /// How far the motors are ahead of the governor's place at the end of the segment, in steps of the motor that
+    /// moves most.
     pub ahead: f64,
 }
 
@@ -157,12 +159,12 @@ pub struct Rig {
     pub position: PerAxis<Length>,
     pub emitted: Vec<Emitted>,
     pub keep: bool,
-    /// What the last block that asked for it wants of overrides.
+    /// The change of overrides that the last block with a request asks for.
     pub change: Option<Change>,
     pub segments: u64,
-    /// A motor that may be ahead of its line.
+    /// A motor that may be ahead of its line, and is not checked.
     pub leads: Option<usize>,
-    /// What segments have moved each motor by, phase units.
+    /// How far the segments have moved each motor, phase units.
     travel: [i64; MOTORS],
 }
 
@@ -200,7 +202,7 @@ impl Rig {
         self.queue.free()
     }
 
-    /// Queues a move; there must be room. mm/s.
+    /// Queues a move at a velocity in mm/s; there must be room.
     pub fn line(&mut self, to: PerAxis<Length>, velocity: f32, number: u32) {
         self.go(to, Some(Feed::PerMinute(velocity * 60.0)), number);
     }
@@ -229,7 +231,7 @@ impl Rig {
         self.position = to;
     }
 
-    /// The next move begins at rest.
+    /// Makes the next move begin at rest.
     pub fn stop(&mut self) {
         self.builder.stopped();
     }
@@ -239,17 +241,17 @@ impl Rig {
         assert!(self.queue.push(block));
     }
 
-    /// Queues something at which the machine does not stop.
+    /// Queues a block at which the machine does not stop.
     pub fn aside(&mut self, block: Block) {
         assert!(self.queue.push_aside(block));
     }
 
-    /// Other overrides are wanted.
+    /// Asks for other overrides.
     pub fn want(&mut self, factors: Factors) {
         self.source.want(factors);
     }
 
-    /// The planner hears of it.
+    /// Passes a change of overrides to the planner.
     pub fn replan(&mut self) {
         if let Some(wanted) = self.queue.wanted() {
             self.queue.replan(wanted);
@@ -261,13 +263,13 @@ impl Rig {
         self.exec.set_hold(hold, &mut self.snapshot);
     }
 
-    /// Forgets all that is queued; it has been held. The moves that follow begin where the motors are.
+    /// Drops all that is queued, during a hold. The next moves begin where the motors are.
     pub fn drop_all(&mut self) {
         assert!(self.snapshot.held);
         self.forget_all();
     }
 
-    /// Forgets all that is queued, wherever the motors are: their ticks have been stopped.
+    /// Drops all that is queued, wherever the motors are, after their ticks have been stopped.
     pub fn forget_all(&mut self) {
         let mut held = self.exec.drop_all(&mut self.source, &mut self.snapshot);
         let queued = || self.drain.pop().or_else(|| held.take());
@@ -322,7 +324,7 @@ impl Rig {
         step
     }
 
-    /// Queues some segments, runs some ticks, and stops them.
+    /// Queues `segments` segments, runs `ticks` ticks, and then stops the ticks.
     pub fn stop_short(&mut self, segments: usize, ticks: usize) {
         for _ in 0..segments {
             let mut segment = Segment::default();
@@ -348,7 +350,7 @@ impl Rig {
         }
     }
 
-    /// See [`Emitted::ahead`].
+    /// Computes [`Emitted::ahead`].
     fn ahead(&self) -> f64 {
         let of = |m: &usize| self.snapshot.steps[*m].unsigned_abs();
         let most = (0..MOTORS).max_by_key(of).expect("motors");
@@ -359,8 +361,8 @@ impl Rig {
         if steps < 0.0 { -ahead } else { ahead }
     }
 
-    /// A block has come to its end: so have the motors, but for half a tick, which may be a step, and the half step to
-    /// the whole one.
+    /// Checks, at the end of a block, that the motors are at its end too. They may be off by half a tick, which may
+    /// be a step, and by the half step of rounding.
     fn check_block(&self) {
         for (m, (travel, target)) in self.travel.iter().zip(self.snapshot.target).enumerate() {
             if self.leads == Some(m) {
@@ -387,18 +389,18 @@ impl Rig {
         self.turn();
     }
 
-    /// Where the motors should be.
+    /// Returns where the motors should be.
     pub fn target(&self) -> [i64; MOTORS] {
         core::array::from_fn(|m| self.config.steps(m, &self.position).into())
     }
 
-    /// Seconds so far.
+    /// Returns the seconds so far.
     pub fn seconds(&self) -> f64 {
         self.pins.now as f64 / 16e6
     }
 }
 
-/// A position in mm.
+/// Makes a position from mm.
 pub fn at<const N: usize>(mm: [f64; N]) -> PerAxis<Length> {
     let mut position = [Length::ZERO; AXES];
     for (position, mm) in position.iter_mut().zip(mm) {

@@ -1,4 +1,5 @@
-//! `docs/settings.schema.json`: the settings as a JSON schema, for programs. A file of `cargo xtask settings save` keeps to it.
+//! `docs/settings.schema.json`: the settings as a JSON schema, for programs. A file of `cargo xtask settings save`
+//! conforms to it.
 
 use std::collections::HashMap;
 
@@ -6,7 +7,7 @@ use kerf::config::docs;
 use kerf::config::table::{Kind, MODE};
 use kerf::config::{Owner, Setting};
 
-/// The groups of settings that are kept; those of a job are not.
+/// Returns the groups of settings that are stored; settings of a job are left out.
 fn owners() -> Vec<(String, Owner)> {
     let named = |owner: Owner| {
         let name = String::from_utf8_lossy(owner.prefix().bytes()).into_owned();
@@ -35,7 +36,8 @@ fn owners() -> Vec<(String, Owner)> {
         .collect()
 }
 
-/// What each setting is, and its unit: from the tables of `docs/settings.md`, by the title of the section.
+/// Returns the meaning and the unit of each setting, from the tables of `docs/settings.md`, by the title of the
+/// section.
 fn meanings() -> HashMap<(String, String), (String, String)> {
     let page = docs::markdown();
     let mut title = String::new();
@@ -73,7 +75,7 @@ fn title(owner: Owner) -> &'static str {
     }
 }
 
-/// A number as it is kept, in decimal.
+/// Returns a number as it is stored, in decimal.
 fn decimal(value: i32, decimals: u8) -> String {
     let (sign, digits) = (if value < 0 { "-" } else { "" }, value.unsigned_abs());
     let one = 10u32.pow(decimals.into());
@@ -123,7 +125,7 @@ fn property(setting: Setting, unit: &str, meaning: &str) -> String {
     format!("{{ {} }}", parts.join(", "))
 }
 
-/// A group of lengths.
+/// Returns a group of lengths.
 fn lengths(members: &str, what: &str, is_read_only: bool) -> String {
     let read_only = if is_read_only { ", \"readOnly\": true" } else { "" };
     let member = |name| {
@@ -139,7 +141,7 @@ fn lengths(members: &str, what: &str, is_read_only: bool) -> String {
     )
 }
 
-/// All of it.
+/// Returns the whole schema.
 pub fn json() -> String {
     let meanings = meanings();
     let mut groups = Vec::new();

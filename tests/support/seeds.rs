@@ -1,6 +1,7 @@
-//! Which random conversations are had: each has a seed, which is printed, and plays the same again alone.
+//! Selects the random conversations. Each has a seed, which is printed, and a seed always gives the same
+//! conversation.
 //!
-//! `KERF_SEED` is the first seed, 0 if there is none, and `KERF_CASES` how many there are from there on.
+//! `KERF_SEED` is the first seed, 0 by default, and `KERF_CASES` the number of seeds.
 
 use std::fmt::Debug;
 use std::io::{Write, stderr};
@@ -12,7 +13,7 @@ use std::thread;
 use proptest::strategy::Strategy;
 use proptest::test_runner::{Config, RngAlgorithm, TestCaseError, TestError, TestRng, TestRunner};
 
-/// The seeds, if `count` of them are usual; printed.
+/// Returns and prints the seeds; `count` is the default number.
 pub fn seeds(count: u64) -> Range<u64> {
     let first = wanted("KERF_SEED").unwrap_or(0);
     let seeds = first..first + wanted("KERF_CASES").unwrap_or(count);
@@ -20,12 +21,12 @@ pub fn seeds(count: u64) -> Range<u64> {
     seeds
 }
 
-/// It ends when so many have failed, unless `KERF_TOLD` has another number.
+/// Number of failures after which a test ends, unless `KERF_TOLD` has another number.
 const TOLD: usize = 3;
-/// A line of progress each so many cases.
+/// Number of cases between two lines of progress.
 const PROGRESS: u64 = 5_000;
 
-/// Tries the case of each seed, on all cores, or on as many as `KERF_CORES` says. The first that fail are told.
+/// Tries the case of each seed, on all cores or on as many as `KERF_CORES` says. Reports the first failures.
 #[allow(dead_code)]
 pub fn try_all(count: u64, try_seed: impl Fn(u64) -> Result<(), String> + Sync) {
     let seeds = seeds(count);
@@ -64,12 +65,12 @@ fn wanted(name: &str) -> Option<u64> {
     std::env::var(name).ok().and_then(|n| n.parse().ok())
 }
 
-/// Says something although the test passes.
+/// Prints something even if the test passes.
 pub fn tell(what: &str) {
     let _ = writeln!(stderr(), "{what}");
 }
 
-/// What makes the case of a seed, and makes it smaller if it fails.
+/// Returns the runner that makes the case of a seed, and that shrinks it if it fails.
 fn runner(seed: u64) -> TestRunner {
     let mut bytes = [0; 32];
     bytes[..8].copy_from_slice(&seed.to_le_bytes());
@@ -77,14 +78,14 @@ fn runner(seed: u64) -> TestRunner {
     TestRunner::new_with_rng(config, TestRng::from_seed(RngAlgorithm::ChaCha, &bytes))
 }
 
-/// The case of a seed, and what makes it smaller if it fails.
+/// Returns the case of a seed, and the runner that shrinks it if it fails.
 pub fn case<S: Strategy>(seed: u64, strategy: &S) -> (S::Tree, TestRunner) {
     let mut runner = runner(seed);
     let tree = strategy.new_tree(&mut runner).expect("a strategy without filters");
     (tree, runner)
 }
 
-/// Plays the case of a seed. One that fails is made as small as it can be, and told.
+/// Plays the case of a seed. A case that fails is shrunk as far as possible and reported.
 #[allow(dead_code, reason = "each test uses a part")]
 pub fn smallest<S: Strategy>(
     seed: u64,

@@ -4,29 +4,29 @@ use crate::side::Side;
 
 /// What an answer begins with.
 const ANSWER: &str = "{\"r\":{";
-/// What comes without having been asked for begins with one of these, or is a banner.
+/// An unsolicited line begins with one of these, or is a banner.
 const UNASKED: [&str; 7] =
     ["{\"r\":{\"prb\":", "{\"sr\":", "{\"qr\":", "{\"er\":", "{\"rx\":", "{\"jog\":", "{\"ack\":"];
 
-/// What holds a sender back that heeds it.
+/// The characters that stop and release a sender that heeds them.
 const XOFF: char = '\x13';
 const XON: char = '\x11';
 /// How a banner ends.
 const BANNER: &str = "\"SYSTEM READY\"},\"f\":[1,0,0]}";
 
-/// What an answer to a line tells of.
+/// What the answer to a line must report.
 #[derive(Clone, PartialEq, Debug)]
 enum Want {
-    /// It is to tell of this first.
+    /// The answer must report this name first.
     Name(String),
-    /// It is to tell of nothing, as that to G-code does.
+    /// The answer must have an empty body, as the answer to G-code has.
     Nothing,
-    /// Of whatever: a line that is broken up by real-time characters may be dropped, or be several.
+    /// Any answer: a line that is broken up by real-time characters may be dropped, or become several lines.
     Anything,
 }
 
 impl Want {
-    /// Of a line.
+    /// Returns what the answer to a line must report.
     fn of(line: &[u8]) -> Want {
         let line = String::from_utf8_lossy(line);
         let is_plain = |c: char| c == ' ' || u8::try_from(c).is_ok_and(|byte| is_text(&byte));
@@ -36,30 +36,30 @@ impl Want {
         let name = line.strip_prefix('{').and_then(|rest| rest.split(':').next());
         match name.map(|name| name.trim_matches('"')) {
             None => Want::Nothing,
-            // If it is dropped, its answer repeats it.
+            // If the line is dropped, its answer repeats it.
             Some("gc") => Want::Anything,
             Some(name) => Want::Name(name.to_string()),
         }
     }
 }
 
-/// What is sent and heard on a port.
+/// The state of a sender on a port.
 pub struct Sender {
     port: usize,
-    /// The text that has not come to its end.
+    /// The text of a line that has not come to its end.
     partial: String,
     /// All lines since [`Sender::forget`].
     pub heard: Vec<String>,
-    /// What lines that have been sent want to hear.
+    /// What the answers to the lines in flight must report.
     wanted: Vec<Want>,
-    /// Banners.
+    /// Banners since the last reset.
     pub banners: usize,
-    /// Jogs that were taken, less those that have ended.
+    /// Jogs that were accepted, minus jogs that have ended.
     pub jogs: isize,
 }
 
 impl Sender {
-    /// On a port: 0 or 1.
+    /// A sender on port 0 or 1.
     pub fn new(port: usize) -> Self {
         Self {
             port,
@@ -71,12 +71,12 @@ impl Sender {
         }
     }
 
-    /// Lines that wait for their answers.
+    /// Number of lines that wait for their answers.
     pub fn in_flight(&self) -> usize {
         self.wanted.len()
     }
 
-    /// Sends bytes, of which the lines want answers.
+    /// Sends bytes. The lines in them are then expected to be answered.
     pub fn send(&mut self, side: &mut impl Side, bytes: &[u8]) {
         self.wanted.extend(wants(bytes));
         match self.port {
@@ -85,7 +85,7 @@ impl Sender {
         }
     }
 
-    /// Takes what has come. The error is what may not come.
+    /// Takes what has come. The error is a line that must not come.
     pub fn hear(&mut self, side: &mut impl Side) -> Result<(), String> {
         let bytes = if self.port == 0 { side.heard() } else { side.heard_aux() };
         self.partial += &String::from_utf8_lossy(&bytes).replace([XON, XOFF], "");
@@ -98,7 +98,7 @@ impl Sender {
         Ok(())
     }
 
-    /// Looks at the line that was heard last.
+    /// Judges the line that was heard last.
     fn judge(&mut self) -> Result<(), String> {
         let Some(line) = self.heard.last() else { return Ok(()) };
         if line.ends_with(BANNER) {
@@ -106,7 +106,7 @@ impl Sender {
             return if self.banners > 1 { Err("it has started anew".to_string()) } else { Ok(()) };
         }
         if self.banners == 0 {
-            // A reset has broken it off.
+            // A reset has broken the line off.
             return Ok(());
         }
         if !is_whole(line) {
@@ -123,7 +123,7 @@ impl Sender {
         Ok(())
     }
 
-    /// The line that was heard last answers one of those that have been sent.
+    /// Takes the line that was heard last as the answer to a line in flight.
     fn answer(&mut self) -> Result<(), String> {
         let Some(line) = self.heard.last() else { return Ok(()) };
         let name = line.strip_prefix("{\"r\":{\"").and_then(|rest| rest.split('"').next());
@@ -141,21 +141,21 @@ impl Sender {
         Ok(())
     }
 
-    /// The machine has been reset: nothing will be answered any more.
+    /// Takes note of a reset: no line in flight will be answered any more.
     pub fn reset(&mut self) {
         (self.banners, self.jogs) = (0, 0);
         self.wanted.clear();
         self.partial.clear();
     }
 
-    /// Whether the answer that came last tells of `name`.
+    /// Returns what the answer that came last reports for `name`, if it does.
     pub fn told(&self, name: &str) -> Option<&str> {
         let start = format!("{ANSWER}\"{name}\":");
         self.heard.iter().rev().find(|line| line.starts_with(ANSWER))?.strip_prefix(&start)
     }
 }
 
-/// Whether a line is one object with all its ends; what stands in quotes is of no account.
+/// Whether a line is one complete object. Text in quotes is ignored.
 fn is_whole(line: &str) -> bool {
     let bare: String = line.split('"').step_by(2).collect();
     let ends = |open: char, close: char| bare.matches(open).count() == bare.matches(close).count();
@@ -163,10 +163,11 @@ fn is_whole(line: &str) -> bool {
     plain && ends('{', '}') && ends('[', ']')
 }
 
-/// What answers the lines in these bytes: real-time characters are no text, and an empty line is none.
+/// Returns what the answers to the lines in these bytes must report. Real-time characters are no text, and an empty
+/// line has no answer.
 fn wants(bytes: &[u8]) -> Vec<Want> {
     let mut pieces: Vec<_> = bytes.split(|byte| *byte == b'\n').collect();
-    // What has no end is no line yet.
+    // Text without an end is no line yet.
     pieces.pop();
     pieces.into_iter().filter(|piece| piece.iter().any(is_text)).map(Want::of).collect()
 }

@@ -1,8 +1,8 @@
-//! A random conversation as it is had and judged, on the host or on the simulated chip.
+//! Plays and judges a random conversation, on the host or on the simulated chip.
 //!
-//! Whatever is sent, and whatever switches do: the machine comes to rest, every line is answered once, jogs are said to
-//! have ended, outputs are as they are said to be, and where the machine says that it is its motors are, by the steps
-//! that were made ([`PositionModel`]).
+//! Whatever is sent, and whatever switches do, this must hold: the machine comes to rest, every line is answered
+//! once, the end of each jog is reported, outputs are as reported, and the motors are where the machine says that it
+//! is, by the steps that were made ([`PositionModel`]).
 
 use kerf::boards::outputs;
 
@@ -13,35 +13,35 @@ use crate::side::Side;
 
 /// Lines in flight on each port.
 const IN_FLIGHT: [usize; 2] = [4, 2];
-/// Longest that the machine may take to come to rest, ms.
+/// Longest time until the machine comes to rest, ms.
 const REST_MS: u64 = 60_000;
-/// `stat`: nothing runs.
+/// Values of `stat` in which nothing runs.
 const READY: f64 = 1.0;
 const STOPPED: f64 = 3.0;
 const ENDED: f64 = 4.0;
-/// `stat`: G-code is refused.
+/// Values of `stat` in which G-code is refused.
 const ALARM: f64 = 2.0;
 const SHUTDOWN: f64 = 11.0;
 /// Free blocks of an empty queue.
 const BLOCKS: f64 = 61.0;
-/// Three numbers with three places.
+/// Tolerance of a sum of three numbers with three decimals.
 const ROUNDED: f64 = 0.0016;
 
-/// A sender's side of a conversation, and what is known of the machine.
+/// A sender's side of a conversation, and the known state of the machine.
 pub struct Session<S> {
     side: S,
     ports: [Sender; 2],
     position_model: PositionModel,
     /// Inputs that are closed by hand, as bits.
     closed: u16,
-    /// What has been done, for whoever looks for the reason of a failure.
+    /// What has been done, to be printed after a failure.
     log: Vec<String>,
 }
 
 type Outcome<T> = Result<T, String>;
 
 impl<S: Side> Session<S> {
-    /// With a machine that has not booted, or is about to say that it has.
+    /// A session with a machine that is about to boot.
     pub fn new(mut side: S) -> Self {
         side.wire(&SWITCHES, 0);
         let ports = [Sender::new(0), Sender::new(1)];
@@ -49,19 +49,19 @@ impl<S: Side> Session<S> {
         Self { side, ports, position_model, closed: 0, log: Vec::new() }
     }
 
-    /// Boots a machine that has never been used.
+    /// Boots a machine with empty EEPROM.
     pub fn begin(&mut self) -> Outcome<()> {
         self.greet()?;
-        // M0 waits for a tilde.
+        // With this setting M0 waits for a tilde.
         for line in SETTINGS.into_iter().chain(["{psw:1}"]) {
             self.line(0, line)?;
         }
-        // They are stored.
+        // Time for the settings to be stored.
         self.run(2_000)?;
         self.rest()
     }
 
-    /// The machine boots: it says so, stands where it stands, and calls that 0.
+    /// Waits for the banner of a machine that boots. Its position is then 0 wherever it stands.
     pub fn greet(&mut self) -> Outcome<()> {
         self.ports.iter_mut().for_each(Sender::reset);
         let mut waited = 0;
@@ -73,11 +73,11 @@ impl<S: Side> Session<S> {
             }
         }
         self.position_model = PositionModel::at_start(self.side.steps());
-        // Its port is decided for TinyG's dialect, in which a reset starts the board anew.
+        // This settles TinyG's dialect on the port. In that dialect a reset restarts the board.
         self.line(0, "{stat:n}")
     }
 
-    /// Does all that. After a reset it is the rest of it that is still to be done.
+    /// Plays the actions. Returns those that remain after a reset; `None` if all are done.
     pub fn play<'a>(&mut self, ops: &'a [Op]) -> Outcome<Option<&'a [Op]>> {
         for (at, op) in ops.iter().enumerate() {
             self.log.push(format!("{op:?}"));
@@ -99,7 +99,7 @@ impl<S: Side> Session<S> {
                 Op::Rest => self.rest()?,
                 Op::Reset => {
                     self.relieve();
-                    // Nothing is on its way that would come into the start.
+                    // Nothing is then on its way that would arrive during the start.
                     self.run(20)?;
                     self.send(0, b"g91 g0 x\x18");
                     return Ok(ops.get(at + 1..));
@@ -109,7 +109,7 @@ impl<S: Side> Session<S> {
         Ok(None)
     }
 
-    /// Comes to rest, and goes to a place that is known to the step, near where the motors were at first.
+    /// Comes to rest, and goes to a place that is known to the step, near where the motors began.
     pub fn finish(&mut self) -> Outcome<()> {
         self.rest()?;
         let (place, line) = self.position_model.way_home();
@@ -121,7 +121,7 @@ impl<S: Side> Session<S> {
         Ok(())
     }
 
-    /// All that was done, and heard, of a conversation that failed; what was heard again and again, once.
+    /// Returns all that was done and heard in a conversation that failed. Lines that were heard repeatedly come once.
     pub fn story(&self) -> String {
         let mut story: Vec<_> = self.log.iter().map(|done| format!("  {done}\n")).collect();
         story.push("heard\n".to_string());
@@ -145,7 +145,7 @@ impl<S: Side> Session<S> {
         self.ports[port].send(&mut self.side, bytes);
     }
 
-    /// Sends a line when fewer than it may wait for their answers.
+    /// Sends a line as soon as the port has fewer unanswered lines than it may have.
     fn line(&mut self, port: usize, line: &str) -> Outcome<()> {
         self.patience(port)?;
         self.position_model.expect(line);
@@ -153,13 +153,13 @@ impl<S: Side> Session<S> {
         Ok(())
     }
 
-    /// Waits until another line may be sent.
+    /// Waits until another line may be sent on the port.
     fn patience(&mut self, port: usize) -> Outcome<()> {
         let mut waited = 0;
         while self.ports[port].in_flight() >= IN_FLIGHT[port] {
             self.run(20)?;
             waited += 20;
-            // It may be held, with the queue full.
+            // The machine may be held with its queue full.
             if waited % 400 == 0 {
                 self.relieve();
             }
@@ -170,7 +170,7 @@ impl<S: Side> Session<S> {
         Ok(())
     }
 
-    /// Lets go of all that keeps the machine from moving.
+    /// Releases whatever keeps the machine from moving.
     fn relieve(&mut self) {
         for input in BY_HAND {
             if self.closed & 1 << input != 0 {
@@ -188,7 +188,7 @@ impl<S: Side> Session<S> {
         self.side.set_input(input, closed);
     }
 
-    /// Waits until the machine is at rest, and looks whether it is where it says, and does what it says.
+    /// Waits until the machine is at rest. Then checks that its position and its outputs are as it reports.
     fn rest(&mut self) -> Outcome<()> {
         let (mut before, mut waited) = (None, 0);
         while !self.is_at_rest(&mut before)? {
@@ -207,7 +207,7 @@ impl<S: Side> Session<S> {
         }
     }
 
-    /// Whether nothing moves and nothing waits; an alarm is cleared.
+    /// Whether nothing moves and nothing waits. Clears an alarm.
     fn is_at_rest(&mut self, before: &mut Option<[i64; 4]>) -> Outcome<bool> {
         let steps = self.side.steps();
         let still = before.replace(steps) == Some(steps);
@@ -225,7 +225,8 @@ impl<S: Side> Session<S> {
         }
     }
 
-    /// Asks, and waits for the answer: what stands behind `name` in it. `None` if it was dropped by a queue flush.
+    /// Sends a request and waits for the answer. Returns what stands behind `name` in it; `None` if a queue flush has
+    /// dropped it.
     fn ask(&mut self, line: &str, name: &str) -> Outcome<Option<String>> {
         self.line(0, line)?;
         let mut waited = 0;

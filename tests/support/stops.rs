@@ -1,12 +1,14 @@
-//! Crowded ports: alarms act when they arrive, and a report tells of one moment.
+//! Crowded ports: alarms act when they arrive, and a report describes a single moment.
 
 use super::{AUX, BYTES_MS, MOVE, USB, alone};
 use crate::side::Side;
 
-/// Alarms do not wait for the answers of their own port: not in the pool, and not in the ring of a port whose pool is full.
+/// Alarms do not wait for the answers of their own port: neither in the pool, nor in the ring of a port whose pool is
+/// full.
 pub fn a_stop_acts_when_it_arrives<S: Side>(boot: impl Fn() -> S + Sync) {
     let before = ["", "$$\n", "{g59:n}\n{g59:n}\n{g59:n}\n"];
-    // Several long lines, so that the one that stops waits in the ring; then the reserve is taken, too.
+    // Several long lines come first, so that the alarm waits in the ring; then lines take the reserve of the pool,
+    // too.
     let long = format!("{{{}xvm:n}}\n", "xvm:n,xfr:n,".repeat(17));
     let full = format!("{long}{long}{{g59:n}}\n{{g58:n}}\n{{g57:n}}\n{{g56:n}}\n");
     for (port, lines) in
@@ -21,12 +23,13 @@ pub fn a_stop_acts_when_it_arrives<S: Side>(boot: impl Fn() -> S + Sync) {
                 crowd.pass(200);
                 assert!(crowd.turns());
                 crowd.forget();
-                // Together: the stop comes while the lines before it are being answered.
+                // Lines and alarm are sent together, so that the alarm comes while the lines before it are being
+                // answered.
                 crowd.put(port, lines);
                 crowd.put(port, stop);
                 crowd.pass((lines.len() / BYTES_MS + 2) as u64);
                 crowd.stops(stop);
-                // It has an answer of its own, behind those of the lines before it.
+                // The alarm has an answer of its own, behind the answers of the lines before it.
                 let name: String = stop.chars().filter(char::is_ascii_alphabetic).take(5).collect();
                 let answer = format!("{{\"r\":{{\"{}\":", name.to_lowercase());
                 assert!(crowd.hears_line(port, &answer, 4_000), "{:?}", crowd.heard);
@@ -37,10 +40,11 @@ pub fn a_stop_acts_when_it_arrives<S: Side>(boot: impl Fn() -> S + Sync) {
     }
 }
 
-/// An alarm that has been ended from the other port does not begin again when the turn of its line comes.
+/// An alarm that was ended from the other port does not begin again when its line has its turn.
 pub fn a_stop_acts_once<S: Side>(boot: impl Fn() -> S + Sync) {
     let long = format!("{{{}xvm:n}}\n", "xvm:n,xfr:n,".repeat(17));
-    // In the pool; in the ring behind lines that overtake; in the ring behind a line that waits for room there.
+    // The alarm waits in the pool; in the ring behind lines that overtake; in the ring behind a line that waits for
+    // room there.
     let behind_long = format!("{long}{long}{{g59:n}}\n{{g58:n}}\n{{g57:n}}\n");
     for lines in ["$$\n", &behind_long, &"{g59:n}\n".repeat(14)] {
         alone(&boot, |mut crowd| {
@@ -54,7 +58,7 @@ pub fn a_stop_acts_once<S: Side>(boot: impl Fn() -> S + Sync) {
             assert!(crowd.hears_line(USB, "\"alarm\":", 4_000), "{:?}", crowd.heard);
             crowd.pass(100);
             crowd.prompt(AUX, "{stat:n}\n", "{\"stat\":3}");
-            // The next one counts, also behind the end of one on its own port.
+            // The next alarm counts, also behind a line on its own port that ends an alarm.
             for stops in ["{alarm:1}\n", "{clear:n}\n{alarm:1}\n"] {
                 crowd.prompt(USB, stops, "{\"alarm\":1}");
                 crowd.prompt(AUX, "{stat:n}\n", "{\"stat\":2}");
@@ -63,7 +67,8 @@ pub fn a_stop_acts_once<S: Side>(boot: impl Fn() -> S + Sync) {
     }
 }
 
-/// An alarm acts at once behind whatever is no line, or ends without a line's end: in the pool, and in the ring behind a full pool.
+/// An alarm acts at once, even behind bytes that are no line or that lack a line end: in the pool, and in the ring
+/// behind a full pool.
 pub fn a_stop_acts_behind_what_is_no_line<S: Side>(boot: impl Fn() -> S + Sync) {
     let full = "{xvm:n}\n".repeat(22);
     for (port, before) in [
@@ -91,7 +96,7 @@ pub fn a_stop_acts_behind_what_is_no_line<S: Side>(boot: impl Fn() -> S + Sync) 
     }
 }
 
-/// A way of many blocks, which all have room, leaves control its turns.
+/// A long move of many blocks, all of which have room in the queue, does not hold up control.
 pub fn a_long_way_does_not_hold_up_control<S: Side>(boot: impl Fn() -> S + Sync) {
     for (line, stop) in [
         ("{jogx:2000}\n", "{alarm:1}\n"),
@@ -115,13 +120,13 @@ pub fn a_long_way_does_not_hold_up_control<S: Side>(boot: impl Fn() -> S + Sync)
     }
 }
 
-/// The number of a name in a line of JSON.
+/// Returns the number of a name in a line of JSON.
 fn value(line: &str, name: &str) -> Option<f64> {
     let (_, rest) = line.split_once(&format!("\"{name}\":"))?;
     rest.split([',', '}']).next()?.parse().ok()
 }
 
-/// The first and the last place in a report are the same one, though the other port is told places as well.
+/// The first and the last position in a report agree, even if the other port is sent positions at the same time.
 pub fn a_report_is_of_one_moment_whoever_asks_on_the_other_port<S: Side>(
     boot: impl Fn() -> S + Sync,
 ) {

@@ -1,17 +1,17 @@
-//! Tables that people can read: no cell is long.
+//! Keeps tables readable: no cell is long.
 
-/// Longest cell of a table, in characters: more is not read.
+/// Longest cell of a table, in characters. Longer cells are not read.
 pub const CELL: usize = 160;
 
-/// A text in two: the sentences that a cell has room for, and those that follow.
+/// Splits a text: the sentences that a cell has room for, and the rest.
 fn split(text: &str) -> (&str, &str) {
     let ends = text.match_indices(". ").map(|(at, _)| at + 1).chain([text.len()]);
-    // A first sentence that is too long is for the test to tell.
+    // A first sentence that is too long stays whole, so that the test reports it.
     let at = ends.take_while(|at| text[..*at].chars().count() <= CELL).last();
     text.split_at(at.unwrap_or(text.len()))
 }
 
-/// Of each row whose last cell is too long, moves what the cell has no room for to a list behind the table.
+/// For each row whose last cell is too long, moves the rest of the cell to a list behind the table.
 pub fn shorten(page: &str) -> String {
     let (mut text, mut more) = (String::new(), String::new());
     for line in page.lines() {

@@ -3,28 +3,28 @@
 //! A transcript is played from power-up. Its first line, a comment, says why it exists. Then, a line each:
 //!
 //! ```text
-//! # what follows is for people
+//! # a comment
 //! -> g1 x10 f500              a line is sent; \x05 is the byte 5
-//! <- {"r":{},"f":[1,0,7]}     the next line heard is exactly this; \x0d is a carriage return, $VERSION Kerf's version,
+//! <- {"r":{},"f":[1,0,7]}     the next line heard is exactly this; \x0d is a carriage return; $VERSION is Kerf's version,
 //!                             which may be left out of JSON
-//! <~ {"qr":*}                 from here on such lines may come, any number of them; * is anything
+//! <~ {"qr":*}                 from here on any number of lines like this may come; * stands for any text
 //! @ +50ms                     time passes
 //! baud 500000                 from here on the sender speaks and hears at this rate
 //! in xmin closed              the contact of a switch closes (or: open); others are probe, door, stop
 //! near xmin -1280             from power-up on, the switch is closed while its axis is at or beyond this step:
-//!                             xmin to amax; probe, while Z is; `near xmin -1280 opens` is the other way round
-//! spindle 300 rpm 4           the spindle turns so fast from now on, with so many pulses of its encoder a turn
-//! steps X=12800 Y=0           the motors come to rest there; those not named are at 0
-//! outputs spindle ccw 12.50%  these are on by now, of `spindle ccw mist flood`, and the spindle's pulses that wide
+//!                             xmin to amax, or probe, which Z works; `near xmin -1280 opens`: the switch is open there
+//! spindle 300 rpm 4           from here on the spindle turns at this speed; its encoder has this many pulses a turn
+//! steps X=12800 Y=0           the motors come to rest there; motors that are not named are at 0
+//! outputs spindle ccw 12.50%  by now exactly these of `spindle ccw mist flood` are on; the spindle's pulses have this width
 //! 2-> {sr:n}                  a line is sent on the second port, whose answers are `2<-`
-//! 2cts 1                      the sender on the second port holds the machine back by that pin (0: no more)
-//! greeting                    the greeting is heard, whatever version it tells
-//! job examples/square.gcode   each line of a file is sent when the one before it has been taken, and none is refused
+//! 2cts 1                      the sender on the second port stops the machine by its handshake pin (0: releases it)
+//! greeting                    the greeting is heard, with any version
+//! job examples/square.gcode   sends each line of a file when the line before it has been accepted; none may be refused
 //! ```
 //!
-//! Automatic reports (`sr`, `qr`), empty lines, `start` and grbl's greeting are passed over unless they are the line expected next. Any other line
-//! that nobody expects fails the transcript, and so does silence where a line is expected. Motors 1 to 4
-//! are `M1` to `M4`, or `X Y Z A`, which is what they move by default.
+//! Automatic reports (`sr`, `qr`), empty lines, `start` and grbl's greeting are ignored unless they are the line
+//! expected next. Any other unexpected line fails the transcript, and so does silence where a line is expected.
+//! Motors 1 to 4 are named `M1` to `M4`, or `X Y Z A` after the axes that they move by default.
 
 use std::collections::VecDeque;
 use std::fs;
@@ -37,14 +37,14 @@ use kerf::config::VERSION;
 
 use crate::side::Side;
 
-/// Longest wait for a line.
+/// Longest wait for a line, ms.
 const HEAR_MS: u64 = 20_000;
-/// Longest wait for the motors to rest, and the time without a step that is called rest.
+/// Longest wait for the motors to come to rest, and the time without a step that counts as rest, ms.
 const MOVE_MS: u64 = 120_000;
 const REST_MS: u64 = 200;
-/// Longest wait for outputs.
+/// Longest wait for outputs, ms.
 const SWITCH_MS: u64 = 30;
-/// Time at the end in which nothing unexpected may come.
+/// Time at the end in which no unexpected line may come, ms.
 const LAST_MS: u64 = 100;
 
 /// One line of a transcript.
@@ -67,7 +67,7 @@ enum Event {
     Greeting,
 }
 
-/// A transcript, read.
+/// A parsed transcript.
 #[derive(Clone)]
 pub struct Transcript {
     /// The name of its file.
@@ -76,7 +76,7 @@ pub struct Transcript {
 }
 
 impl Transcript {
-    /// Whether it is about grbl's dialect, and asks for nothing in TinyG's.
+    /// Whether it is about grbl's dialect, and makes no request in TinyG's.
     #[allow(dead_code)]
     pub fn is_grbl_alone(&self) -> bool {
         let is_json = |bytes: &[u8]| bytes.starts_with(b"{");
@@ -92,7 +92,7 @@ impl Transcript {
 
 #[allow(dead_code)]
 impl Transcript {
-    /// Lines that are expected are so where the transcript says otherwise.
+    /// Replaces each expected line by what `as_here` returns for it.
     pub fn expect(&mut self, as_here: impl Fn(&str) -> String) {
         for (_, event) in &mut self.events {
             if let Event::Hear(line) | Event::HearAux(line) | Event::Allow(line) = event {
@@ -102,7 +102,7 @@ impl Transcript {
     }
 }
 
-/// Reads every transcript in a folder; those alone whose name contains `KERF_TRANSCRIPT`, if that is set.
+/// Reads every transcript in a folder, or, if `KERF_TRANSCRIPT` is set, only those whose name contains it.
 pub fn read_all(folder: &Path) -> Vec<Transcript> {
     let entries = fs::read_dir(folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
     let mut paths: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
@@ -114,15 +114,14 @@ pub fn read_all(folder: &Path) -> Vec<Transcript> {
     paths.iter().map(|path| read(path)).collect()
 }
 
-/// Plays each transcript on a machine of its own, `at_once` of them at a time; fails with all that went
-/// wrong.
+/// Plays each transcript on a machine of its own, `at_once` of them at a time. Fails with a list of all failures.
 pub fn play_all<S: Side>(
     transcripts: Vec<Transcript>,
     at_once: usize,
     boot: impl Fn() -> S + Sync,
 ) {
     let next = AtomicUsize::new(0);
-    // A machine on the host is its thread's.
+    // On the host each machine needs its own thread.
     let play = |t: &Transcript| {
         thread::scope(|own| own.spawn(|| t.play(&mut boot()).err()).join().unwrap())
     };
@@ -145,7 +144,7 @@ fn read(path: &Path) -> Transcript {
     read_text(name, &text)
 }
 
-/// Reads a transcript from its text.
+/// Parses a transcript from its text.
 pub fn read_text(name: String, text: &str) -> Transcript {
     let numbered = text.lines().enumerate().map(|(i, line)| (i + 1, line));
     let events = numbered.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
@@ -177,7 +176,7 @@ fn parse(line: &str) -> Option<Event> {
     }
 }
 
-/// The bytes of a line to send, with its end.
+/// Returns the bytes of a line to send, with its end; `None` if an escape is malformed.
 fn unescape(text: &str) -> Option<Vec<u8>> {
     let mut parts = text.split("\\x");
     let mut bytes = parts.next()?.as_bytes().to_vec();
@@ -226,7 +225,7 @@ fn steps(text: &str) -> Option<[i64; 4]> {
     Some(steps)
 }
 
-/// What a transcript calls outputs; the direction of a spindle that is off is of no account.
+/// Returns the names of outputs in transcripts. The direction of a spindle that is off is ignored.
 fn name_outputs((on, share): (u8, f64)) -> String {
     let turns = on & 1 != 0;
     let names = ["spindle", "ccw", "mist", "flood"].into_iter().enumerate();
@@ -235,7 +234,7 @@ fn name_outputs((on, share): (u8, f64)) -> String {
     names.map(|(_, name)| name).chain([&*share]).collect::<Vec<_>>().join(" ")
 }
 
-/// Whether `pattern`, in which `*` is anything, is all of `text`.
+/// Whether `pattern`, in which `*` stands for any text, matches all of `text`.
 fn matches(pattern: &str, text: &str) -> bool {
     match pattern.split_once('*') {
         None => pattern == text,
@@ -246,7 +245,7 @@ fn matches(pattern: &str, text: &str) -> bool {
 }
 
 impl Transcript {
-    /// The lines that are sent, without their ends, each with the line that is heard next.
+    /// Returns the lines that are sent, without their ends, each with the line that is heard next.
     #[allow(dead_code)]
     pub fn exchanges(&self) -> impl Iterator<Item = (String, &str)> {
         self.events.windows(2).filter_map(|pair| match pair {
@@ -257,7 +256,7 @@ impl Transcript {
         })
     }
 
-    /// The pulses in a turn of the spindle that turns in it, if one does.
+    /// Returns the pulses in a turn of the spindle; `None` if the transcript turns no spindle.
     pub fn spindle_pulses(&self) -> Option<u32> {
         self.events.iter().find_map(|(_, event)| match event {
             Event::Spindle(_, pulses) => Some(*pulses),
@@ -265,7 +264,7 @@ impl Transcript {
         })
     }
 
-    /// Plays it; the error says where it fails and how.
+    /// Plays the transcript. The error says where and how it fails.
     pub fn play(&self, side: &mut impl Side) -> Result<(), String> {
         let near = |(_, event): &(usize, Event)| match event {
             Event::Near(input, step, opens) => Some((*input, *step, *opens)),
@@ -286,14 +285,14 @@ impl Transcript {
 /// A transcript being played.
 struct Player<'a, S> {
     side: &'a mut S,
-    /// What has been heard on each port.
+    /// What each port has sent.
     ears: [Ear; 2],
     allowed: Vec<String>,
-    /// The last line heard on the first port that was expected by itself was grbl's greeting.
+    /// Whether the line that was expected last on the first port was grbl's greeting.
     greeted: bool,
 }
 
-/// What has been heard on a port.
+/// What a port has sent.
 #[derive(Default)]
 struct Ear {
     partial: String,
@@ -311,17 +310,17 @@ impl Ear {
     }
 }
 
-/// A line without Kerf's version, which most transcripts leave out: it changes with each release.
+/// Returns a line without Kerf's version, which changes with each release. Most transcripts leave it out.
 fn without_version(line: &str) -> String {
     line.replace(&format!("\"kerf\":\"{VERSION}\","), "")
 }
 
-/// The greeting on the second port, which transcripts that do not use it pass over.
+/// The greeting on the second port. Transcripts that do not use the port ignore it.
 const GREETING: &str = "{\"r\":{\"fv\":*\"SYSTEM READY\"},\"f\":[1,0,0]}";
 
-/// The greeting of grbl's dialect, likewise.
+/// The greeting of grbl's dialect, which is ignored unless it is expected.
 const OTHER_GREETING: &str = "Grbl 1.1h ['$' for help]";
-/// The greeting of printing hosts, likewise.
+/// The greeting of printing hosts, which is ignored unless it is expected.
 const START: &str = "start";
 
 impl<S: Side> Player<'_, S> {
@@ -359,7 +358,8 @@ impl<S: Side> Player<'_, S> {
         Ok(())
     }
 
-    /// Hears the greeting of TinyG's dialect; of an image without it that of grbl's, which may have been heard.
+    /// Waits for the greeting: of TinyG's dialect, or, in an image without that dialect, of grbl's, which may have
+    /// come already.
     fn greeting(&mut self) -> Result<(), String> {
         if self.side.speaks_tinyg() {
             return self.wait(0, GREETING, |line| matches(GREETING, line));
@@ -367,9 +367,9 @@ impl<S: Side> Player<'_, S> {
         if std::mem::take(&mut self.greeted) { Ok(()) } else { self.hear(0, OTHER_GREETING) }
     }
 
-    /// Sends a file as a sender does that waits for each answer.
+    /// Sends a file as a sender that waits for each answer.
     fn run(&mut self, file: &str) -> Result<(), String> {
-        // Tests of the simulator run in their own folder.
+        // Tests of the simulator run in the folder of their package.
         let folder = if Path::new(file).exists() { "." } else { "../../.." };
         let job = fs::read_to_string(Path::new(folder).join(file)).expect(file);
         for line in job.lines().filter(|line| !line.trim().is_empty()) {
@@ -382,7 +382,7 @@ impl<S: Side> Player<'_, S> {
 
     fn hear(&mut self, port: usize, wanted: &str) -> Result<(), String> {
         self.wait(port, wanted, |line| {
-            // The lines of grbl's dialect end in CR LF, which transcripts leave out.
+            // The lines of grbl's dialect end in CR LF. Transcripts leave out the CR.
             let plain = line.strip_suffix('\r').filter(|_| !wanted.ends_with('\r'));
             let line = plain.unwrap_or(line);
             line == wanted
@@ -422,7 +422,7 @@ impl<S: Side> Player<'_, S> {
         if port == 1 && matches(GREETING, line) {
             return true;
         }
-        // Where nothing decides between dialects yet each sender finds its own greeting.
+        // Where no dialect is settled yet, each kind of sender gets its own greeting.
         let other = line.trim_end_matches('\r');
         if other.is_empty() || [OTHER_GREETING, START].contains(&other) {
             return true;

@@ -21,7 +21,7 @@ Which wire goes where, for each board. Check it against your shield **before** y
 
 ";
 
-/// What a pin is called on an Arduino Mega 2560; by port and bit. D38 and on are of the double row.
+/// Returns the name of a pin on an Arduino Mega 2560. Pins from D38 on are in the double row.
 fn arduino(pin: Pin) -> String {
     let digital: &[(Port, [u8; 8])] = &[
         (Port::A, [22, 23, 24, 25, 26, 27, 28, 29]),
@@ -44,7 +44,8 @@ fn arduino(pin: Pin) -> String {
     }
 }
 
-/// The headers of RAMPS 1.4, by the Arduino's name of a pin; of the grbl shield there are many kinds.
+/// The headers of RAMPS 1.4, by the Arduino's name of the pin. The grbl shield is not listed, because there are many
+/// kinds of it.
 const RAMPS: [(&str, &str); 26] = [
     ("A0", "X driver"),
     ("A1", "X driver"),
@@ -74,7 +75,7 @@ const RAMPS: [(&str, &str); 26] = [
     ("A9", "AUX-2"),
 ];
 
-/// A row: what, the pin, the level that is on, the setting.
+/// A row: what is connected, the pin, the level that is on, and the setting.
 struct Wire {
     what: String,
     pin: Pin,
@@ -141,7 +142,7 @@ fn wires(board: &Board) -> Vec<Wire> {
         }
         add("fan".into(), Some(heaters.fan), "high is on", "M106".into());
     }
-    // The first port of an Arduino is its USB; one that is the chip's own has no pins.
+    // The first port of an Arduino is its USB. The first port of a chip with USB of its own has no pins.
     let wired = usize::from(!is_numbered(board));
     for (port, name) in board.serial.iter().zip(["first port", "second port"]).skip(wired) {
         let Some([rx, tx]) = port.usart.pins() else { continue };
@@ -184,12 +185,12 @@ fn header(board: &Board, pin: &str) -> &'static str {
     rows.iter().find(|(name, _)| *name == pin).map_or("", |(_, header)| header)
 }
 
-/// Whether a board has the RP2040, whose pins have numbers.
+/// Whether a board has the RP2040, whose pins are numbered.
 fn is_numbered(board: &Board) -> bool {
     board.motors[0].step.port == Port::Gpio
 }
 
-/// The Arduinos with pins of their own.
+/// Returns the Arduino boards with different pins: the ones that are drawn.
 pub fn drawn() -> impl Iterator<Item = &'static Board> {
     let pins = |board: &Board| wires(board).iter().map(|wire| wire.pin).collect::<Vec<_>>();
     let is_first = move |n: usize| !ALL[..n].iter().any(|other| pins(other) == pins(ALL[n]));
@@ -197,7 +198,7 @@ pub fn drawn() -> impl Iterator<Item = &'static Board> {
     boards.filter(move |(n, _)| is_first(*n)).map(|(_, board)| board)
 }
 
-/// All of it.
+/// Returns the whole page.
 pub fn markdown() -> String {
     let mut text = PREFACE.to_string();
     for board in drawn() {
@@ -230,7 +231,7 @@ pub fn markdown() -> String {
     text.trim_end().to_string() + "\n"
 }
 
-/// A board with numbered pins.
+/// Returns the section of a board with numbered pins.
 fn numbered(board: &Board) -> String {
     let mut text = format!("## {}\n\n{}\n\n", board.name, about(board));
     text += "| what | pin | level | setting |\n|---|---|---|---|\n";
@@ -240,7 +241,8 @@ fn numbered(board: &Board) -> String {
     text + "\n"
 }
 
-/// The headers of a Mega: their pins from left to right, as they lie, USB to the left, and the place of the first.
+/// Returns the headers of a Mega, as they lie with USB to the left: the place of the first pin, and the pins from
+/// left to right.
 fn headers() -> Vec<(f64, f64, Vec<String>)> {
     let digital = |numbers: &[u8]| numbers.iter().map(|n| format!("D{n}")).collect::<Vec<_>>();
     let analog = |from: u8| (from..from + 8).map(|n| format!("A{n}")).collect::<Vec<_>>();
@@ -256,7 +258,7 @@ fn headers() -> Vec<(f64, f64, Vec<String>)> {
     ]
 }
 
-/// A drawing of the board with what is at its pins.
+/// Returns a drawing of the board with the connections of its pins.
 pub fn svg(board: &Board) -> String {
     const PITCH: f64 = 24.0;
     let wires = wires(board);
@@ -275,7 +277,7 @@ pub fn svg(board: &Board) -> String {
     for (x, row, pins) in headers() {
         for (n, pin) in pins.iter().enumerate() {
             let along = n as f64 * PITCH;
-            // Double rows run down at the right edge; the others lie along the upper and the lower one.
+            // Double rows run down at the right edge; the other headers lie along the upper and the lower edge.
             let (px, py) = match row as u8 {
                 0 => (x + along, 205.0),
                 1 => (x + along, 595.0),

@@ -44,7 +44,7 @@ impl Board {
         Board::value_variants()
     }
 
-    /// The Cargo features that its file asks for: dialects and capabilities.
+    /// The Cargo features that the board's file asks for: dialects and capabilities.
     pub fn features(self) -> Result<Vec<String>> {
         let file = root().join(format!("boards/{self}.rs"));
         let text = std::fs::read_to_string(&file);
@@ -52,7 +52,7 @@ impl Board {
         listed(&text).with_context(|| format!("no line `features: &[...]` in {}", file.display()))
     }
 
-    /// Whether its chip is the RP2040; of the others it is the ATmega2560.
+    /// Whether its chip is the RP2040; otherwise it is the ATmega2560.
     pub fn is_rp2040(self) -> bool {
         matches!(self, Board::PicoCnc | Board::PicoCnc6 | Board::SkrPico)
     }
@@ -78,7 +78,7 @@ impl fmt::Display for Board {
     }
 }
 
-/// What `features: &["a", "b"],` lists.
+/// Returns the names that `features: &["a", "b"],` lists; `None` if there is no such list.
 fn listed(text: &str) -> Option<Vec<String>> {
     let (_, rest) = text.split_once("\n    features: &[")?;
     let (list, _) = rest.split_once(']')?;

@@ -1,7 +1,7 @@
 //! `cargo xtask dist`: the files of a release, in `target/dist`.
 //!
-//! For each board a `.hex` that avrdude takes, or the `.uf2` of a boot loader, made from the image that the tests run; the settings as a JSON schema; the licences; and
-//! checksums of all of them.
+//! For each board there is a `.hex` that avrdude takes, or the `.uf2` of a boot loader, made from the image that the
+//! tests run. Further files are the settings as a JSON schema, the licences, and checksums of all files.
 
 mod hex;
 mod sha256;
@@ -18,7 +18,7 @@ use crate::process::root;
 use crate::rp2040::uf2;
 use crate::setup::{self, Scope};
 
-/// Files that are as they are in the repository.
+/// Files that are copied from the repository unchanged.
 const COPIED: [&str; 5] =
     ["docs/settings.schema.json", "LICENSE-MIT", "LICENSE-APACHE", "CHANGELOG.md", "README.md"];
 /// The checksums, as `sha256sum --check` reads them.
@@ -58,7 +58,7 @@ pub fn run() -> Result<()> {
     Ok(())
 }
 
-/// A line for each file: its checksum and its name.
+/// Returns a line for each file: its checksum and its name.
 fn sums(files: &[PathBuf]) -> Result<String> {
     let mut text = String::new();
     for file in files {

@@ -1,9 +1,9 @@
 //! Keeps the documents true: whatever they name in `code` must exist.
 //!
-//! A code span with a slash, or with the ending of a file, is a path from the repository's root or from
-//! `src`. A span that reads like a name of Rust (`Name::method`, `field.other`) must consist of words of
-//! the sources, and two neighbours must stand in one file, or be a module and a word in its file.
-//! Anything else, such as G-code or a command, is left alone, and so are fenced blocks.
+//! A code span with a slash, or with the ending of a file, is a path from the repository's root or from `src`. A span
+//! that reads like a name of Rust (`Name::method`, `field.other`) must consist of words of the sources. Two
+//! neighbouring words must stand in one file, or be a module and a word in its file. Any other span, such as G-code
+//! or a command, is not checked, nor are fenced blocks.
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -24,7 +24,7 @@ const DOCUMENTS: [&str; 7] = [
 const SOURCES: [&str; 9] =
     ["avr-embassy", "src", "boards", "machines", "tests", "xtask", "Cargo.toml", ".cargo", ".ci"];
 
-/// A file of the sources: its path, the words of its path, and those of its text.
+/// A file of the sources: the words of its path, and the words of its text.
 struct Source {
     modules: HashSet<String>,
     words: HashSet<String>,
@@ -80,7 +80,7 @@ fn links(text: &str) -> Vec<(usize, &str)> {
     targets.filter(|(_, target)| !target.contains("://") && !target.starts_with('#')).collect()
 }
 
-/// Whether the file of a link is there, and the heading that it names behind `#`.
+/// Whether a link leads to an existing file, and to an existing heading if the link has a `#`.
 fn leads_somewhere(folder: &Path, target: &str) -> bool {
     let Some((file, heading)) = target.split_once('#') else { return folder.join(target).exists() };
     let text = std::fs::read_to_string(folder.join(file)).unwrap_or_default();
@@ -99,7 +99,7 @@ fn is_path(span: &str) -> bool {
         && (span.trim_end_matches('/').contains('/') || ENDINGS.iter().any(|e| span.ends_with(e)))
 }
 
-/// The parts of a name of Rust; `None` if it is none.
+/// Returns the parts of a name of Rust; `None` if the span is no such name.
 fn parts(span: &str) -> Option<Vec<&str>> {
     let name = span.strip_suffix("()").or(span.strip_suffix('!')).unwrap_or(span);
     let parts: Vec<_> = name.split("::").flat_map(|part| part.split('.')).collect();

@@ -1,4 +1,4 @@
-//! Builds the firmware image of a board, and writes it to one.
+//! Builds the firmware image of a board, and flashes it.
 
 use std::path::{Path, PathBuf};
 
@@ -15,19 +15,23 @@ use crate::setup::{self, Scope};
 use crate::shrink::{self, link};
 use crate::toolchain::Toolchain;
 
-/// Copies of code (`tail-dup-placement`, `rotation-max-header-size`, `jump-threading-threshold`) save no cycle here: without them the image
-/// is 900 bytes smaller. What is taken out of a loop (`disable-machine-licm`) has to be kept, on a CPU with few registers, in memory: without
-/// that and with few spills (`split-spill-mode`) it is 1,800 bytes smaller, and no slower. `--relax`: the linker shortens calls and jumps to what is near, 1,600 bytes and a cycle each. It may, for
-/// LLVM leaves it a relocation for every branch. `__TEXT_REGION_LENGTH__`: what the compiler wrote may be larger than the flash, since it is
-/// made smaller behind it; the image is held against the flash by [`elf::check`]. For `CHIP` stands the chip's name.
+/// Flags of the compiler. Copies of code (`tail-dup-placement`, `rotation-max-header-size`,
+/// `jump-threading-threshold`) save no cycle here, and without them the image is 900 bytes smaller. A value that is
+/// taken out of a loop must be kept in memory on a CPU with few registers. With `disable-machine-licm` against that,
+/// and with few spills (`split-spill-mode`), the image is 1,800 bytes smaller and no slower. With `--relax` the
+/// linker shortens calls and jumps over short distances, which saves 1,600 bytes and a cycle each. It can do that
+/// because LLVM leaves it a relocation for every branch. `__TEXT_REGION_LENGTH__` allows the compiler's program to be
+/// larger than the flash, because it is made smaller afterwards; [`elf::check`] compares the image with the flash.
+/// `CHIP` is replaced by the chip's name.
 const FLAGS: &str = "-C target-cpu=CHIP -C llvm-args=-inline-threshold=30 -C llvm-args=-tail-dup-placement=false \
                      -C llvm-args=-rotation-max-header-size=4 -C llvm-args=-jump-threading-threshold=3 -C llvm-args=-disable-machine-licm \
                      -C llvm-args=-split-spill-mode=size -C jump-tables=no \
                      -C linker=target/avr/keep-gcc -C link-arg=-mmcu=CHIP -C link-arg=-Wl,--gc-sections -C link-arg=-Wl,--relax \
                      -C link-arg=-Wl,--defsym=__TEXT_REGION_LENGTH__=0x60000";
 
-/// The linker in `FLAGS`: a script that writes down how it was called. Its path does not name the checkout, for cargo would build all
-/// anew in a copy; `rustc` knows by the end of the name which options it takes.
+/// The linker in `FLAGS`: a script that records its arguments. Its path does not name the checkout, because cargo
+/// would then build everything anew in a copied checkout. `rustc` chooses the style of options by the end of the
+/// name.
 const LINKER: &str = "target/avr/keep-gcc";
 
 /// The flags for a chip.
@@ -35,23 +39,24 @@ fn flags(chip: &Chip) -> String {
     FLAGS.replace("CHIP", chip.name)
 }
 
-/// Where cargo builds for AVR: one directory for all boards and chips, so that what runs on the host is built once.
+/// Returns the folder in which cargo builds for AVR. All boards and chips share it, so that programs for the host are
+/// built once.
 fn target() -> PathBuf {
     root().join("target/avr")
 }
 
-/// Where the images lie: `BOARD.elf`, or `BOARD-MACHINE.elf` if it is not for the usual machine. The name of one that lacks features says
-/// so: `BOARD-without-FEATURE.elf`.
+/// Returns the folder of the images: `BOARD.elf`, or `BOARD-MACHINE.elf` if the image is not for the default machine.
+/// An image that lacks features is `BOARD-without-FEATURE.elf`.
 pub fn directory() -> PathBuf {
     root().join("target/firmware")
 }
 
-/// Where the image of a board and a machine lies once it is built.
+/// Returns the path of the image of a board and a machine.
 pub fn image(board: Board, machine: Machine) -> PathBuf {
     image_without(board, machine, &[])
 }
 
-/// Where the image of a board without some of its features lies once it is built.
+/// Returns the path of the image of a board without some of its features.
 fn image_without(board: Board, machine: Machine, without: &[String]) -> PathBuf {
     let machine = match machine == Machine::default() {
         true => String::new(),
@@ -61,12 +66,12 @@ fn image_without(board: Board, machine: Machine, without: &[String]) -> PathBuf 
     directory().join(format!("{board}{machine}{lacks}.elf"))
 }
 
-/// Builds and checks the image; returns where it lies.
+/// Builds and checks the image; returns its path.
 pub fn build(board: Board, machine: Machine) -> Result<PathBuf> {
     build_without(board, machine, &[])
 }
 
-/// Builds and checks the image without some of the board's features; returns where it lies.
+/// Builds and checks the image without some of the board's features; returns its path.
 pub fn build_without(board: Board, machine: Machine, without: &[String]) -> Result<PathBuf> {
     if board.is_rp2040() {
         let features = features(board, machine, without)?;
@@ -75,8 +80,8 @@ pub fn build_without(board: Board, machine: Machine, without: &[String]) -> Resu
     compile(board, machine, without)?.finish()
 }
 
-/// What the compiler has written for an image, whose program is to be made smaller and linked: half a minute, in which the compiler may be
-/// at work on the next image.
+/// The compiler's output for an image, whose program is still to be made smaller and linked. That takes half a
+/// minute, in which the compiler may work on the next image.
 pub struct Compiled {
     text: PathBuf,
     linked: PathBuf,
@@ -84,13 +89,13 @@ pub struct Compiled {
 }
 
 impl Compiled {
-    /// Links and checks the image; returns where it lies.
+    /// Links and checks the image; returns its path.
     pub fn finish(&self) -> Result<PathBuf> {
         make_small(&self.text, &self.linked, &self.image)
     }
 }
 
-/// An image for AVR, compiled.
+/// Compiles an image for AVR.
 pub fn compile(board: Board, machine: Machine, without: &[String]) -> Result<Compiled> {
     let features = features(board, machine, without)?;
     let image = image_without(board, machine, without);
@@ -111,19 +116,19 @@ pub fn compile(board: Board, machine: Machine, without: &[String]) -> Result<Com
     Ok(Compiled { text, linked, image })
 }
 
-/// Builds and checks the image of a board without any capability, dialects apart; returns where it lies.
+/// Builds and checks the image of a board without any capability except dialects; returns its path.
 pub fn build_bare(board: Board) -> Result<PathBuf> {
     compile_bare(board)?.finish()
 }
 
-/// The image of a board for AVR without any capability, dialects apart, compiled.
+/// Compiles the image of a board for AVR without any capability except dialects.
 pub fn compile_bare(board: Board) -> Result<Compiled> {
     let is_capability = |feature: &String| !feature.starts_with("dialect-");
     let without: Vec<_> = board.features()?.into_iter().filter(is_capability).collect();
     compile(board, Machine::default(), &without)
 }
 
-/// The Cargo features of an image, separated by commas: what the board's file says, but for some.
+/// Returns the Cargo features of an image, separated by commas: those in the board's file, without some of them.
 fn features(board: Board, machine: Machine, without: &[String]) -> Result<String> {
     let own = board.features()?;
     if let Some(unknown) = without.iter().find(|feature| !own.contains(feature)) {
@@ -135,10 +140,11 @@ fn features(board: Board, machine: Machine, without: &[String]) -> Result<String
     Ok(all.join(","))
 }
 
-/// Links the program that the compiler wrote a second time, made smaller; refuses one that would not work: see [`elf`].
+/// Links the compiler's program a second time, made smaller. Refuses a program that would not work: see [`elf`].
 ///
-/// `rustc` makes a text and an object by two runs of its back end, which need not agree. So the image comes from the text, and so does
-/// the program in which defects of the compiler are looked for: shared code would hide them.
+/// `rustc` makes a text and an object in two runs of its back end, which need not agree. So the image is made from
+/// the text. The program that is searched for defects of the compiler is also made from the text, without shared
+/// code, which would hide the defects.
 fn make_small(text: &Path, linked: &Path, elf: &Path) -> Result<PathBuf> {
     let (plain, small) = (text.with_file_name("plain.elf"), text.with_file_name("small.elf"));
     if !is_newer(&small, &[text, linked, &std::env::current_exe()?]) {
@@ -155,7 +161,7 @@ fn make_small(text: &Path, linked: &Path, elf: &Path) -> Result<PathBuf> {
     keep(&small, elf)
 }
 
-/// Whether a file was made after all of the others.
+/// Whether a file was made after all the others.
 fn is_newer(made: &Path, others: &[&Path]) -> bool {
     let time = |path: &Path| std::fs::metadata(path).and_then(|data| data.modified()).ok();
     time(made).is_some_and(|made| {
@@ -163,7 +169,7 @@ fn is_newer(made: &Path, others: &[&Path]) -> bool {
     })
 }
 
-/// Copies the image to its own name and refuses one that would not work: see [`elf::check`].
+/// Copies the image to its own name. Refuses an image that would not work: see [`elf::check`].
 fn keep(built: &Path, kept: &Path) -> Result<PathBuf> {
     std::fs::create_dir_all(kept.parent().unwrap_or(kept))?;
     std::fs::copy(built, kept).with_context(|| format!("cannot copy {}", built.display()))?;
@@ -171,10 +177,10 @@ fn keep(built: &Path, kept: &Path) -> Result<PathBuf> {
     Ok(kept.to_owned())
 }
 
-/// Builds and checks the examples of the runtime, `avr-embassy`, and what else runs on a bare chip; returns the folder of the examples, where they lie as
-/// `CHIP/NAME.elf`.
+/// Builds and checks the examples of the runtime, `avr-embassy`, and further programs for a bare chip. Returns the
+/// folder of the examples, which are `CHIP/NAME.elf` there.
 ///
-/// That of a clock of which a millisecond is no whole number of counts is `CHIP-uneven-clock/blink.elf`.
+/// The example for a clock of which a millisecond is no whole number of counts is `CHIP-uneven-clock/blink.elf`.
 pub fn build_examples() -> Result<PathBuf> {
     let folder = directory().join("avr-embassy");
     for chip in [ATMEGA2560, ATMEGA1284P] {
@@ -186,8 +192,8 @@ pub fn build_examples() -> Result<PathBuf> {
     Ok(folder)
 }
 
-/// Builds and checks the images that try parts of Kerf on the chip of every board, as they are compiled for the usual board. They lie in `parts` beside the
-/// images of boards.
+/// Builds and checks the images that test parts of Kerf on the chip of every board, compiled as for the default
+/// board. They are in `parts` beside the images of boards.
 fn build_parts() -> Result<()> {
     let features = features(Board::default(), Machine::default(), &[])?;
     let mut cargo = cargo_for(&ATMEGA2560)?;
@@ -203,7 +209,7 @@ fn build_examples_of(chip: &Chip, feature: &str, names: &[&str], folder: &Path) 
     keep_examples(cargo, chip, names, folder)
 }
 
-/// What builds for a chip.
+/// Returns the cargo command that builds for a chip.
 fn cargo_for(chip: &Chip) -> Result<std::process::Command> {
     let rust = Toolchain::find().context("no Rust that can build for AVR; `cargo xtask setup`")?;
     link::write_script(&root().join(LINKER))?;
@@ -214,7 +220,7 @@ fn cargo_for(chip: &Chip) -> Result<std::process::Command> {
     Ok(cargo)
 }
 
-/// Has cargo build examples of a package for a chip, and checks and copies them into a folder.
+/// Lets cargo build examples of a package for a chip. Checks them and copies them into a folder.
 fn keep_examples(
     mut cargo: std::process::Command,
     chip: &Chip,
@@ -232,7 +238,7 @@ fn keep_examples(
 
 /// The examples of `avr-embassy`.
 const EXAMPLES: [&str; 4] = ["blink", "echo", "preempt", "costs"];
-/// What of `tests/chip` is an image.
+/// The programs of `tests/chip` that are built as images.
 const PARTS: [&str; 1] = ["arithmetic"];
 
 /// `cargo xtask flash`
@@ -244,7 +250,8 @@ pub struct FlashArgs {
     /// The machine whose settings are the defaults
     #[arg(long, value_enum, default_value_t)]
     machine: Machine,
-    /// The board's serial port, such as /dev/ttyACM0; of a Pico in its boot loader the drive that it shows, such as /media/me/RPI-RP2
+    /// The board's serial port, such as /dev/ttyACM0; for a Pico in its boot loader the drive that it shows, such as
+    /// /media/me/RPI-RP2
     #[arg(long)]
     port: String,
     /// Only print the command
@@ -252,7 +259,7 @@ pub struct FlashArgs {
     dry_run: bool,
 }
 
-/// Copies an image to the drive of a boot loader, which writes it and starts it.
+/// Copies an image to the drive of a boot loader, which writes the image to flash and starts it.
 fn copy_to_drive(image: &Path, args: &FlashArgs) -> Result<()> {
     let to = Path::new(&args.port).join("kerf.uf2");
     println!("cp {} {}", image.display(), to.display());
@@ -263,7 +270,7 @@ fn copy_to_drive(image: &Path, args: &FlashArgs) -> Result<()> {
     Ok(())
 }
 
-/// Builds, then writes the image through the boot loader of the board.
+/// Builds the image, then writes it through the boot loader of the board.
 pub fn flash(args: &FlashArgs) -> Result<()> {
     setup::ensure(if args.board.is_rp2040() { Scope::Arm } else { Scope::Firmware })?;
     let elf = build(args.board, args.machine)?;

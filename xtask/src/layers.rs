@@ -1,15 +1,15 @@
-//! Who uses whom in `src`: computed from the sources, and held against the table of layers in ARCHITECTURE.md.
+//! The dependencies within `src`, computed from the sources and compared with the table of layers in ARCHITECTURE.md.
 //!
-//! A **unit** is a folder of `src` or a file beside these. What a unit uses is every path of its code that begins with `crate::`, or that
-//! `super::` leads out of the unit, but for tests. The table's third column lists paths that the units of the first may use;
-//! a path stands for all below it.
+//! A **unit** is a folder of `src`, or a file of `src` outside these folders. A unit uses every path of its code,
+//! tests excepted, that begins with `crate::` or that leads out of the unit by `super::`. The table's third column
+//! lists the paths that the units of the first column may use. A path stands for everything below it.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use crate::process::root;
 
-/// Files of a folder that are a unit of their own: how their paths begin, and the unit's name.
+/// Files in a folder that are a unit of their own: the beginnings of their paths, and the name of the unit.
 const APART: [(&str, &str); 6] = [
     ("hal/primitives", "primitives"),
     ("hal/progmem", "primitives"),
@@ -18,20 +18,20 @@ const APART: [(&str, &str); 6] = [
     ("hal/rp2040/PRIMITIVE", "primitives"),
     ("gcode/codes/docs", "docs"),
 ];
-/// The bottom of `hal`: what is arithmetic or reads flash, and touches no register.
+/// The bottom of `hal`: modules for arithmetic or for reading flash, which touch no register.
 const PRIMITIVES: [&str; 4] = ["arithmetic", "flash", "float", "text"];
-/// Macros of theirs, which the crate has at its root.
+/// Macros of these modules, which are at the root of the crate.
 const MACROS: [&str; 5] = ["flash_bytes", "named", "plain", "progmem", "text"];
-/// Not layers: they put the others together.
+/// Units that are no layers: they put the others together.
 const ENTRIES: [&str; 2] = ["lib", "main"];
 
-/// A path as it is used: its words.
+/// A path that is used, as words.
 type Used = Vec<String>;
 
-/// What each unit uses, each with a file that does.
+/// For each unit, the paths that it uses, each with a file that uses it.
 type Uses = BTreeMap<String, BTreeMap<String, String>>;
 
-/// Code with comments, strings and characters left out.
+/// Returns code without comments, strings and characters.
 fn code(text: &str) -> String {
     let (mut code, mut rest) = (String::new(), text);
     while let Some(c) = rest.chars().next() {
@@ -88,7 +88,7 @@ fn character(text: &str) -> usize {
     end.map_or(0, |at| at + 2)
 }
 
-/// Code without what is for tests alone, and the modules in other files that are.
+/// Returns code without parts that are for tests only, and the names of test modules in other files.
 fn without_tests(code: &str) -> (String, Vec<String>) {
     let (mut kept, mut modules, mut rest) = (String::new(), Vec::new(), code);
     while let Some(at) = rest.find("#[cfg(test)]") {
@@ -107,7 +107,7 @@ fn without_tests(code: &str) -> (String, Vec<String>) {
     (kept, modules)
 }
 
-/// The length of a block in braces, or of the one character that ends an item without one.
+/// Returns the length of a block in braces, or 1 if the item ends with a single character.
 fn block(text: &str) -> usize {
     let mut depth = 0;
     for (at, c) in text.char_indices() {
@@ -123,7 +123,7 @@ fn block(text: &str) -> usize {
     text.len()
 }
 
-/// The paths that a tree of `use` stands for, or one path of an expression. Adds them; returns what follows.
+/// Adds the paths of a `use` tree, or the single path of an expression. Returns the text behind it.
 fn tree<'a>(text: &'a str, before: &[String], found: &mut Vec<Used>) -> &'a str {
     let text = text.trim_start();
     if let Some(mut list) = text.strip_prefix('{') {
@@ -154,14 +154,15 @@ fn tree<'a>(text: &'a str, before: &[String], found: &mut Vec<Used>) -> &'a str 
         rest = renamed.trim_start().trim_start_matches(is_word);
     }
     if end == 0 && rest.len() == text.len() {
-        // Neither a name nor a list: go on behind it.
+        // Neither a name nor a list: continues behind this character.
         rest = text.get(1..).unwrap_or_default();
     }
     found.push(path);
     rest
 }
 
-/// The paths from the crate's root that code of a file uses which is so many modules deep.
+/// Returns the paths from the crate's root that a file's code uses. `depth` is the number of modules that the file is
+/// deep.
 fn paths(code: &str, depth: usize) -> Vec<Used> {
     let mut found = Vec::new();
     let out = "super::".repeat(depth);
@@ -182,14 +183,14 @@ fn collect(path: &Path, files: &mut Vec<PathBuf>) {
     }
 }
 
-/// The modules of a file: its path below `src` without endings.
+/// Returns the module path of a file below `src`, without endings.
 fn modules(file: &Path) -> String {
     let below = file.strip_prefix(root().join("src")).expect("in src").with_extension("");
     let below = below.to_string_lossy().replace('\\', "/");
     below.strip_suffix("/mod").unwrap_or(&below).to_owned()
 }
 
-/// The unit of a module.
+/// Returns the unit of a module.
 fn unit(modules: &str) -> String {
     let begins = |path: &str| {
         let rest = |path: &str| modules.strip_prefix(path).map(|rest| !rest.starts_with(is_word));
@@ -205,7 +206,7 @@ fn unit(modules: &str) -> String {
     apart.map_or_else(folder, |(_, name)| name).to_owned()
 }
 
-/// A path as the table has it: what is a part of a folder but a unit of its own begins with the unit's name.
+/// Returns a path as the table writes it. The path of a unit of its own within a folder begins with the unit's name.
 fn shown(path: &[String]) -> String {
     let words: Vec<_> = path.iter().map(String::as_str).collect();
     let primitive = |name: &str| PRIMITIVES.contains(&name);
@@ -218,7 +219,7 @@ fn shown(path: &[String]) -> String {
     }
 }
 
-/// Who uses what.
+/// Returns what each unit uses.
 fn uses() -> Uses {
     let mut files = Vec::new();
     collect(&root().join("src"), &mut files);
@@ -248,18 +249,18 @@ fn uses() -> Uses {
     uses
 }
 
-/// Whether a path is another, or one below it.
+/// Whether a path equals another path or is below it.
 fn begins_with(path: &str, other: &str) -> bool {
     path.strip_prefix(other).is_some_and(|rest| rest.is_empty() || rest.starts_with("::"))
 }
 
-/// A row of the table: its units, and what they may use; `None` for everything.
+/// A row of the table: its units, and the paths that they may use; `None` for everything.
 struct Row {
     units: Vec<String>,
     may_use: Option<Vec<String>>,
 }
 
-/// The rows of the table of layers that are about units of `src`.
+/// Returns the rows of the table of layers that are about units of `src`.
 fn rows() -> Vec<Row> {
     let tour = std::fs::read_to_string(root().join("ARCHITECTURE.md")).expect("the tour");
     let lines = tour.lines().skip_while(|line| !line.starts_with("| folder |"));
@@ -319,7 +320,7 @@ fn there_is_no_circle() {
         let first = |path: &String| path.split("::").next().unwrap_or_default().to_owned();
         used.map(first).filter(|used| used != unit).collect()
     };
-    // Whoever uses only units that are settled is settled.
+    // A unit is settled if it uses only settled units.
     let mut open: BTreeSet<_> = uses.keys().cloned().collect();
     loop {
         let settled: Vec<_> =
@@ -336,7 +337,7 @@ fn there_is_no_circle() {
     assert!(open.is_empty(), "in a circle:\n{}", circle.collect::<Vec<_>>().join("\n"));
 }
 
-/// Which chip it is, is asked in the folder `hal` alone, and where an image begins.
+/// Only the folder `hal`, and the place where an image begins, depend on the architecture.
 #[test]
 fn no_layer_asks_for_the_architecture() {
     let mut files = Vec::new();
@@ -348,7 +349,7 @@ fn no_layer_asks_for_the_architecture() {
     assert_eq!(asking, ["hal", "main", "primitives"].map(str::to_owned).into());
 }
 
-/// But by the contract, `hal::contract` and `hal::primitives`. On the host there is also the machine, for tests.
+/// Other layers use `hal` only by `hal::contract` and `hal::primitives`. On the host, tests also use its machine.
 #[test]
 fn no_layer_knows_the_chip() {
     let uses = uses();
@@ -363,14 +364,14 @@ fn the_chip_knows_nothing_of_motion() {
     let uses = uses();
     let known = uses["hal"].keys().filter(|path| begins_with(path, "motion"));
     assert_eq!(known.count(), 0);
-    // What it has to know of steps is here.
+    // What `hal` must know of steps is in `dda`.
     assert!(
         uses["hal"].contains_key("dda::Segment")
             && uses["dda"].keys().all(|path| begins_with(path, "boards"))
     );
 }
 
-/// The list that is held against the number of timers when Kerf is built.
+/// The list is compared with the number of timers when Kerf is built.
 #[test]
 fn tasks_that_wait_for_a_time_are_counted() {
     let mut files = Vec::new();

@@ -7,7 +7,7 @@ use clap::ValueEnum;
 /// A machine whose settings are the defaults of an image.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Machine {
-    /// A machine that nothing is known of
+    /// A machine of which nothing is known
     #[default]
     Careful,
     /// A router of the Shapeoko class

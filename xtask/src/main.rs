@@ -1,13 +1,13 @@
 //! Developer commands of Kerf: `cargo xtask help` lists them.
 //!
-//! | module | for |
+//! | module | purpose |
 //! |---|---|
 //! | [`setup`] | finds the tools, installs what is missing |
-//! | [`toolchain`] | which Rust builds for AVR, and its environment |
+//! | [`toolchain`] | finds the Rust that builds for AVR, and sets its environment |
 //! | [`chips`] | the chips that images are built for |
 //! | [`firmware`] | builds the image of a board, flashes it |
-//! | [`shrink`] | makes the image smaller before the link |
-//! | [`elf`] | what is in an image: sizes, stack, what must not be in it |
+//! | [`shrink`] | makes the image smaller before it is linked |
+//! | [`elf`] | examines an image: sizes, stack, defects |
 //! | [`size`], [`caps`] | prints and limits what an image takes |
 //! | [`rp2040`] | boards with another chip: images, UF2, the emulator |
 //! | [`dist`] | writes the files of a release |
@@ -19,10 +19,10 @@
 //! | [`web`] | builds the page with the firmware in it, serves and tests it |
 //! | [`checks`] | everything that must pass before a merge |
 //! | [`jobs`] | writes the example jobs |
-//! | [`nist`] | what another interpreter makes of G-code, to compare with |
+//! | [`nist`] | the motions of another interpreter, for comparison |
 //! | `docs` | test: what the documents name exists |
-//! | `layers` | test: who uses whom is what ARCHITECTURE.md says |
-//! | `seam` | test: dialects are known to their table alone |
+//! | `layers` | test: dependencies agree with ARCHITECTURE.md |
+//! | `seam` | test: only the table of dialects knows the dialects |
 
 mod boards;
 mod caps;
@@ -82,7 +82,7 @@ enum Command {
     /// Look for inputs that break the interpreter or the machine, by fuzzing; fail on a finding.
     /// Corpus and findings are kept in target/fuzz, and the next run goes on from there
     Fuzz(fuzz::FuzzArgs),
-    /// Run real senders of G-code, such as CNCjs and bCNC, against the simulated board
+    /// Run real G-code senders, such as CNCjs and bCNC, against the simulated board
     Senders(senders::SendersArgs),
     /// Build the page with the firmware in it: a folder of static files; the last line is `page: FOLDER`
     Web(web::WebArgs),
@@ -94,11 +94,11 @@ enum Command {
     Settings(settings::SettingsArgs),
     /// Write the files of a release to target/dist: a .hex for each board, the settings as a schema, licences, checksums
     Dist,
-    /// Write the example jobs again
+    /// Write the example jobs anew
     Jobs,
-    /// Write the pages of `docs` again that are made from tables: G-code, settings, codes, wiring
+    /// Write the pages of `docs` anew that are generated from tables: G-code, settings, codes, wiring
     Docs,
-    /// Write the motions of `tests/nist` again, by a NIST-derived interpreter (Debian 12)
+    /// Write the motions of `tests/nist` anew, by a NIST-derived interpreter (Debian 12)
     Nist(nist::Args),
 }
 
@@ -113,7 +113,7 @@ struct BuildArgs {
     /// A feature of the board that the image is to lack, such as `help`; may be given several times
     #[arg(long, value_name = "FEATURE")]
     without: Vec<String>,
-    /// Build what the tests run instead: the images of all boards, one without capabilities, and the examples
+    /// Instead, build what the tests run: the images of all boards, one without capabilities, and the examples
     #[arg(long, conflicts_with_all = ["board", "machine", "without"])]
     all: bool,
 }
@@ -151,7 +151,7 @@ fn dispatch(command: Command) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Kerf's tests write it, so that this program need not be built with Kerf in it.
+/// The test of Kerf that writes the pages, so that this program need not be built with Kerf in it.
 const DESCRIBE: [&str; 9] =
     ["test", "--quiet", "--package", "kerf", "--test", "host", "docs::write", "--", "--ignored"];
 
@@ -165,8 +165,8 @@ fn build(args: &BuildArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Images for AVR and for the RP2040 beside each other: most of the time of each is a link, which takes one core. For AVR a program is made
-/// smaller beside the compilation of the next one.
+/// Builds images for AVR and for the RP2040 at the same time: most of the time of each is a link, which takes one
+/// core. For AVR a program is made smaller while the next one is being compiled.
 fn build_all() -> anyhow::Result<()> {
     setup::ensure(Scope::Arm)?;
     let (arm, avr): (Vec<_>, Vec<_>) = Board::all().iter().partition(|board| board.is_rp2040());
@@ -181,7 +181,7 @@ fn build_all() -> anyhow::Result<()> {
         let avr = all
             .chain(std::iter::once_with(|| firmware::compile_bare(Board::Ramps14)))
             .try_for_each(|image| {
-                // Who has failed takes no more.
+                // The receiver takes no more images after an error.
                 let _ = compiled.send(image?);
                 anyhow::Ok(())
             })

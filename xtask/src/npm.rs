@@ -1,4 +1,4 @@
-//! Packages of npm, in a folder below `target`: installed once for each version of the list.
+//! Packages of npm, in a folder below `target`, installed once for each version of the list.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -7,11 +7,11 @@ use anyhow::{Context, Result};
 
 use crate::process::{root, run};
 
-/// What is to be installed, as npm reads it.
+/// The list of packages to install, as npm reads it.
 const PACKAGES: &str = "package.json";
 
-/// Installs what the `package.json` in the folder `list` names, unless an earlier run did it; the folder with `node_modules`, which is
-/// `target/NAME`. No scripts of packages run.
+/// Installs the packages that the `package.json` in the folder `list` names, unless an earlier run has done so.
+/// Returns the folder with `node_modules`, which is `target/NAME`. Install scripts of packages do not run.
 pub fn install(name: &str, list: &Path) -> Result<PathBuf> {
     let folder = root().join("target").join(name);
     let wanted = list.join(PACKAGES);

@@ -1,4 +1,4 @@
-//! Child processes, and where the repository is.
+//! Child processes, and the root of the repository.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -7,10 +7,10 @@ use std::sync::LazyLock;
 
 use anyhow::{Context, Result, ensure};
 
-/// The repository's root, worked out at run time.
+/// Returns the repository's root, found at run time.
 ///
-/// Cargo takes a target folder that was copied with its checkout for up to date, so that a path fixed at compile time
-/// would be that of the original.
+/// Cargo considers a target folder that was copied with its checkout up to date. A path fixed at compile time would
+/// then be that of the original checkout.
 pub fn root() -> &'static Path {
     static ROOT: LazyLock<PathBuf> = LazyLock::new(|| {
         let program = std::env::current_exe().unwrap_or_default();
@@ -20,7 +20,7 @@ pub fn root() -> &'static Path {
     &ROOT
 }
 
-/// The repository of the package that cargo has started, else of the program in its target folder.
+/// Returns the repository of the package that cargo has started; else that of the program in its target folder.
 fn find_root(package: Option<OsString>, program: &Path) -> Option<PathBuf> {
     let package = package.map(PathBuf::from).filter(|dir| dir.ends_with("xtask"));
     let starts = package.iter().map(PathBuf::as_path).chain([program]);
@@ -28,31 +28,32 @@ fn find_root(package: Option<OsString>, program: &Path) -> Option<PathBuf> {
     folders.find(|dir| dir.join("xtask/Cargo.toml").is_file()).map(Path::to_owned)
 }
 
-/// The cargo that started this program, for everything that runs on the host.
+/// Returns the cargo that started this program, for everything that runs on the host.
 pub fn host_cargo() -> Command {
     Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
 }
 
-/// Runs to the end; a failure names the program.
+/// Runs a command to its end. The error of a failure names the program.
 pub fn run(command: &mut Command) -> Result<()> {
     let status = status(command)?;
     ensure!(status.success(), "`{}` failed ({status})", shown(command));
     Ok(())
 }
 
-/// Runs to the end.
+/// Runs a command to its end and returns its status.
 pub fn status(command: &mut Command) -> Result<ExitStatus> {
     command.status().with_context(|| format!("cannot run `{}`", shown(command)))
 }
 
-/// Runs to the end and passes the child's exit code on.
+/// Runs a command to its end and passes its exit code on.
 pub fn pass_through(command: &mut Command) -> Result<ExitCode> {
     let status = status(command)?;
     let code = status.code().and_then(|code| u8::try_from(code).ok());
     Ok(code.map_or(ExitCode::FAILURE, ExitCode::from))
 }
 
-/// Becomes the program, where that can be done: who ends this process by its number ends the program then, and nothing stays behind.
+/// Replaces this process by the program where the system supports it. Then ending this process by its number ends the
+/// program, and nothing stays behind.
 pub fn become_program(command: &mut Command) -> Result<ExitCode> {
     #[cfg(unix)]
     {
@@ -63,7 +64,7 @@ pub fn become_program(command: &mut Command) -> Result<ExitCode> {
     pass_through(command)
 }
 
-/// What the program prints on its standard output.
+/// Runs a command and returns its standard output.
 pub fn output(command: &mut Command) -> Result<String> {
     let output = command.stdin(Stdio::null()).stderr(Stdio::inherit()).output();
     let output = output.with_context(|| format!("cannot run `{}`", shown(command)))?;
@@ -71,19 +72,19 @@ pub fn output(command: &mut Command) -> Result<String> {
     Ok(String::from_utf8_lossy(&output.stdout).into_owned())
 }
 
-/// What the program prints when it works, without a word when it does not.
+/// Runs a command silently and returns its standard output; `None` if it fails.
 pub fn probe(command: &mut Command) -> Option<String> {
     let output = command.stdin(Stdio::null()).stderr(Stdio::null()).output().ok()?;
     output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
 }
 
-/// Where a program lies on the search path.
+/// Returns the path of a program on the search path; `None` if it is not there.
 pub fn which(program: &str) -> Option<PathBuf> {
     let path = std::env::var_os("PATH")?;
     std::env::split_paths(&path).map(|dir| dir.join(program)).find(|file| file.is_file())
 }
 
-/// The command as one would type it.
+/// Returns the command as one would type it.
 pub fn shown(command: &Command) -> String {
     let words = std::iter::once(command.get_program()).chain(command.get_args());
     words.map(|word| word.to_string_lossy()).collect::<Vec<_>>().join(" ")
@@ -107,16 +108,16 @@ mod tests {
         let package = |root: &Path| Some(root.join("xtask").into_os_string());
         let program = |root: &Path| root.join("target/debug/xtask");
         assert_eq!(find_root(package(&copy), &program(&copy)).as_ref(), Some(&copy));
-        // Cargo's word counts: the target folder may be anywhere.
+        // Cargo's information is used, because the target folder may be anywhere.
         assert_eq!(find_root(package(&copy), &program(&original)).as_ref(), Some(&copy));
         assert_eq!(find_root(None, &program(&copy)).as_ref(), Some(&copy));
-        // Started by another package's cargo.
+        // The program was started by another package's cargo.
         let other = Some(original.clone().into_os_string());
         assert_eq!(find_root(other, &program(&copy)).as_ref(), Some(&copy));
         assert_eq!(find_root(None, Path::new("/xtask")), None);
     }
 
-    /// Macros that fix a place at compile time; what they say is wrong in a copied checkout.
+    /// Macros that fix a path at compile time. The path is wrong in a copied checkout.
     const FIXED_PLACES: [&str; 3] =
         ["env!(\"CARGO_MANIFEST_DIR", "env!(\"CARGO_TARGET_TMPDIR", "env!(\"CARGO_BIN_EXE"];
 

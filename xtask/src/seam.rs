@@ -1,12 +1,12 @@
-//! Dialects stay behind their interface: nothing of the firmware knows one by name but the table of dialects.
+//! Dialects stay behind their interface: only the table of dialects in the firmware knows a dialect by name.
 //!
-//! Tools of the host may: they print the numbers and texts of TinyG.
+//! Tools for the host may know dialects: they print the numbers and texts of TinyG.
 
 use std::path::{Path, PathBuf};
 
 use crate::process::root;
 
-/// Where a dialect may be named: its own folder, the table, and tools.
+/// Paths where a dialect may be named: its own folder, the table, and tools.
 const KNOWN: [&str; 7] = [
     "src/protocol/grbl/",
     "src/protocol/reprap/",
@@ -24,10 +24,10 @@ fn collect(path: &Path, files: &mut Vec<PathBuf>) {
     }
 }
 
-/// The lines of a file that name a dialect.
+/// Returns the lines of a file that name a dialect.
 fn naming<'a>(text: &'a str, dialects: &[String]) -> Vec<&'a str> {
     let names = |line: &&str| {
-        // Not at the end of a longer word.
+        // The name must not be the end of a longer word.
         let is_word = |at: usize| {
             at == 0
                 || !line.as_bytes()[at - 1].is_ascii_alphanumeric()
@@ -43,7 +43,7 @@ fn naming<'a>(text: &'a str, dialects: &[String]) -> Vec<&'a str> {
     text.lines().filter(names).collect()
 }
 
-/// The folders beside the interface.
+/// Returns the names of the dialects: the folders beside the interface.
 fn dialects() -> Vec<String> {
     let entries = std::fs::read_dir(root().join("src/protocol")).expect("the interface");
     let folders = entries.flatten().filter(|entry| entry.path().is_dir());

@@ -25,22 +25,22 @@ pub struct RunArgs {
     /// The machine whose settings are the defaults. The lathe has a spindle with an encoder, and its threads are checked
     #[arg(long, value_enum, default_value_t)]
     machine: Machine,
-    /// A setting sent before the job, as the sender would: '{"xvm":800}'; with @FILE each line of a file
+    /// A setting to send before the job, as a sender would: '{"xvm":800}'; @FILE sends each line of a file
     #[arg(long, value_name = "JSON|@FILE")]
     set: Vec<String>,
     /// The speed of the serial line, which the firmware is told to change to
     #[arg(long)]
     baud: Option<u32>,
-    /// Write what happened to this file
+    /// Write a report to this file
     #[arg(long, value_name = "FILE.json")]
     report: Option<PathBuf>,
-    /// Write the pins' waveforms to this file
+    /// Write the waveforms of the pins to this file
     #[arg(long, value_name = "FILE.vcd")]
     vcd: Option<PathBuf>,
-    /// Draw path, velocity, acceleration and jerk, as the steps made them, into this file
+    /// Draw path, velocity, acceleration and jerk from the steps into this file
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
-    /// The seconds that the curves of the plot show
+    /// The span of time that the curves of the plot show, in seconds
     #[arg(long, value_name = "FROM..TO", requires = "plot")]
     span: Option<String>,
     /// The milliseconds over which the plot is smoothed
@@ -57,13 +57,13 @@ pub struct ServeArgs {
     /// The machine whose settings are the defaults
     #[arg(long, value_enum, default_value_t)]
     machine: Machine,
-    /// How many times faster than a real board, or `max`
+    /// How many times faster than real time to run, or `max`
     #[arg(long, value_name = "N|max")]
     speed: Option<String>,
     /// Where to put a link to the serial port
     #[arg(long, value_name = "PATH")]
     link: Option<PathBuf>,
-    /// Let avr-gdb in at this port of TCP
+    /// Let avr-gdb connect to this TCP port
     #[arg(long, value_name = "PORT")]
     gdb: Option<u16>,
 }
@@ -71,15 +71,15 @@ pub struct ServeArgs {
 /// `cargo xtask bench`
 #[derive(Args)]
 pub struct BenchArgs {
-    /// Measure this row only; may be given more than once
+    /// Measure only this row; may be given more than once
     #[arg(long, value_name = "NAME")]
     row: Vec<String>,
-    /// The board: the one that others were measured on, or `pico-cnc`
+    /// The board: the one that the other firmwares were measured on, or `pico-cnc`
     #[arg(long, value_enum, default_value_t)]
     board: Board,
 }
 
-/// Pulses a turn of the encoder at the spindle of the lathe.
+/// Pulses a turn of the encoder at the lathe's spindle.
 const SPINDLE_PULSES: u32 = 4;
 
 impl RunArgs {
@@ -92,37 +92,37 @@ impl RunArgs {
     }
 }
 
-/// Builds and runs a job; the simulator's exit code is ours.
+/// Builds the firmware and runs a job. Returns the simulator's exit code.
 pub fn run(args: &RunArgs) -> Result<ExitCode> {
     ensure!(args.job.is_file(), "there is no job {}", args.job.display());
     let elf = prepare(args.board(), args.machine)?;
     pass_through(&mut run_command(args, &elf)?)
 }
 
-/// Builds and offers the simulated board as a serial port. The simulator takes this process's place, so that the number by which it was
-/// started is that of the board.
+/// Builds the firmware and offers the simulated board as a serial port. The simulator replaces this process, so that
+/// its process number is the one that was started.
 pub fn serve(args: &ServeArgs) -> Result<ExitCode> {
     let elf = prepare(args.board, args.machine)?;
     become_program(&mut serve_command(args, &elf))
 }
 
-/// Builds and measures, on the board that others were measured on.
+/// Builds and measures, on the board that other firmwares were measured on.
 pub fn bench(args: &BenchArgs) -> Result<ExitCode> {
     let elf = prepare(args.board, Machine::default())?;
     if args.board == Board::PicoCnc {
-        // Of six motors.
+        // The rows with six motors need this image.
         firmware::build(Board::PicoCnc6, Machine::default())?;
         return pass_through(&mut bench_command(args, &elf));
     }
     ensure!(args.board == Board::default(), "there are no rows of {}", args.board.name());
     if args.row.is_empty() || args.row.iter().any(|row| row.starts_with("print")) {
-        // Of what a printer does.
+        // The rows of a printer need this image.
         firmware::build(Board::Ramps14, Machine::default())?;
     }
     pass_through(&mut bench_command(args, &elf))
 }
 
-/// Gets everything that the simulator needs, and builds the firmware; where that lies.
+/// Installs everything that the simulator needs, and builds the firmware. Returns its path.
 pub fn prepare(board: Board, machine: Machine) -> Result<PathBuf> {
     if board.is_rp2040() {
         setup::ensure(Scope::Emulator)?;
@@ -152,7 +152,7 @@ fn run_command(args: &RunArgs, elf: &Path) -> Result<Command> {
     Ok(command)
 }
 
-/// The settings one by one: of `@FILE` each line that is not empty.
+/// Returns the settings one by one; `@FILE` gives each line of the file that is not empty.
 fn settings(given: &[String]) -> Result<Vec<String>> {
     let mut all = Vec::new();
     for set in given {
@@ -183,7 +183,7 @@ fn bench_command(args: &BenchArgs, elf: &Path) -> Command {
     command
 }
 
-/// Runs a job with settings as `--set` takes them, and writes down what happened.
+/// Runs a job with settings as in `--set`, and writes a report.
 pub fn report(elf: &Path, job: &Path, set: &[String], file: &Path) -> Result<()> {
     let mut command = simulator("run", elf, Board::default());
     for set in settings(set)? {
@@ -192,8 +192,8 @@ pub fn report(elf: &Path, job: &Path, set: &[String], file: &Path) -> Result<()>
     run_child(command.arg(job).arg("--quiet").arg("--report").arg(file))
 }
 
-/// Builds the simulator, [`program`]. Features are those of all packages together, so that no other package has to have what they
-/// share compiled again.
+/// Builds the simulator, [`program`]. All packages are named together, so that shared dependencies have the same
+/// features and are compiled once.
 pub fn build() -> Result<()> {
     if !program().exists() {
         eprintln!("building the simulator: some minutes, this once");
@@ -203,7 +203,7 @@ pub fn build() -> Result<()> {
     run_child(cargo.args(["build", "--quiet", "--workspace", "--bin", "kerf-sim"]))
 }
 
-/// Where the simulator lies: beside this program, wherever cargo has been told to build.
+/// Returns the path of the simulator: beside this program, wherever cargo builds.
 pub fn program() -> PathBuf {
     std::env::current_exe().unwrap_or_default().with_file_name("kerf-sim")
 }

@@ -1,4 +1,4 @@
-//! What an image takes of the chip, and whether that is within the caps.
+//! Shows what an image takes of the chip, and whether that is within the caps.
 
 use std::path::{Path, PathBuf};
 
@@ -16,7 +16,7 @@ use crate::rp2040;
 use crate::setup::{self, Scope};
 use crate::shrink::hot;
 
-/// How many rows the lists have.
+/// Number of rows in the lists.
 const ROWS: usize = 15;
 
 /// `cargo xtask size`
@@ -25,12 +25,12 @@ pub struct SizeArgs {
     /// The board to build for
     #[arg(long, value_enum, default_value_t)]
     board: Board,
-    /// Look at this image instead, without building
+    /// Examine this image instead, without building
     #[arg(long, conflicts_with = "board")]
     elf: Option<PathBuf>,
 }
 
-/// Builds, prints, and fails past a cap.
+/// Builds the image, prints its sizes, and fails past a cap.
 pub fn run(args: &SizeArgs) -> Result<()> {
     setup::ensure(if args.board.is_rp2040() { Scope::Arm } else { Scope::Firmware })?;
     match &args.elf {
@@ -47,7 +47,7 @@ pub fn show_board(board: Board, elf: &Path) -> Result<()> {
     if board.is_rp2040() { rp2040::show(elf) } else { show(elf) }
 }
 
-/// Prints what an image takes, and fails past a cap, or if the stack has no bound.
+/// Prints what an image takes. Fails past a cap, or if the stack has no bound.
 pub fn show(elf: &Path) -> Result<()> {
     let image = Image::load(elf)?;
     let stack = Stack::of(&image, caps::INTERRUPT_TASKS)?;
@@ -89,7 +89,7 @@ fn print_largest(title: &str, mut symbols: Vec<&Symbol>) {
     }
 }
 
-/// Mangled names of generics run over several lines.
+/// Shortens a name, because mangled names of generics fill several lines.
 fn shorten(name: &str) -> String {
     const WIDTH: usize = 90;
     let name = task_name(name).map_or_else(|| name.to_owned(), |task| format!("poll of {task}"));
@@ -147,7 +147,7 @@ fn free_stack(sizes: Sizes, stack: u32) -> i64 {
     free_ram(sizes) - i64::from(stack)
 }
 
-/// What exceeds its cap.
+/// Returns what exceeds its cap.
 fn past_caps(sizes: Sizes, stack: u32) -> Vec<String> {
     let limits = [
         ("flash", sizes.flash, caps::FLASH),

@@ -1,7 +1,7 @@
-//! Which Rust builds the firmware.
+//! Finds the Rust that builds the firmware.
 //!
-//! AVR has no pre-built `core`, so the toolchain must bring its library sources: a rustup nightly
-//! with the component `rust-src`, or the system's own Rust with its source package.
+//! AVR has no pre-built `core`, so the toolchain must have the sources of its library: a rustup nightly with the
+//! component `rust-src`, or the system's own Rust with its source package.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -15,13 +15,13 @@ const OLDEST: &str = env!("CARGO_PKG_RUST_VERSION");
 /// A Rust that can build for AVR.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Toolchain {
-    /// What to call it in messages.
+    /// The name for messages.
     pub name: String,
-    /// Where its `cargo` and `rustc` lie.
+    /// The folder of its `cargo` and `rustc`.
     pub bin: PathBuf,
 }
 
-/// What was found out about a toolchain.
+/// What is known of a toolchain.
 #[derive(Clone, Copy, Debug)]
 struct Facts {
     has_cargo: bool,
@@ -36,12 +36,13 @@ impl Facts {
 }
 
 impl Toolchain {
-    /// The first usable one: rustup's nightlies, newest first, then the system's.
+    /// Returns the first usable toolchain: rustup's nightlies, newest first, then the system's; `None` if there is
+    /// none.
     pub fn find() -> Option<Toolchain> {
         candidates().into_iter().find(|candidate| candidate.facts().usable())
     }
 
-    /// Its cargo, in an environment without traces of the cargo that runs this program.
+    /// Returns its cargo, in an environment without traces of the cargo that runs this program.
     pub fn cargo(&self) -> Command {
         let mut cargo = self.program("cargo");
         cargo.env("RUSTC", self.bin.join("rustc")).env("RUSTC_BOOTSTRAP", "1");
@@ -68,7 +69,7 @@ impl Toolchain {
     }
 }
 
-/// Where `core` lies below a toolchain's directory.
+/// The path of `core` below a toolchain's directory.
 const SOURCES: &str = "lib/rustlib/src/rust/library/core";
 
 fn candidates() -> Vec<Toolchain> {
@@ -82,7 +83,7 @@ fn candidates() -> Vec<Toolchain> {
     found
 }
 
-/// The nightlies in rustup's list: the moving one first, then those with a date, newest first.
+/// Returns the nightlies in rustup's list: the undated one first, then those with a date, newest first.
 fn nightlies(list: &str) -> Vec<Toolchain> {
     let rows = list.lines().filter(|row| row.starts_with("nightly"));
     let mut rows: Vec<_> = rows.filter_map(|row| Some((row.split(' ').next()?, row))).collect();
@@ -95,13 +96,13 @@ fn nightlies(list: &str) -> Vec<Toolchain> {
     rows.into_iter().filter_map(toolchain).collect()
 }
 
-/// Major and minor number of `1.96.0 (...)` or `1.90`.
+/// Parses the major and minor number of `1.96.0 (...)` or `1.90`.
 fn version(text: &str) -> Option<(u32, u32)> {
     let mut numbers = text.split(['.', ' ', '-']);
     Some((numbers.next()?.parse().ok()?, numbers.next()?.parse().ok()?))
 }
 
-/// Takes out what the cargo and the rustup around this program left in the environment.
+/// Removes what the cargo and the rustup around this program have left in the environment.
 fn clean(command: &mut Command) {
     for (name, value) in std::env::vars_os() {
         let Some(text) = name.to_str() else { continue };
@@ -146,7 +147,7 @@ fn is_inherited(name: &str) -> bool {
     EXACT.contains(&name) || PREFIXES.iter().any(|prefix| name.starts_with(prefix))
 }
 
-/// The library path without the toolchains and target directories that cargo and rustup put in.
+/// Returns the library path without the toolchains and target directories that cargo and rustup have added.
 fn library_path(value: &OsString) -> Option<OsString> {
     let added = |dir: &PathBuf| {
         let text = dir.to_string_lossy();

@@ -1,17 +1,16 @@
 //! Fuzzing of the path of a line: bytes to G-code interpreter, and bytes to the whole machine.
 //!
-//! `cargo xtask fuzz` builds the fuzzers with coverage counters and runs them. What they do with an input
-//! is here, so that `cargo test -p kerf-fuzz` does it with the examples and transcripts, without libFuzzer
-//! and its compiler.
+//! `cargo xtask fuzz` builds the fuzzers with coverage counters and runs them. The checks of an input are in this
+//! crate, so that `cargo test -p kerf-fuzz` runs them with the examples and transcripts, without libFuzzer and its
+//! compiler.
 //!
 //! | target | an input is | what must hold |
 //! |---|---|---|
-//! | [`lines`] | lines | see there |
-//! | [`serial`] | how to send, then what to send | see there |
+//! | [`lines`] | lines | see the module |
+//! | [`serial`] | how to send, then what to send | see the module |
 //!
-//! A fuzzer takes files as arguments, too: each is run once. That is how to look at a finding, and `words.dict`
-//! holds what inputs are put together from. A finding that is understood becomes a test beside the code
-//! that was wrong.
+//! A fuzzer also takes files as arguments and runs each once, which is how to look at a finding. `words.dict` has the
+//! words that inputs are composed of. A finding that is understood becomes a test beside the code that was wrong.
 
 pub mod lines;
 pub mod serial;

@@ -1,8 +1,9 @@
-//! Target `lines`: an input is lines, parted by line feeds, for one interpreter.
+//! Target `lines`: an input is a sequence of lines, separated by line feeds, for one interpreter.
 //!
-//! After each line: a refused one has left the interpreter as it was and asks for nothing; the fast path
-//! for plain lines has either done nothing, or what the slow path does; the chords of an arc stay on
-//! their circle and end at its end; the steps of a line lead to where the interpreter is. A second interpreter gets the same lines for a machine of odd axes.
+//! Checks after each line: a refused line has left the interpreter as it was and asks for nothing; the fast path for
+//! plain lines has either done nothing or has done what the slow path does; the chords of an arc stay on their circle
+//! and end at its end; the steps of a line lead to the interpreter's position. A second interpreter gets the same
+//! lines for a machine with unusual axes.
 
 mod chords;
 
@@ -14,7 +15,7 @@ use kerf::gcode::{Info, Interpreter};
 use kerf::status::Status;
 use kerf::units::Length;
 
-/// Interprets the lines of an input; panics where something does not hold.
+/// Interprets the lines of an input; panics where a check fails.
 pub fn check(input: &[u8]) {
     let (mut usual, mut odd) = (Interpreter::new(), Interpreter::new());
     for line in input.split(|byte| *byte == b'\n') {
@@ -27,7 +28,7 @@ pub fn check(input: &[u8]) {
     }
 }
 
-/// What a line came to.
+/// The result of a line.
 #[derive(PartialEq, Debug)]
 struct Outcome {
     result: Result<Info, Status>,
@@ -35,7 +36,7 @@ struct Outcome {
 }
 
 impl Outcome {
-    /// Interprets a line and checks what holds for any.
+    /// Interprets a line and checks what must hold for any line.
     fn of(interpreter: &mut Interpreter, line: &[u8], axes: &impl Setup) -> Self {
         let before = *interpreter;
         let mut out = Commands::default();
@@ -57,13 +58,14 @@ impl Outcome {
     }
 }
 
-/// The fast path alone, from `before` on, and the slow one alone, against what both together did.
+/// Runs the fast path alone and the slow path alone, from `before` on, and compares them with the result of both
+/// together.
 fn fast_path(before: &Interpreter, line: &[u8], after: &Interpreter, outcome: &Outcome) {
     for writer in [Writer::Plain, Writer::Numbers] {
         let (mut fast, mut out) = (*before, Commands::default());
         if !fast.fast_path(line, writer, &Usual, &mut out) {
             assert_eq!(fast, *before, "declined, changed all the same");
-            // The motion is whatever the slow path makes of it, which begins anew.
+            // The slow path sets the motion anew, so the motion does not count here.
             out.motion = Motion::None;
             assert_eq!(out, Commands::default(), "declined");
             continue;
@@ -84,7 +86,7 @@ fn arc(before: &Interpreter, out: &Commands) {
     }
 }
 
-/// Carries a line out. Some holes are drilled in a million pecks: those are not followed to the end.
+/// Executes a line. A hole drilled in a million pecks is not followed to its end.
 fn steps(before: &Interpreter, after: &Interpreter, out: &Commands) {
     let (mut steps, mut at) = (Steps::default(), *before.position());
     for _ in 0..2_000 {
@@ -100,7 +102,7 @@ fn steps(before: &Interpreter, after: &Interpreter, out: &Commands) {
     }
 }
 
-/// As usual, but with limits, which nothing can be beyond: the fast path leaves such axes alone.
+/// Usual axes that have limits beyond all positions. The fast path does not handle axes with limits.
 struct Endless;
 
 impl Setup for Endless {
@@ -115,7 +117,7 @@ impl Setup for Endless {
     }
 }
 
-/// X has limits, Y is inhibited, Z disabled; A turns by a radius of 1 mm, B of 10 m.
+/// X has limits, Y is inhibited, Z disabled; A turns with a radius of 1 mm, B with 10 m.
 struct Odd;
 
 impl Setup for Odd {

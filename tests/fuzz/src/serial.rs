@@ -1,12 +1,12 @@
-//! Target `serial`: an input is for the whole machine, on the host, at its serial line.
+//! Target `serial`: an input goes to the serial line of a whole machine on the host.
 //!
-//! Of its first byte the last bit counts: 0, and each line is sent when the one before has been answered;
-//! 1, and all is sent at once, more than the machine can take. (`0` and `1` do as well.) The rest is what is
-//! sent.
+//! The lowest bit of the first byte says how to send. With 0 each line is sent when the line before it has been
+//! answered. With 1 all is sent at once, more than the machine can take. (The characters `0` and `1` have the right
+//! bits.) The rest of the input is sent.
 //!
-//! What must hold: every line is answered once; what the machine says is text; it never stands still with
-//! something left to do; when it has come to rest it answers still. A job that takes too long is not waited
-//! for. Each input has a machine of its own, in a thread, which leaves some memory behind.
+//! What must hold: every line is answered once; the machine sends only text; it never stands still with work left to
+//! do; when it has come to rest it still answers. A job that takes too long is not waited for. Each input has a
+//! machine of its own, in a thread, which leaks some memory.
 
 mod ears;
 mod lines;
@@ -14,7 +14,7 @@ mod session;
 
 use session::Session;
 
-/// Sends an input to a new machine; panics where something does not hold.
+/// Sends an input to a new machine; panics where a check fails.
 pub fn check(input: &[u8]) {
     let Some((how, text)) = input.split_first() else { return };
     let all_at_once = how & 1 == 1;

@@ -1,9 +1,9 @@
-//! What the fuzzers do, done once with the examples and the transcripts.
+//! Runs the checks of the fuzzers once with the examples and the transcripts.
 
 use std::fs;
 use std::path::Path;
 
-/// The texts of the files in a folder of the repository.
+/// Returns the texts of the files in a folder of the repository.
 fn texts(folder: &str) -> Vec<String> {
     let folder = Path::new("../..").join(folder);
     let files = fs::read_dir(&folder).expect("a folder of seeds").flatten();
@@ -12,7 +12,7 @@ fn texts(folder: &str) -> Vec<String> {
     texts
 }
 
-/// What a transcript sends.
+/// Returns the lines that a transcript sends.
 fn sent(transcript: &str) -> String {
     let lines = transcript.lines().filter_map(|line| line.strip_prefix("-> "));
     lines.flat_map(|line| [line, "\n"]).collect()

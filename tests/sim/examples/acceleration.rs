@@ -1,6 +1,6 @@
-//! The acceleration of X and Y in a job, from their steps: percentiles, and where most is:
-//! `cargo run -p kerf-sim --example acceleration -- ELF BOARD JOB STEPS_PER_MM WINDOW_MS LEAST [SETTING...]`,
-//! where only places count that are passed with LEAST mm/s or more.
+//! Measures the acceleration of X and Y in a job, from their steps: percentiles, and the places with the highest
+//! values: `cargo run -p kerf-sim --example acceleration -- ELF BOARD JOB STEPS_PER_MM WINDOW_MS LEAST [SETTING...]`.
+//! Only places that are passed at LEAST mm/s or more count.
 
 use std::path::Path;
 

@@ -1,7 +1,7 @@
-//! What calls of functions cost, with all they call and without interrupts:
-//! `cargo run -p kerf-sim --example calls -- ELF BOARD JOB PATTERNS [SETTING...]`.
+//! Measures what calls of functions cost, with all that they call and without interrupts: `cargo run -p kerf-sim
+//! --example calls -- ELF BOARD JOB PATTERNS [SETTING...]`.
 //!
-//! PATTERNS are parts of function names, divided by commas. Only calls from thread code count.
+//! PATTERNS are parts of function names, separated by commas. Only calls from thread code count.
 
 use std::path::Path;
 

@@ -1,5 +1,6 @@
-//! What exec takes for a segment of a job, and the longest, and each call of functions whose names end in what `KERF_CALLS`
-//! lists, with commas between: `cargo run -p kerf-sim --example laps -- ELF BOARD JOB [SETTING...]`.
+//! Measures what exec takes for a segment of a job, the longest segment, and each call of some functions.
+//! `KERF_CALLS` lists the ends of their names, separated by commas: `cargo run -p kerf-sim --example laps -- ELF
+//! BOARD JOB [SETTING...]`.
 
 use std::path::Path;
 

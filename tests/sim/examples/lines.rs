@@ -1,8 +1,8 @@
-//! What the lines of a job cost, and how long interrupts are off meanwhile:
-//! `cargo run -p kerf-sim --example lines -- ELF BOARD BAUD JOB [SETTING...]`.
+//! Measures what the lines of a job cost, and how long interrupts are off meanwhile: `cargo run -p kerf-sim --example
+//! lines -- ELF BOARD BAUD JOB [SETTING...]`.
 //!
-//! Measures from the first line sent to the last one answered, so the cost of motion is in it only as
-//! far as it happens meanwhile. `KERF_ADDRESSES=FILE` writes cycles by address, for a symbolizer.
+//! Measures from the first line sent to the last one answered, so the cost of motion counts only as far as motion
+//! happens during that time. `KERF_ADDRESSES=FILE` writes cycles by address, for a symbolizer.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -10,9 +10,9 @@ use std::path::Path;
 use anyhow::{Context, Result, bail};
 use kerf_sim::{Host, Machine, job};
 
-/// How long the line of a job may take, ms of AVR time.
+/// Longest time of a line of the job, ms of AVR time.
 const LINE_MS: u64 = 10_000;
-/// Settings are in the EEPROM after this, ms of AVR time.
+/// Time after which the settings are in the EEPROM, ms of AVR time.
 const KEEPS_MS: u64 = 4_000;
 /// Lines in flight: as many as the firmware has room for.
 const IN_FLIGHT: usize = 8;

@@ -1,5 +1,5 @@
-//! Where a job's cycles go, function by function:
-//! `cargo run -p kerf-sim --example profile -- ELF BOARD JOB [SETTING...]`. `{baud:500000}` is a setting, too.
+//! Shows where the cycles of a job go, function by function: `cargo run -p kerf-sim --example profile -- ELF BOARD
+//! JOB [SETTING...]`. `{baud:500000}` also counts as a setting.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! Where a job that somebody else sent has to have brought the machine.
+//! Checks where a job that another program has sent must have brought the machine.
 
 use std::fmt::{self, Display, Formatter};
 use std::path::Path;
@@ -9,18 +9,18 @@ use kerf_sim::job::{read_lines, read_setup};
 use kerf_sim::oracle::Setup;
 use kerf_sim::{Host, Machine, oracle, print};
 
-/// For what is under way when the sender has left, ms of AVR time.
+/// Time for motion that is still under way when the sender has left, ms of AVR time.
 const SETTLE_MS: u64 = 1_000;
 /// Longest time from reset to the greeting, ms of AVR time.
 const BOOT_MS: u64 = 5_000;
 
 /// A motor at the end of a job.
 struct Motor {
-    /// Steps on balance.
+    /// Steps up minus steps down.
     steps: i64,
-    /// The oracle's.
+    /// The steps that the oracle expects.
     expected: i64,
-    /// Steps in both directions.
+    /// Steps in both directions together.
     total: u64,
 }
 
@@ -28,8 +28,8 @@ struct Motor {
 pub struct Arrival(Vec<Motor>);
 
 impl Arrival {
-    /// Asks the firmware for its motors, and an independent reading of the job for the steps. Asked is a twin with the memory of the machine, for
-    /// the port of that one may speak any dialect by now.
+    /// Compares the motors of `machine` with an independent reading of the job. The settings are asked of `twin`, a
+    /// second machine with the same EEPROM contents, because the port of `machine` may speak any dialect by now.
     pub fn of(machine: &mut Machine, twin: &mut Machine, job: &Path) -> Result<Arrival> {
         let lines = read_lines(job)?;
         Host::new(1).run_for_ms(machine, SETTLE_MS)?;
@@ -45,7 +45,8 @@ impl Arrival {
         Ok(Self::at(&setup, &ends, &expected))
     }
 
-    /// As [`Arrival::of`], with steps counted from `begun`. The board itself is asked, after a power cut.
+    /// As [`Arrival::of`], with steps counted from `begun`. The settings are asked of the board itself, after a power
+    /// cut.
     pub fn of_emulated(board: &mut Emulated, begun: &[(i64, u64)], job: &Path) -> Result<Arrival> {
         let lines = read_lines(job)?;
         board.session(Talks { open: true, reads: true });
@@ -60,7 +61,8 @@ impl Arrival {
         Ok(Self::at(&setup, &ends, &expected))
     }
 
-    /// Motors by their setup, where each ends with how many steps, and where it should.
+    /// Pairs each motor's setup with its end position and its steps in both directions, and with the position that is
+    /// expected.
     fn at(setup: &Setup, ends: &[(i64, u64)], expected: &[i64]) -> Arrival {
         let motors = setup.motors.iter().zip(ends).zip(expected);
         let motors = motors.map(|((setup, (position, total)), expected)| Motor {

@@ -1,4 +1,4 @@
-//! The peripherals that replace simavr's, and the way from a register to them.
+//! The peripherals that replace simavr's, and the dispatch of register accesses to them.
 
 use std::ffi::{c_int, c_void};
 use std::ptr::NonNull;
@@ -17,7 +17,7 @@ use crate::timer::Timer;
 use crate::uart::{OFFSETS, Uart};
 use crate::wire::Wire;
 
-/// Whose register it is.
+/// Which peripheral owns a register.
 #[derive(Clone, Copy)]
 enum Owner {
     Nobody,
@@ -37,37 +37,38 @@ pub struct Bus {
     chip: &'static Chip,
     owners: [Owner; IO_END],
     pub(crate) timers: Vec<Timer>,
-    /// Which of them makes the ticks of the step generator, if one does.
+    /// Index of the timer that makes the ticks of the step generator, if there is one.
     step_timer: Option<usize>,
     pub(crate) uarts: Vec<Uart>,
     pub(crate) eeprom: Eeprom,
-    /// A line for each serial port of the board, and the USART it leads to.
+    /// The serial lines of the board's ports, each with the index of the USART that it leads to.
     pub(crate) wires: Vec<(usize, Wire)>,
     pins: PinInterrupts,
     pub(crate) spi: Spi,
     pub(crate) recorder: Recorder,
     pub(crate) mechanics: Option<Box<Mechanics>>,
-    /// When the temperatures are worked out next, and how many cycles after that again; never without heaters.
+    /// Cycle at which the temperatures are computed next, and the cycles between two computations. `NEVER` without
+    /// heaters.
     pub(crate) heat_due: u64,
     /// See `heat_due`.
     pub(crate) heat_every: u64,
-    /// How often they have become due; the machine works them out.
+    /// How many computations of the temperatures have become due; the machine makes them.
     pub(crate) heats: u32,
-    /// Pins that the mechanics has changed; the machine drives them.
+    /// Pins whose level the mechanics has changed; the machine drives them.
     pub(crate) changed: Vec<(Pin, bool)>,
     pub(crate) sums: Sums,
     /// Interrupts that ask for service, by vector.
     pub(crate) pending: u64,
     /// Interrupts that are not served although they ask, by vector.
     withheld: u64,
-    /// When each of them began to ask.
+    /// Cycle at which each interrupt began to ask for service, by vector.
     raised_at: [u64; MAX_VECTORS],
-    /// Cycle of the next thing to happen.
+    /// Cycle of the next event.
     pub(crate) due: u64,
 }
 
 impl Bus {
-    /// Puts the peripherals around a CPU, which keeps the pointer returned.
+    /// Puts the peripherals around a CPU. The CPU keeps the pointer that is returned.
     pub fn install(
         cpu: Cpu,
         chip: &'static Chip,
@@ -113,7 +114,7 @@ impl Bus {
         bus
     }
 
-    /// All peripherals as after a reset; the world outside keeps its state.
+    /// Puts all peripherals into their state after a reset; the world outside keeps its state.
     pub fn reset(&mut self) {
         self.timers = self.chip.timers.iter().map(Timer::new).collect();
         self.uarts = self.chip.usarts.iter().copied().map(Uart::new).collect();
@@ -125,7 +126,7 @@ impl Bus {
         self.refresh_due();
     }
 
-    /// Does everything that is due by `now`.
+    /// Handles all events that are due by `now`.
     pub fn run(&mut self, now: u64) {
         while self.due <= now {
             for (usart, wire) in &mut self.wires {
@@ -164,7 +165,7 @@ impl Bus {
         }
     }
 
-    /// The interrupt is being served.
+    /// Tells the peripheral that its interrupt is being served.
     pub fn acknowledge(&mut self, vector: u8, now: u64) {
         let bit = 1u64 << vector;
         if let Some(i) = self.chip.timers.iter().position(|t| t.vectors.contains(&vector)) {
@@ -182,20 +183,20 @@ impl Bus {
         self.refresh_due();
     }
 
-    /// An interrupt of a USART is not served from now on, or it is again.
+    /// Withholds an interrupt of a USART from service, or releases it.
     pub fn withhold(&mut self, vector: u8, withheld: bool) {
         let bit = 1 << vector;
         self.withheld = if withheld { self.withheld | bit } else { self.withheld & !bit };
         (0..self.uarts.len()).for_each(|i| self.update_uart(i, self.cpu.cycle()));
     }
 
-    /// The level of an input has changed.
+    /// Takes a change of an input's level.
     pub fn pin_edge(&mut self, port: char, bit: u8, high: bool) {
         self.pins.edge(port, bit, high);
         self.update_pins(self.cpu.cycle());
     }
 
-    /// When a pending interrupt began to ask for service.
+    /// Returns the cycle at which a pending interrupt began to ask for service.
     pub fn raised_at(&self, vector: u8) -> u64 {
         self.raised_at[usize::from(vector)]
     }
@@ -212,7 +213,7 @@ impl Bus {
         self.refresh_due();
     }
 
-    /// Looks when there is something to do next.
+    /// Computes when the next event is due.
     pub(crate) fn refresh_due(&mut self) {
         let timers = self.timers.iter().map(Timer::due);
         let uarts = self.uarts.iter().map(Uart::due);
@@ -274,7 +275,7 @@ impl Bus {
                 self.update_eeprom(now);
             }
             Owner::Pins => {
-                // simavr's own pin interrupts look there: let them see that all are off.
+                // simavr's own pin interrupts read this memory. A 0 there tells them that all pin interrupts are off.
                 self.cpu.set_data(usize::from(addr), 0);
                 self.pins.write(addr, value);
                 self.update_pins(now);
@@ -379,7 +380,7 @@ unsafe extern "C" fn tifr_bit<const TIMER: usize>(
     1
 }
 
-/// A bit of a register of pin interrupts' flags is written: a 1 clears the flag.
+/// A bit of a register of pin-interrupt flags is written: a 1 clears the flag.
 unsafe extern "C" fn pin_flag_bit<const REGISTER: usize>(
     _: *mut ffi::avr_t,
     bit: u8,

@@ -1,29 +1,30 @@
-//! An SD card on SPI: its contents are an image of a card with a partition.
+//! An SD card on SPI. Its contents are the image of a card with a partition.
 //!
-//! It answers CMD0, 8, 16, 17, 24, 41, 55 and 58 as the SD specification has it (Physical Layer, simplified, chapter 7), in the order in which they
-//! are allowed. A block comes [`SdCard::access_us`] after it was asked for; after a block was written the card is busy for as long.
+//! The card answers CMD0, 8, 16, 17, 24, 41, 55 and 58 as the SD specification says (Physical Layer, simplified,
+//! chapter 7), in the order that the specification allows. A block comes [`SdCard::access_us`] after it was
+//! requested; after a block was written the card is busy for the same time.
 
 use std::collections::VecDeque;
 
 /// Bytes of a block.
 const BLOCK: usize = 512;
-/// Tries of CMD41 until the card is ready.
+/// How often CMD41 must be sent until the card is ready.
 const TRIES: u32 = 5;
 
-/// R1.
+/// Bits of the response R1.
 const IDLE: u8 = 1;
 const ILLEGAL: u8 = 4;
 
 /// The card.
 pub struct SdCard {
     image: Vec<u8>,
-    /// Blocks are counted, not bytes.
+    /// Whether addresses count blocks, not bytes (a high-capacity card).
     is_high: bool,
-    /// How long a block takes, us.
+    /// Access time of a block, us.
     pub access_us: u64,
     /// Blocks that have been read.
     pub reads: u64,
-    /// It is in its slot.
+    /// Whether the card is in its slot.
     pub is_there: bool,
     cycles_per_us: u64,
     idle: bool,
@@ -31,9 +32,9 @@ pub struct SdCard {
     tries: u32,
     command: Vec<u8>,
     out: VecDeque<u8>,
-    /// The block that is on its way, and from when on it is there.
+    /// The block that is being read, and the cycle from which on its data is there.
     coming: Option<(usize, u64)>,
-    /// The block that is to be written, and what has come of it.
+    /// The block that is being written, and the bytes of it that have come so far.
     write: Option<(usize, Vec<u8>)>,
     busy_until: u64,
 }
@@ -59,7 +60,7 @@ impl SdCard {
         }
     }
 
-    /// What is on it.
+    /// Returns the contents of the card.
     pub fn image(&self) -> &[u8] {
         &self.image
     }

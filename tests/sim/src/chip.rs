@@ -1,32 +1,34 @@
-//! The chips that can be simulated, as data: all that differs between them (data sheets: register summary, interrupt vectors).
+//! The chips that can be simulated, as data. All differences between them are here (data sheets: register summary,
+//! interrupt vectors).
 //!
-//! simavr has the instructions, the ports and the watchdog of each; a further chip is one more [`Chip`].
+//! simavr supplies the instructions, the ports and the watchdog of each chip. A further chip is one more [`Chip`].
 
 use std::ffi::CStr;
 
 use crate::pins::{self, PinLayout};
 use crate::timer::{self, Layout};
 
-/// Vectors that a chip may have: they are bits of a word.
+/// Most vectors that a chip may have: each vector is a bit of a `u64`.
 pub(crate) const MAX_VECTORS: usize = 64;
 
 /// A chip.
 pub struct Chip {
     /// simavr's name for it.
     pub(crate) name: &'static CStr,
-    /// Cycles from acceptance of an interrupt to the first instruction at its vector: two, and one for each byte of the return address.
+    /// Cycles from the acceptance of an interrupt to the first instruction at its vector: two, plus one for each byte
+    /// of the return address.
     pub(crate) entry_cycles: u64,
     /// The first address of the data space behind the registers.
     pub(crate) ram_start: u16,
-    /// Its vectors by number, reset first, as in the data sheet.
+    /// Names of its vectors by number, reset first, as in the data sheet.
     pub(crate) vectors: &'static [&'static str],
     /// Its timers by number.
     pub(crate) timers: &'static [Layout],
     /// Its USARTs by number: the first register, UCSRnA, and the first vector, RX; UDRE and TX follow.
     pub(crate) usarts: &'static [(u16, u8)],
-    /// The vector of EE_READY. All chips here have 4 KB of EEPROM and its registers at one place.
+    /// The vector of EE_READY. All chips here have 4 KB of EEPROM, with its registers at the same addresses.
     pub(crate) eeprom_ready: u8,
-    /// Interrupts of pins.
+    /// The pin interrupts.
     pub(crate) pins: PinLayout,
 }
 
@@ -36,10 +38,10 @@ impl Chip {
         self.vectors.get(usize::from(vector)).copied().unwrap_or("?")
     }
 
-    /// The number of a vector with this name.
+    /// Returns the number of the vector with this name.
     ///
     /// # Panics
-    /// If the chip has none.
+    /// If the chip has no vector of this name.
     pub fn vector(&self, name: &str) -> u8 {
         let found = self.vectors.iter().position(|known| *known == name);
         found.unwrap_or_else(|| panic!("{:?} has no vector {name}", self.name)) as u8
@@ -91,7 +93,7 @@ pub static ATMEGA1284P: Chip = Chip {
 mod tests {
     use super::*;
 
-    /// The vectors that parts of a chip are said to have are those of these names.
+    /// The vector numbers in a chip's description point to the vectors with the expected names.
     #[test]
     fn vectors_have_the_names_of_their_parts() {
         for chip in [&ATMEGA2560, &ATMEGA1284P] {

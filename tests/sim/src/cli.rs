@@ -54,10 +54,10 @@ pub struct RunArgs {
     /// Speed of the serial line during the job; the firmware is told to change to it.
     #[arg(long, value_name = "N", value_parser = baud())]
     pub baud: Option<u32>,
-    /// Lines in flight.
+    /// Lines that are sent and not yet answered, at most.
     #[arg(long, value_name = "N", default_value_t = kerf_sim::LINES_IN_FLIGHT)]
     pub in_flight: usize,
-    /// A spindle with an encoder of so many pulses a turn stands beside the board; threads of the job are checked.
+    /// Put a spindle with an encoder of this many pulses a turn beside the board, and check the threads of the job.
     #[arg(long, value_name = "PULSES")]
     pub spindle: Option<u32>,
     /// Write the summary as JSON too.
@@ -66,16 +66,16 @@ pub struct RunArgs {
     /// Write step and direction signals for GTKWave.
     #[arg(long, value_name = "FILE")]
     pub vcd: Option<PathBuf>,
-    /// Draw path, velocity, acceleration and jerk, as the steps made them.
+    /// Draw path, velocity, acceleration and jerk from the steps.
     #[arg(long, value_name = "FILE")]
     pub plot: Option<PathBuf>,
-    /// Seconds that the curves of the plot show, such as 10..14.
+    /// The span of time that the curves of the plot show, in seconds, such as 10..14.
     #[arg(long, value_name = "FROM..TO", requires = "plot", value_parser = span)]
     pub span: Option<Range<f64>>,
     /// Milliseconds over which the plot is smoothed.
     #[arg(long, value_name = "MS", default_value_t = WINDOW_MS, requires = "plot")]
     pub smooth: u32,
-    /// Print the result only.
+    /// Print only the result.
     #[arg(long)]
     pub quiet: bool,
 }
@@ -86,23 +86,22 @@ pub struct ServeArgs {
     /// Firmware and board.
     #[command(flatten)]
     pub target: Target,
-    /// How many times faster than real time, or `max`.
+    /// How many times faster than real time to run, or `max`.
     #[arg(long, value_name = "N", default_value = "1")]
     pub speed: Speed,
     /// Make a symbolic link to the pseudo-terminal.
     #[arg(long, value_name = "PATH")]
     pub link: Option<PathBuf>,
-    /// Let a debugger in at this port of TCP; 0 is any that is free. The second line printed is `gdb: PORT`.
+    /// Let a debugger connect to this TCP port; 0 chooses a free port. The second line printed is `gdb: PORT`.
     #[arg(long, value_name = "PORT")]
     pub gdb: Option<u16>,
-    /// The job that senders send: at the end, which is that of the standard input, each motor must be
-    /// where this ends, to the step.
+    /// The job that senders send. When the standard input ends, each motor must be where this job ends, to the step.
     #[arg(long, value_name = "JOB")]
     pub expect: Option<PathBuf>,
-    /// Damage one numbered line of so many on its way to the board, by this seed.
+    /// Damage one in N numbered lines on their way to the board, chosen by a seed.
     #[arg(long, value_name = "ONE_IN:SEED", value_parser = damage)]
     pub damage: Option<(u64, u64)>,
-    /// Speed of the serial line at power-up; it goes along when the firmware changes its own.
+    /// Speed of the serial line at power-up. The line follows when the firmware changes its speed.
     #[arg(long, default_value_t = 115_200, value_parser = baud())]
     pub baud: u32,
 }
@@ -118,10 +117,10 @@ pub struct BenchArgs {
     pub rows: Vec<String>,
 }
 
-/// The pace of `serve`.
+/// How fast `serve` runs.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Speed {
-    /// As fast as it can.
+    /// As fast as the computer allows.
     Max,
     /// This many times as fast as a real machine.
     Times(f64),
@@ -150,7 +149,7 @@ fn span(text: &str) -> Result<Range<f64>, String> {
     }
 }
 
-/// One line of how many is damaged, and a seed.
+/// Parses how many numbered lines come to one that is damaged, and a seed.
 fn damage(text: &str) -> Result<(u64, u64), String> {
     let parts = text.split_once(':').map(|(one_in, seed)| (one_in.parse(), seed.parse()));
     match parts {

@@ -1,7 +1,8 @@
 //! How often each instruction ran, written to a file when a machine is dropped.
 //!
-//! `KERF_COUNTS=FOLDER` has every machine of a process do so: what seldom runs need not be in `xtask/src/shrink/hot.rs`. A file has the cycles of the
-//! machine in its first line, then an address in bytes and how often it was executed in each.
+//! `KERF_COUNTS=FOLDER` makes every machine of a process write its counts to a file in the folder. Code that seldom
+//! runs need not be listed in `xtask/src/shrink/hot.rs`. The first line of a file has the cycles of the machine. Each
+//! further line has an address in bytes and how often the instruction there was executed.
 
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -17,7 +18,7 @@ pub struct Counts {
 }
 
 impl Counts {
-    /// Counts, if the environment asks for it.
+    /// Returns counts if the environment variable asks for them, else `None`.
     pub fn wanted() -> Option<Counts> {
         static MADE: AtomicU32 = AtomicU32::new(0);
         let folder = PathBuf::from(std::env::var_os("KERF_COUNTS")?);
@@ -26,7 +27,7 @@ impl Counts {
         Some(Counts { times: vec![0; WORDS], file })
     }
 
-    /// The instruction at this address was executed.
+    /// Counts an execution of the instruction at this address.
     #[inline]
     pub fn executed(&mut self, pc: u32) {
         if let Some(times) = self.times.get_mut(pc as usize / 2) {
@@ -34,7 +35,8 @@ impl Counts {
         }
     }
 
-    /// Writes the file; `cycles` passed in all. A folder that is not there loses the counts, as a test must not fail for it.
+    /// Writes the file; `cycles` is the machine's total. If the folder does not exist the counts are lost, because a
+    /// test must not fail for them.
     pub fn write(&self, cycles: u64) {
         let mut text = format!("{cycles}\n");
         for (word, times) in self.times.iter().enumerate().filter(|(_, times)| **times > 0) {

@@ -19,7 +19,7 @@ const SMCR: usize = 0x53;
 /// Index of the I flag in simavr's unpacked status register.
 const FLAG_I: usize = 7;
 
-// Exported by libsimavr but left out of the bindings.
+// libsimavr exports this function, but the bindings leave it out.
 unsafe extern "C" {
     fn avr_run_one(avr: *mut ffi::avr_t) -> u32;
     fn _avr_push_addr(avr: *mut ffi::avr_t, addr: u32) -> c_int;
@@ -36,14 +36,14 @@ pub enum Mode {
     Crashed,
 }
 
-/// A handle to simavr's CPU. It is copied freely; its machine keeps what it points to alive.
+/// A handle to simavr's CPU. It is copied freely; the machine keeps the core alive.
 #[derive(Clone, Copy)]
 pub struct Cpu(NonNull<ffi::avr_t>);
 
 /// Called for SBI and CBI: core, bit, new value, parameter. Returns 1 when it has done the write.
 pub type BitWrite = unsafe extern "C" fn(*mut ffi::avr_t, u8, u8, *mut c_void) -> c_int;
 
-/// simavr calls this to wait; simulated time is never made to wait.
+/// simavr calls this to wait in real time. It returns at once, because simulated time never waits.
 extern "C" fn no_sleep(_: *mut ffi::avr_t, _: u64) {}
 
 /// simavr calls this for an instruction that does not exist.
@@ -53,7 +53,7 @@ unsafe extern "C" fn bad_instruction(_: *mut ffi::avr_irq_t, _: u32, avr: *mut c
 }
 
 impl Cpu {
-    /// A powered-up chip with the image in its flash.
+    /// Returns a powered-up chip with the image in its flash.
     pub fn power_up(image: &Image, chip: &Chip, clock_hz: u32) -> Result<Self> {
         // SAFETY: the name is a C string; simavr returns null or a core that nothing else uses.
         let made = unsafe { ffi::avr_make_mcu_by_name(chip.name.as_ptr()) };
@@ -78,7 +78,7 @@ impl Cpu {
         Ok(Cpu(avr))
     }
 
-    /// Gives the memory of flash and RAM back. The handle and its copies are dead afterwards.
+    /// Frees the memory of flash and RAM. The handle and its copies are dead afterwards.
     pub fn power_down(self) {
         // SAFETY: called once, by the machine that owns the core, when it is dropped.
         unsafe { ffi::avr_terminate(self.0.as_ptr()) }
@@ -95,7 +95,7 @@ impl Cpu {
         unsafe { (*self.p()).cycle }
     }
 
-    /// Moves time.
+    /// Sets the cycle counter.
     #[inline]
     pub fn set_cycle(self, cycle: u64) {
         // SAFETY: the machine keeps the core alive; plain write.
@@ -242,7 +242,7 @@ impl Cpu {
         }
     }
 
-    /// Calls simavr's own peripherals. True when the watchdog has reset the core.
+    /// Calls simavr's own peripherals. Returns true when the watchdog has reset the core.
     pub fn run_native(self) -> bool {
         let now = self.cycle();
         // SAFETY: the core is initialised.
@@ -254,15 +254,15 @@ impl Cpu {
         reset
     }
 
-    /// Nested interrupts being served.
+    /// Number of nested interrupts that are being served.
     #[inline]
     pub fn depth(self) -> u8 {
         // SAFETY: the machine keeps the core alive; plain read.
         unsafe { (*self.p()).interrupts.running_ptr }
     }
 
-    /// Enters an interrupt: return address on the stack, I cleared, jump to the vector. Charges no
-    /// cycles. False when the nesting is deeper than any real program's.
+    /// Enters an interrupt: pushes the return address, clears I, jumps to the vector. Charges no cycles. Returns
+    /// false when the nesting is deeper than in any real program.
     pub fn enter(self, vector: u8) -> bool {
         let p = self.p();
         // SAFETY: the core is initialised; the index into `running` is checked.
@@ -275,7 +275,8 @@ impl Cpu {
         self.adopt(vector)
     }
 
-    /// Counts a handler that was called instead of entered. False when the nesting is deeper than any real program's.
+    /// Counts a handler that was called instead of entered. Returns false when the nesting is deeper than in any real
+    /// program.
     pub fn adopt(self, vector: u8) -> bool {
         let p = self.p();
         // SAFETY: the core is initialised; the index into `running` is checked.
@@ -284,7 +285,7 @@ impl Cpu {
             if depth >= (*p).interrupts.running.len() {
                 return false;
             }
-            // RETI takes this off again. All it does with it is to tell listeners; there are none.
+            // RETI removes this entry again. simavr only notifies listeners with it, and there are none.
             (*p).interrupts.running[depth] = self.find_vector(vector);
             (*p).interrupts.running_ptr += 1;
         }
@@ -313,8 +314,8 @@ impl Cpu {
         }
     }
 
-    /// The most urgent interrupt that simavr's own peripherals have pending, if it is enabled.
-    /// Forgets those that were cleared or disabled since they were raised.
+    /// Returns the most urgent interrupt that simavr's own peripherals have pending, if it is enabled. Forgets
+    /// interrupts that were cleared or disabled since they were raised.
     pub fn native_vector(self) -> Option<u8> {
         let p = self.p();
         let mut best: Option<u8> = None;
@@ -346,7 +347,7 @@ impl Cpu {
         unsafe { ffi::avr_clear_interrupt(self.p(), self.find_vector(vector)) }
     }
 
-    /// Routes an I/O register's accesses. `None` leaves plain memory.
+    /// Routes the accesses to an I/O register to callbacks. `None` leaves the register plain memory.
     pub fn hook(
         self,
         addr: u16,
@@ -362,13 +363,13 @@ impl Cpu {
             (*self.p()).io[io].w.c = write;
             (*self.p()).io[io].w.param = param;
             if io < 32 {
-                // SBI and CBI then do a read, a change and a write.
+                // Without a bit callback, SBI and CBI do a read, a change and a write.
                 (*self.p()).bit_io[io].c = None;
             }
         }
     }
 
-    /// Routes SBI and CBI on one of the 32 low I/O registers.
+    /// Routes SBI and CBI on one of the 32 low I/O registers to a callback.
     pub fn hook_bits(self, addr: u16, write: BitWrite, param: *mut c_void) {
         let io = addr as usize - 32;
         // SAFETY: the index is bounds-checked; the caller keeps `param` valid as long as the core.
@@ -384,7 +385,7 @@ impl Cpu {
         unsafe { ffi::avr_irq_register_notify(self.pin(port, bit), notify, param) }
     }
 
-    /// The voltage at a channel of the converter, of a supply of 5,000 mV.
+    /// Sets the voltage at a channel of the converter, mV; the supply has 5,000 mV.
     pub fn set_millivolts(self, channel: u8, millivolts: u32) {
         let ctl = u32::from_be_bytes(*b"adc0");
         let index = ffi::ADC_IRQ_ADC0 as c_int + c_int::from(channel);
@@ -392,8 +393,8 @@ impl Cpu {
         unsafe { ffi::avr_raise_irq(ffi::avr_io_getirq(self.p(), ctl, index), millivolts) }
     }
 
-    /// Drives an input pin from outside. `driven` are the pins of its port that are driven at all, and `levels` what
-    /// they are driven to: else simavr would have a pull-up win whenever the port is written.
+    /// Drives an input pin from outside. `driven` are the pins of its port that are driven at all, and `levels` are
+    /// their levels. Both are needed because simavr would otherwise let the pull-up win whenever the port is written.
     pub fn drive_pin(self, port: char, bit: u8, driven: u8, levels: u8) {
         // SAFETY: three numbers, for which 0 is a value.
         let mut external: ffi::avr_ioport_external_t = unsafe { std::mem::zeroed() };

@@ -1,7 +1,8 @@
 //! A wire between a printing host and the board that damages lines.
 //!
-//! Of the lines that have a number, one of so many loses bytes, gets others, or gets more, by a seed. The end of a line arrives, for a host waits for its
-//! answer; M110 does, which says what the numbers are.
+//! One in `one_in` lines that have a line number is damaged at random: bytes are changed, lost or inserted. The end
+//! of a line always arrives, because the host waits for the answer to each line. M110 always arrives whole, because
+//! it sets the line numbers.
 
 use kerf_sim::mechanics::Random;
 
@@ -15,18 +16,18 @@ pub struct Damage {
 }
 
 impl Damage {
-    /// Damages one numbered line of so many.
+    /// Damages one in `one_in` numbered lines.
     pub fn new(one_in: u64, seed: u64) -> Self {
         let random = Random::new(seed);
         Self { one_in: one_in.max(1), random, line: Vec::new(), numbered: 0, damaged: 0 }
     }
 
-    /// Lines that had a number, and how many of them were damaged.
+    /// Number of numbered lines, and how many of them were damaged.
     pub fn counts(&self) -> (u64, u64) {
         (self.numbered, self.damaged)
     }
 
-    /// Takes what the host has sent; what arrives, whole lines at a time.
+    /// Takes what the host has sent. Returns what arrives at the board, whole lines at a time.
     pub fn pass(&mut self, bytes: &[u8]) -> Vec<u8> {
         let mut out = Vec::new();
         for byte in bytes {

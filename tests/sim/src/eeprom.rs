@@ -2,7 +2,7 @@
 
 const NEVER: u64 = u64::MAX;
 
-/// Bytes there are.
+/// Size of the EEPROM, bytes.
 pub const SIZE: usize = 4096;
 
 const EECR: u16 = 0x3F;
@@ -65,12 +65,12 @@ impl Eeprom {
         self.writes
     }
 
-    /// The registers as after a reset; a write under way is taken as done.
+    /// Puts the registers into their state after a reset; a write under way is taken as done.
     pub fn reset(&mut self) {
         (self.control, self.master_until, self.busy_until) = (0, 0, 0);
     }
 
-    /// When the write under way is done.
+    /// Cycle at which the write under way is done.
     pub fn due(&self) -> u64 {
         if self.busy_until == 0 { NEVER } else { self.busy_until }
     }
@@ -102,7 +102,7 @@ impl Eeprom {
         })
     }
 
-    /// A store that takes effect at cycle `now`. Returns for how many cycles the CPU is halted.
+    /// A store that takes effect at cycle `now`. Returns how many cycles the CPU is halted.
     pub fn write(&mut self, addr: u16, value: u8, now: u64) -> u64 {
         self.advance(now);
         match addr {

@@ -1,7 +1,7 @@
 //! A debugger's end of the board: GDB's remote protocol over TCP, for `kerf-sim serve --gdb PORT`.
 //!
-//! The machine stands while the debugger thinks; its time stands too. Breakpoints are looked at after each instruction. Addresses are
-//! avr-gdb's: flash from 0, data from 0x800000.
+//! While the debugger has the machine halted, simulated time stands still. Breakpoints are checked after each
+//! instruction. Addresses are those of avr-gdb: flash from 0, data from 0x800000.
 
 use std::collections::HashSet;
 use std::io::{ErrorKind, Read, Write};
@@ -10,16 +10,16 @@ use std::net::{TcpListener, TcpStream};
 use anyhow::{Context, Result};
 use kerf_sim::Machine;
 
-/// Where data begins.
+/// First address of the data space.
 const DATA: u32 = 0x80_0000;
-/// The byte by which a debugger halts what runs.
+/// The byte with which a debugger halts a running machine.
 const BREAK: u8 = 3;
-/// Halted by a breakpoint or a step.
+/// The stop reply for a breakpoint or a step.
 const TRAPPED: &str = "S05";
-/// Most bytes that are read at once.
+/// Most bytes that one request may read.
 const MOST: u32 = 0x400;
 
-/// The debugger's end.
+/// The server that a debugger connects to.
 pub struct Gdb {
     listener: TcpListener,
     client: Option<TcpStream>,
@@ -29,7 +29,7 @@ pub struct Gdb {
 }
 
 impl Gdb {
-    /// Waits for a debugger at a port of this computer.
+    /// Listens for a debugger at a TCP port of this computer.
     pub fn listen(port: u16) -> Result<Self> {
         let listener = TcpListener::bind(("127.0.0.1", port));
         let listener = listener.with_context(|| format!("port {port} is taken"))?;
@@ -38,17 +38,17 @@ impl Gdb {
         Ok(Gdb { listener, client, heard, breakpoints: HashSet::new(), halted: false })
     }
 
-    /// The port, if any was free.
+    /// Returns the port that is listened at. If port 0 was asked for, it is the one that the system chose.
     pub fn port(&self) -> Result<u16> {
         Ok(self.listener.local_addr()?.port())
     }
 
-    /// Does what the debugger asks for.
+    /// Takes a connection and handles what the debugger has asked for.
     pub fn turn(&mut self, machine: &mut Machine) -> Result<()> {
         if let Ok((client, _)) = self.listener.accept() {
             client.set_nonblocking(true)?;
             client.set_nodelay(true)?;
-            // Who attaches finds it halted.
+            // A debugger that attaches finds the machine halted.
             (self.client, self.halted) = (Some(client), true);
             self.heard.clear();
             self.breakpoints.clear();
@@ -91,12 +91,12 @@ impl Gdb {
         Ok(())
     }
 
-    /// Whether the machine stands because the debugger thinks.
+    /// Whether the debugger has halted the machine.
     pub fn is_halted(&self) -> bool {
         self.halted
     }
 
-    /// The next thing that was heard: what stands between `$` and `#`, or a break.
+    /// Returns the next packet: the text between `$` and `#`, or a break. `None` if no whole packet has come.
     fn packet(&mut self) -> Option<String> {
         loop {
             let begin = self.heard.iter().position(|byte| matches!(byte, b'$' | &BREAK))?;
@@ -119,7 +119,7 @@ impl Gdb {
 
     fn write(&mut self, bytes: &[u8]) {
         if let Some(client) = &mut self.client {
-            // A debugger that is gone is noticed when it is read from.
+            // A write error is ignored. A debugger that has gone is noticed at the next read.
             let _ = client.write_all(bytes);
         }
     }
@@ -160,7 +160,7 @@ impl Gdb {
                         };
                         "OK".to_string()
                     }
-                    // Watchpoints: GDB steps instead.
+                    // An empty answer means "not supported". GDB then steps instead of setting watchpoints.
                     _ => String::new(),
                 }
             }
@@ -172,7 +172,7 @@ impl Gdb {
             }
             "q" if rest.starts_with("Supported") => format!("PacketSize={MOST:x}"),
             "q" if rest.starts_with("Attached") => "1".to_string(),
-            // What is not known is answered by nothing.
+            // An empty answer means "not supported".
             _ => String::new(),
         };
         self.say(&answer);
@@ -188,7 +188,7 @@ fn hex(text: &str) -> Option<u32> {
     u32::from_str_radix(text, 16).ok()
 }
 
-/// An address and a length.
+/// Parses an address and a length.
 fn range(text: &str) -> Option<(u32, u32)> {
     let (from, count) = text.split_once(',')?;
     let count = count.split([':', ';']).next()?;
@@ -199,7 +199,7 @@ fn digits(bytes: impl IntoIterator<Item = u8>) -> String {
     bytes.into_iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// R0 to R31, SREG, the stack pointer, the program counter.
+/// The registers R0 to R31, SREG, the stack pointer and the program counter, in GDB's order.
 fn registers(machine: &Machine) -> String {
     (0..=34).map(|number| register(machine, number)).collect()
 }
@@ -214,7 +214,7 @@ fn register(machine: &Machine, number: u32) -> String {
     }
 }
 
-/// Bytes of flash or of data; those that do not exist are 0.
+/// Returns bytes of flash or of the data space; bytes that do not exist read as 0.
 fn memory(machine: &Machine, from: u32, count: u32) -> String {
     let byte = |at: u32| match at.checked_sub(DATA) {
         Some(at) => u16::try_from(at).ok().and_then(|at| machine.data(at)).unwrap_or(0),
@@ -223,7 +223,7 @@ fn memory(machine: &Machine, from: u32, count: u32) -> String {
     digits((from..from.saturating_add(count.min(MOST))).map(byte))
 }
 
-/// Writes to RAM; flash stays as it is.
+/// Writes to RAM; writes to flash are ignored.
 fn write(machine: &mut Machine, text: &str) -> Option<()> {
     let ((from, count), bytes) = (range(text)?, text.split_once(':')?.1);
     for n in 0..count {

@@ -1,4 +1,4 @@
-//! A sender on the serial line: some lines in flight, one answer for each.
+//! A sender on the serial line. It keeps some lines in flight and expects one answer for each.
 
 use std::collections::VecDeque;
 
@@ -9,10 +9,10 @@ use serde_json::Value;
 use crate::protocol::{Incoming, Response, classify, control_name, is_idle, state_of};
 use crate::runs::Runs;
 
-/// Lines in flight unless asked otherwise.
+/// Lines in flight by default.
 pub const LINES_IN_FLIGHT: usize = 4;
 
-/// From the answer to a change of speed until the firmware has changed it.
+/// Time that the firmware takes to change its speed after the answer, ms.
 const SPEED_CHANGE_MS: u64 = 10;
 
 /// A line that was sent.
@@ -20,7 +20,8 @@ const SPEED_CHANGE_MS: u64 = 10;
 struct Line {
     number: usize,
     text: String,
-    /// Set on a control line: it may be answered before G-code that was sent earlier.
+    /// The name that a control line sets or asks for. A control line may be answered before G-code that was sent
+    /// earlier.
     name: Option<String>,
 }
 
@@ -41,7 +42,7 @@ pub struct Host {
     queue: VecDeque<(usize, String)>,
     awaiting: VecDeque<Line>,
     partial: Vec<u8>,
-    /// The firmware has said XOFF, and not XON since.
+    /// Whether the firmware has sent XOFF, and no XON since.
     is_stopped: bool,
     answered: VecDeque<Answered>,
     reports: Vec<Value>,
@@ -50,7 +51,7 @@ pub struct Host {
     stat: Option<i64>,
     heard_at: u64,
     idle_since: Option<u64>,
-    /// Characters to be sent ahead of everything, and the cycles at which they are.
+    /// Characters to send ahead of everything else, each with the cycle at which it is sent.
     interjections: VecDeque<(u64, u8)>,
 }
 
@@ -79,7 +80,7 @@ impl Host {
         self.queue.push_back((number, text.to_string()));
     }
 
-    /// Has a character sent ahead of everything at a cycle; the earliest first.
+    /// Schedules a character that is sent ahead of everything else at a cycle. Call it in the order of the cycles.
     pub fn interject(&mut self, cycle: u64, byte: u8) {
         self.interjections.push_back((cycle, byte));
     }
@@ -109,12 +110,12 @@ impl Host {
         std::mem::take(&mut self.reports)
     }
 
-    /// Lines that were no JSON, and answers that no line had asked for.
+    /// Lines that were not JSON, and answers that belong to no line.
     pub fn strays(&self) -> &[String] {
         &self.strays
     }
 
-    /// Banners seen.
+    /// Number of banners seen.
     pub fn banners(&self) -> usize {
         self.banners
     }
@@ -129,7 +130,7 @@ impl Host {
         self.idle_since
     }
 
-    /// Cycle at which the last line came.
+    /// Cycle at which the last line came from the firmware.
     pub fn heard_at(&self) -> u64 {
         self.heard_at
     }
@@ -145,7 +146,7 @@ impl Host {
         self.run_until(machine, machine.cycle() + machine.cycles(ms))
     }
 
-    /// Like `run_until`, but stops after any line from the firmware. False when time is up.
+    /// Like `run_until`, but stops after any line from the firmware. Returns false when the time is up.
     pub fn run_until_line(&mut self, machine: &mut impl Runs, cycle: u64) -> Result<bool> {
         self.fill(machine);
         while let Some((at, byte)) = self.interjections.front().copied()
@@ -161,7 +162,7 @@ impl Host {
         Ok(machine.cycle() < cycle)
     }
 
-    /// Runs until the banner comes, then a little for the line to fall silent.
+    /// Runs until the banner comes, then a little longer until the line is silent.
     pub fn boot(&mut self, machine: &mut impl Runs, timeout_ms: u64) -> Result<()> {
         let seen = self.banners;
         let end = machine.cycle() + machine.cycles(timeout_ms);
@@ -183,7 +184,7 @@ impl Host {
         format!("no SYSTEM READY within {timeout_ms} ms of reset; {heard}")
     }
 
-    /// Sends a line at once, ahead of those queued and whatever is in flight.
+    /// Sends a line at once, ahead of all queued lines and whatever is in flight.
     pub fn send(&mut self, machine: &mut impl Runs, number: usize, text: &str) {
         machine.send(text.as_bytes());
         machine.send(b"\n");

@@ -1,4 +1,4 @@
-//! Reading a firmware ELF: flash contents, the end of static data, and function names.
+//! Reads a firmware ELF: flash contents, the end of static data, and function names.
 
 use std::collections::HashMap;
 use std::fs;
@@ -17,11 +17,11 @@ const DATA_SPACE: u64 = 0x80_0000;
 pub struct Image {
     /// Flash contents from address 0.
     pub flash: Vec<u8>,
-    /// First address after static data, where the stack must not go. 0 when not known.
+    /// First address after static data, which the stack must not reach. 0 when it is not known.
     pub static_end: u16,
     /// Functions, by rising address.
     functions: Vec<(u32, String)>,
-    /// Variables and where they are in the data space.
+    /// Variables, each with its address in the data space.
     variables: HashMap<String, u16>,
 }
 
@@ -91,23 +91,23 @@ impl Image {
         }
         let end = self.variable("_end").or(self.variable("__bss_end"));
         self.static_end = end.unwrap_or(0);
-        // Of several names for one address the one with a size comes first and is kept.
+        // If an address has several names, the name with a size comes first and is kept.
         sized.sort();
         sized.dedup_by_key(|s| s.0);
         self.functions = sized.into_iter().map(|(addr, _, name)| (addr, pretty(name))).collect();
     }
 
-    /// Where a variable is in the data space.
+    /// Returns the address of a variable in the data space.
     pub fn variable(&self, name: &str) -> Option<u16> {
         self.variables.get(name).copied()
     }
 
-    /// Where a function begins in flash, by its full name.
+    /// Returns the address in flash at which a function begins, by its full name.
     pub fn function(&self, name: &str) -> Option<u32> {
         self.functions.iter().find(|(_, known)| known == name).map(|(addr, _)| *addr)
     }
 
-    /// All functions, with where they begin.
+    /// All functions with their start addresses.
     pub fn functions(&self) -> &[(u32, String)] {
         &self.functions
     }

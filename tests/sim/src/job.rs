@@ -21,11 +21,11 @@ use crate::trace::Trace;
 pub use setup::read_setup;
 pub(crate) use watch::{POLL, Watch};
 
-/// How long a reset may take, ms of AVR time.
+/// Longest time of a reset, ms of AVR time.
 pub(crate) const BOOT_MS: u64 = 5_000;
-/// How long a setting may take.
+/// Longest time of a setting, ms of AVR time.
 const ASK_MS: u64 = 5_000;
-/// Longer than between two bytes that are written to the EEPROM.
+/// Longer than the time between two bytes that are written to the EEPROM, ms.
 const PUT_AWAY_MS: u64 = 100;
 
 /// The lines of a job, each with its number in the file.
@@ -34,7 +34,7 @@ pub type Lines = Vec<(usize, String)>;
 /// How to run a job.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Speed of the line, settings included, that the firmware is told to change to after boot.
+    /// Speed of the serial line that the firmware is told to change to after boot, before the settings.
     pub baud: Option<u32>,
     /// Settings to send first; each must be accepted.
     pub settings: Vec<String>,
@@ -42,7 +42,7 @@ pub struct Options {
     pub in_flight: usize,
     /// Where to write the step and direction signals.
     pub vcd: Option<PathBuf>,
-    /// Real-time characters, and after how many ms of the job each is sent; the earliest first.
+    /// Real-time characters, each with the time in the job at which it is sent, ms; the earliest first.
     pub interjections: Vec<(u64, u8)>,
 }
 
@@ -59,7 +59,7 @@ impl Default for Options {
 }
 
 impl Options {
-    /// Those of a job after these settings; of `{baud:N}` the speed is taken, which the sender has to follow.
+    /// Options with these settings. `{baud:N}` becomes the speed of the line, because the sender has to follow it.
     pub fn with_settings(settings: impl Iterator<Item = String>) -> Self {
         let mut options = Self::default();
         for setting in settings {
@@ -72,8 +72,8 @@ impl Options {
     }
 }
 
-/// Splits G-code text into the lines a sender sends: no blank ones and no `%`, which would flush
-/// the queue.
+/// Splits G-code text into the lines that a sender sends. Leaves out blank lines, and `%`, which would flush the
+/// queue.
 pub fn lines_of(text: &str) -> Lines {
     let numbered = text.lines().enumerate().map(|(i, l)| (i + 1, l.trim()));
     numbered
@@ -93,7 +93,7 @@ pub fn read_lines(path: &Path) -> Result<Lines> {
     Ok(lines)
 }
 
-/// What is known of a job while it runs.
+/// The state of a job while it runs.
 struct Run<'a> {
     machine: &'a mut Machine,
     host: Host,
@@ -107,8 +107,9 @@ struct Run<'a> {
     progress_at: u64,
 }
 
-/// Waits until the settings are in the EEPROM, so that all jobs begin alike. While they are put away, a motor
-/// that is not the dominant one may step 0.7 us off its usual place: each read of the EEPROM halts the CPU.
+/// Waits until the settings are in the EEPROM, so that all jobs begin alike. While the settings are being written, a
+/// motor that is not the dominant one may step 0.7 us off its usual place, because each read of the EEPROM halts the
+/// CPU.
 pub(crate) fn put_away(machine: &mut Machine, host: &mut Host) -> Result<()> {
     let mut writes = None;
     while writes.replace(machine.eeprom_writes()) != Some(machine.eeprom_writes()) {
@@ -117,7 +118,7 @@ pub(crate) fn put_away(machine: &mut Machine, host: &mut Host) -> Result<()> {
     Ok(())
 }
 
-/// Looks for pauses from now on, of a machine at rest where `lines` begin.
+/// Looks for pauses from now on. The machine must be at rest where `lines` begin.
 pub fn meter_pauses(machine: &mut Machine, lines: &Lines, setup: &Setup) {
     let ends = oracle::ends(lines.iter().map(|(n, l)| (*n, l.as_str())), setup);
     let at_pins = |steps: Vec<i64>| -> [i64; MOTORS] {
@@ -131,10 +132,10 @@ pub fn meter_pauses(machine: &mut Machine, lines: &Lines, setup: &Setup) {
     machine.recorder_mut().meter_pauses(scale);
 }
 
-/// What waits for a hand by default, which the simulator has not: it is told to go on by itself.
+/// Setting for programs that wait for an operator: the simulator has none, so the firmware goes on by itself.
 const GO_ON: &str = "{psw:0}";
 
-/// Whether a line has a code that may wait for a hand.
+/// Whether a line has a code that may wait for an operator.
 fn may_wait(line: &str) -> bool {
     let line = line.split(['(', ';']).next().unwrap_or_default().to_ascii_uppercase();
     let line: String = line.chars().filter(|c| !c.is_whitespace()).collect();
@@ -143,7 +144,8 @@ fn may_wait(line: &str) -> bool {
     numbers.filter_map(|digits| digits.parse::<u32>().ok()).any(|n| matches!(n, 0 | 1 | 6 | 60))
 }
 
-/// Sends settings, each of which must be taken, and what lets a job of these lines go on by itself.
+/// Sends settings, each of which must be accepted. If the lines have a code that may wait for an operator, also sends
+/// [`GO_ON`].
 pub(crate) fn ask_settings(
     machine: &mut impl Runs,
     host: &mut Host,
@@ -161,8 +163,8 @@ pub(crate) fn ask_settings(
     Ok(())
 }
 
-/// Boots the machine, runs a job on it and says how it went. An error means that the job could not
-/// begin; all that goes wrong later is in the report. `progress` gets the lines answered so far.
+/// Boots the machine, runs a job on it and says how it went. An error means that the job could not begin; the report
+/// has all that goes wrong later. `progress` gets the number of lines answered so far.
 pub fn run(
     machine: &mut Machine,
     lines: &Lines,
@@ -263,7 +265,7 @@ impl Run<'_> {
         watch.settle(self.machine, &mut self.host)
     }
 
-    /// What the firmware has counted itself; `None` if it does not answer.
+    /// Asks the firmware for its own count of late segments; `None` if it does not answer.
     fn late_segments(&mut self) -> Option<u64> {
         self.host.ask(self.machine, "{stv:n}", ASK_MS).ok()?.body.get("stv")?.as_u64()
     }

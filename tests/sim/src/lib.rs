@@ -1,12 +1,11 @@
 //! The simulated machine that Kerf is tested on.
 //!
-//! The firmware's ELF runs on simavr's CPU core with peripherals of our own around it, made to
-//! behave like the chip in what matters here: serial frames, FIFO depth and overruns, timer flags,
-//! the cost of entering an interrupt, software interrupts. Time is counted in CPU cycles and is
-//! exactly repeatable.
+//! The firmware's ELF runs on simavr's CPU core, with peripherals of our own around it. They behave like the chip's
+//! where that matters here: serial frames, FIFO depth and overruns, timer flags, the cost of entering an interrupt,
+//! software interrupts. Time is counted in CPU cycles and is exactly repeatable.
 //!
-//! [`Machine`] is a [chip] on its board, [`mechanics`] what is built around it, [`Host`] a sender on its serial line, [`oracle`] an
-//! independent reading of the same G-code, and [`job`] all of them together.
+//! [`Machine`] is a [chip] on its board, and [`mechanics`] is what is built around the board. [`Host`] is a sender on
+//! the serial line, [`oracle`] an independent reading of the same G-code, and [`job`] puts them all together.
 
 pub mod bench;
 mod bus;

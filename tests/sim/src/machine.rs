@@ -26,7 +26,7 @@ use crate::trace::Trace;
 use crate::uart::Uart;
 use crate::wire::Wire;
 
-/// Cycles more until an interrupt is entered when it ends a sleep.
+/// Extra cycles until an interrupt is entered when it ends a sleep.
 const WAKE_CYCLES: u64 = 4;
 
 /// The ports of a board, as [`Machine::send_to`] counts them.
@@ -42,7 +42,7 @@ pub enum Fault {
         /// Where.
         place: String,
     },
-    /// Sleep with interrupts off: nothing can wake it.
+    /// A sleep with interrupts off: nothing can wake the CPU.
     SleepsForever {
         /// Where.
         place: String,
@@ -80,24 +80,25 @@ impl std::error::Error for Fault {}
 pub struct Machine {
     cpu: Cpu,
     bus: NonNull<Bus>,
-    /// The pins' callbacks point into these.
+    /// The state that the pins' callbacks point to.
     probes: Vec<Vec<Probe>>,
-    /// The pins of each port that are driven from outside, and their levels, by the port's letter.
+    /// For each port, by its letter: the pins that are driven from outside, and their levels.
     driven: [(u8, u8); 12],
     meters: Meters,
-    /// The step interrupt and where its handler begins, which other handlers call when a tick is due.
+    /// The vector of the step interrupt and the address of its handler. Other handlers call it when a tick is due.
     step_handler: Option<(u8, u32)>,
     image: Image,
     chip: &'static Chip,
     clock_hz: u32,
     board: Option<&'static Board>,
     resets: u64,
-    /// Cycles spent at each word of flash, if asked for.
+    /// Cycles spent at each word of flash, if a profile was started.
     profile: Option<Vec<u64>>,
     /// How often each word of flash ran, if the environment asks for it.
     counts: Option<Counts>,
     stopwatches: Vec<Stopwatch>,
-    /// Whether there is a profile, counts or a stopwatch: one question an instruction.
+    /// Whether there is a profile, counts or a stopwatch. One flag, so that the loop has only one check for each
+    /// instruction.
     is_watched: bool,
     thermal: Option<Box<Thermal>>,
 }
@@ -111,7 +112,7 @@ impl Machine {
                 Usart::U0 => 0,
                 Usart::U1 => 1,
                 Usart::U3 => 3,
-                // Of the RP2040, which is emulated: see above.
+                // These belong to the RP2040, which is emulated: the check above refuses it.
                 Usart::Uart0 | Usart::Uart1 | Usart::Usb => 0,
             };
             (usart, Wire::new(board.clock_hz, serial.rate))
@@ -119,7 +120,7 @@ impl Machine {
         Self::make(image, &ATMEGA2560, board.clock_hz, Some(board), wires.collect())
     }
 
-    /// A chip alone, with this image in its flash, at cycle 0, and a serial line of 115200 baud at its first USART.
+    /// A chip alone at cycle 0, with this image in its flash, and a serial line of 115200 baud at its first USART.
     pub fn bare(image: Image, chip: &'static Chip, clock_hz: u32) -> Result<Self> {
         Self::make(image, chip, clock_hz, None, vec![(0, Wire::new(clock_hz, 115_200))])
     }
@@ -174,13 +175,13 @@ impl Machine {
         unsafe { self.bus.as_mut() }
     }
 
-    /// Executes one instruction and serves at most one interrupt. Asleep, it goes on to the next
-    /// event or to cycle `limit`, whichever is first.
+    /// Executes one instruction and serves at most one interrupt. If the CPU sleeps, goes on to the next event or to
+    /// cycle `limit`, whichever is first.
     pub fn step(&mut self, limit: u64) -> Result<(), Fault> {
         self.go_on(limit).map(|_| ())
     }
 
-    /// [`Machine::step`], part of the loops that run it. True when an event came.
+    /// The body of [`Machine::step`], inlined into the loops that run it. Returns whether an event came.
     #[inline(always)]
     fn go_on(&mut self, limit: u64) -> Result<bool, Fault> {
         let cpu = self.cpu;
@@ -223,7 +224,8 @@ impl Machine {
         Ok(event)
     }
 
-    /// The instruction at `pc`, begun at `began`, was executed: tells whoever counts instructions.
+    /// Tells the profile, the counts and the stopwatches that the instruction at `pc`, begun at `began`, was
+    /// executed.
     #[cold]
     fn watch(&mut self, pc: u32, began: u64) {
         if let Some(spent) = self.profile.as_mut().and_then(|p| p.get_mut(pc as usize / 2)) {
@@ -237,18 +239,18 @@ impl Machine {
         }
     }
 
-    /// Measures something from now on; see [`Machine::stopwatches`].
+    /// Adds a stopwatch, which measures from now on; see [`Machine::stopwatches`].
     pub fn add_stopwatch(&mut self, stopwatch: Stopwatch) {
         self.stopwatches.push(stopwatch);
         self.is_watched = true;
     }
 
-    /// What measures, in the order of adding.
+    /// Returns the stopwatches, in the order in which they were added.
     pub fn stopwatches(&self) -> &[Stopwatch] {
         &self.stopwatches
     }
 
-    /// The instruction at `pc`, begun at `began`, was executed: tells the stopwatches.
+    /// Tells the stopwatches that the instruction at `pc`, begun at `began`, was executed.
     fn time(&mut self, pc: u32, began: u64) {
         let left = usize::from(self.cpu.depth()) < self.meters.depth();
         let in_interrupts = self.bus().sums.in_interrupts;
@@ -257,7 +259,7 @@ impl Machine {
         }
     }
 
-    /// Counts from now on where cycles are spent.
+    /// Starts a profile: from now on counts the cycles spent at each word of flash.
     pub fn start_profile(&mut self) {
         self.profile = Some(vec![0; 1 << 17]);
         self.is_watched = true;
@@ -291,7 +293,7 @@ impl Machine {
     /// Runs to a cycle, or until a whole line has come over the serial line.
     pub fn run_until_line(&mut self, cycle: u64) -> Result<(), Fault> {
         let has_line = |machine: &Self| machine.bus().wires[USB].1.has_line();
-        // A line is whole at an event.
+        // A line becomes whole only at an event, so it is enough to look after events.
         let mut found = has_line(self);
         while !found && self.cpu.cycle() < cycle {
             found = self.go_on(cycle)? && has_line(self);
@@ -348,7 +350,7 @@ impl Machine {
         Ok(())
     }
 
-    /// A handler has called another one.
+    /// Takes note that a handler has called another handler.
     fn called(&mut self, vector: u8) -> Result<(), Fault> {
         if !self.cpu.adopt(vector) {
             return Err(Fault::EndlessNesting);
@@ -370,7 +372,7 @@ impl Machine {
         }
     }
 
-    /// Works the temperatures out as often as they have become due.
+    /// Computes the temperatures as often as they have become due.
     fn pass_heat(&mut self) {
         let heats = std::mem::take(&mut self.bus_mut().heats);
         let Some(mut thermal) = self.thermal.take_if(|_| heats > 0) else { return };
@@ -384,7 +386,7 @@ impl Machine {
         self.thermal = Some(thermal);
     }
 
-    /// The reset has made the core forget what the world outside does to its pins.
+    /// Drives the pins again, because a reset makes the core forget how the outside world drives its pins.
     fn drive_again(&mut self) {
         for (port, (driven, levels)) in ('A'..='L').zip(self.driven) {
             for bit in (0..8).filter(|bit| driven & 1 << bit != 0) {
@@ -455,12 +457,12 @@ impl Machine {
         &self.bus().recorder
     }
 
-    /// The step and direction pins, to be cleared or told to keep a log.
+    /// The recorder of the step and direction pins, to be cleared or told to keep a log.
     pub fn recorder_mut(&mut self) -> &mut Recorder {
         &mut self.bus_mut().recorder
     }
 
-    /// Begins a VCD file, or ends it with `None`. Returns the one before.
+    /// Begins a VCD file, or ends it with `None`. Returns the file that was being written before.
     pub fn set_trace(&mut self, trace: Option<Trace>) -> Option<Trace> {
         self.bus_mut().recorder.set_trace(trace)
     }
@@ -485,7 +487,7 @@ impl Machine {
         self.uart(0).is_listening() && self.cpu.interrupts_on()
     }
 
-    /// CTC tops of the step timer that were written behind its counter.
+    /// Number of CTC tops of the step timer that were written when the counter had already passed them.
     pub fn missed_tops(&self) -> u64 {
         self.bus().timers[self.board().step_timer as usize].missed()
     }
@@ -520,7 +522,8 @@ impl Machine {
         self.cpu.sreg()
     }
 
-    /// Does what a store of the firmware would, to a register or to RAM: to break it, or to make it old.
+    /// Stores a byte in a register or in RAM, with the side effects of a store by the firmware. Tests use it to
+    /// corrupt the firmware's state or to make it look old.
     pub fn poke(&mut self, addr: u16, value: u8) {
         match addr >= self.chip.ram_start {
             true => self.cpu.set_data(usize::from(addr), value),
@@ -528,7 +531,7 @@ impl Machine {
         }
     }
 
-    /// An interrupt of a USART is not served from now on, or it is again: to hold up what runs in it.
+    /// Withholds an interrupt of a USART from service, or releases it. This holds up what runs in the interrupt.
     pub fn withhold(&mut self, vector: u8, withheld: bool) {
         self.bus_mut().withhold(vector, withheld);
     }
@@ -550,12 +553,12 @@ impl Machine {
         }
     }
 
-    /// The voltage at a channel of the converter, A0 to A15, of a supply of 5,000 mV.
+    /// Sets the voltage at a channel of the converter, A0 to A15, mV; the supply has 5,000 mV.
     pub fn set_millivolts(&mut self, channel: u8, millivolts: u32) {
         self.cpu.set_millivolts(channel, millivolts);
     }
 
-    /// Builds a machine around the chip, best before the first instruction.
+    /// Builds a machine around the chip. It is best called before the first instruction.
     pub fn build(&mut self, build: &Build) {
         let mechanics = Mechanics::new(build, self.board());
         let spindle = recorder::attach_spindle(self.bus, self.cpu, self.board(), build.spindle.pwm);
@@ -564,8 +567,8 @@ impl Machine {
         self.bus_mut().refresh_due();
     }
 
-    /// Puts heaters, their sensors and a fan at the pins that the board has for them, best before the first instruction. A board without such pins
-    /// stays as it is.
+    /// Puts heaters, their sensors and a fan at the pins that the board has for them. It is best called before the
+    /// first instruction. Does nothing on a board without such pins.
     pub fn build_heaters(&mut self) {
         let Some(pins) = self.board().heaters else { return };
         self.thermal = Some(Box::new(Thermal::new(pins)));
@@ -576,7 +579,7 @@ impl Machine {
         bus.refresh_due();
     }
 
-    /// Puts a MAX6675 on SPI, selected by a pin, best before the first instruction.
+    /// Puts a MAX6675 on SPI, selected by a pin. It is best called before the first instruction.
     pub fn build_max6675(&mut self, select: Pin) {
         let clock_hz = self.clock_hz;
         self.bus_mut().spi.add_max6675(select, clock_hz);
@@ -611,7 +614,8 @@ impl Machine {
         self.thermal.as_deref_mut()
     }
 
-    /// A spindle that is driven by the width of pulses goes by it, as it has been: nobody sees each of them.
+    /// Drives the spindle with the duty cycle that its pulse-width output has now. It must be called whenever the
+    /// width may have changed, because the edges of these pulses are not simulated.
     pub fn follow_pulses(&mut self) {
         if self.mechanics().is_none() {
             return;
@@ -625,7 +629,7 @@ impl Machine {
         self.bus().mechanics.as_deref()
     }
 
-    /// Changes something of the machine around the chip, if there is one; `change` gets the cycle as well.
+    /// Calls `change` with the machine around the chip, if there is one, and the current cycle.
     pub fn tamper(&mut self, change: impl FnOnce(&mut Mechanics, u64)) {
         let now = self.cycle();
         if let Some(mechanics) = &mut self.bus_mut().mechanics {
@@ -634,12 +638,12 @@ impl Machine {
         self.bus_mut().refresh_due();
     }
 
-    /// Has one byte of so many to the machine arrive with a bit turned over, on every port.
+    /// Flips a bit in one of `one_in` bytes on their way to the machine, on every port. `None` ends that.
     pub fn spoil_bytes(&mut self, one_in: Option<u64>, seed: u64) {
         self.bus_mut().wires.iter_mut().for_each(|(_, wire)| wire.spoil(one_in, seed));
     }
 
-    /// Has one byte of so many to the machine arrive without its stop bit, on every port.
+    /// Removes the stop bit of one of `one_in` bytes on their way to the machine, on every port. `None` ends that.
     pub fn break_frames(&mut self, one_in: Option<u64>, seed: u64) {
         self.bus_mut().wires.iter_mut().for_each(|(_, wire)| wire.break_frames(one_in, seed));
     }
@@ -654,7 +658,7 @@ impl Machine {
         self.bus().eeprom.writes()
     }
 
-    /// Replaces the EEPROM's contents, best before the first instruction.
+    /// Replaces the EEPROM's contents. It is best called before the first instruction.
     pub fn set_eeprom(&mut self, cells: &[u8; eeprom::SIZE]) {
         self.bus_mut().eeprom.set_cells(cells);
     }
@@ -665,7 +669,7 @@ impl Machine {
         self.bus_mut().wires[USB].1.set_baud(clock_hz, baud);
     }
 
-    /// Has the host's side of the serial line change its speed whenever the firmware does.
+    /// Makes the host's side of the serial line change its speed whenever the firmware changes its own.
     pub fn follow_speed(&mut self) {
         self.bus_mut().wires[USB].1.follow();
     }
@@ -680,13 +684,13 @@ impl Machine {
         self.bus_mut().send(port, bytes);
     }
 
-    /// Drives the pin with which the other side of a port holds the firmware back.
+    /// Drives the handshake pin with which the other side of a port stops the firmware from sending.
     pub fn set_cts(&mut self, port: usize, stop: bool) {
         let handshake = self.board().serial[port].handshake.expect("a port with the pins");
         self.drive_pin(handshake.cts.port.letter(), handshake.cts.bit, stop);
     }
 
-    /// Whether the firmware drives a pin high, or would if it were an output.
+    /// Whether the firmware drives a pin high, or would drive it high if it were an output.
     pub fn is_high(&self, pin: Pin) -> bool {
         self.peek(pin.port.address() as u16) & 1 << pin.bit != 0
     }
@@ -711,7 +715,7 @@ impl Machine {
         &self.bus().wires[USB].1
     }
 
-    /// A function name for a flash address; vectors by their own names.
+    /// Returns the function name for a flash address; for a vector, the vector's name.
     pub fn place(&self, pc: u32) -> String {
         let vector = pc / 4;
         if pc.is_multiple_of(4) && (1..self.chip.vectors.len() as u32).contains(&vector) {
@@ -720,7 +724,7 @@ impl Machine {
         self.image.function_at(pc)
     }
 
-    /// Says where a window was.
+    /// Describes the place of a window with interrupts off.
     pub fn describe(&self, window: &Window) -> String {
         let (from, to) = (self.place(window.from_pc), self.place(window.to_pc));
         if from == to { from } else { format!("{from} .. {to}") }

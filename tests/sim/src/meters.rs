@@ -1,5 +1,4 @@
-//! What an observer outside the chip can tell: time in interrupts, time with interrupts off,
-//! stack depth.
+//! What an observer outside the chip can measure: time in interrupts, time with interrupts off, stack depth.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +9,8 @@ use crate::cpu::Cpu;
 const OUT_SPH: u16 = 0xBE0E;
 const OUT_MASK: u16 = 0xFE0F;
 
-/// The opcode of `sbic TIFR1, OCF1A`: a handler looks whether a tick is due, and calls the step interrupt then.
+/// The opcode of `sbic TIFR1, OCF1A`, with which a handler checks whether a tick is due. If it is, the handler calls
+/// the step interrupt.
 const LOOKS_FOR_TICK: u16 = 0x99B1;
 
 /// The longest time with interrupts off in some context.
@@ -22,20 +22,20 @@ pub struct Window {
     pub from_pc: u32,
     /// Byte address at which they went on again.
     pub to_pc: u32,
-    /// When it began.
+    /// Cycle at which it began.
     pub at: u64,
-    /// The interrupt it was in; `None` in thread code.
+    /// The interrupt that was being served; `None` in thread code.
     pub vector: Option<u8>,
 }
 
 /// One vector's service. Times are in cycles, from acceptance to the end of RETI.
 #[derive(Clone, Copy, Default, PartialEq, Eq, Debug)]
 pub struct Service {
-    /// How often it was served.
+    /// How often the interrupt was served.
     pub count: u64,
     /// Longest time, without the interrupts nested in it.
     pub own_max: u64,
-    /// All that time.
+    /// Sum of these times.
     pub own_sum: u64,
     /// Longest time from the flag to acceptance.
     pub latency_max: u64,
@@ -81,14 +81,14 @@ impl Meters {
         }
     }
 
-    /// Forgets what was measured, but for the stack: its lowest point counts from power-up.
+    /// Clears all measurements except the lowest point of the stack, which counts from power-up.
     pub fn clear(&mut self) {
         self.services.fill(Service::default());
         self.window_outside = Window::default();
         self.window_step = Window::default();
     }
 
-    /// The chip was reset.
+    /// Takes note that the chip was reset.
     pub fn reset(&mut self) {
         self.frames.clear();
         self.open = None;
@@ -96,12 +96,13 @@ impl Meters {
         self.booted = false;
     }
 
-    /// How a vector was served.
+    /// Returns how a vector was served.
     pub fn service(&self, vector: u8) -> Service {
         self.services.get(usize::from(vector)).copied().unwrap_or_default()
     }
 
-    /// Longest time in which no tick came in, anywhere but in the step interrupt: interrupts were off, and nobody looked.
+    /// Longest time in which no tick was served, anywhere outside the step interrupt: interrupts were off, and no
+    /// handler checked for a tick.
     pub fn window_outside(&self) -> Window {
         self.window_outside
     }
@@ -111,12 +112,12 @@ impl Meters {
         self.window_step
     }
 
-    /// Keeps from now on the longest window of each place where interrupts go off.
+    /// From now on keeps the longest window of each place where interrupts go off.
     pub fn start_places(&mut self) {
         self.places = Some(BTreeMap::new());
     }
 
-    /// What has been kept since [`Meters::start_places`], longest first.
+    /// Returns the windows that were kept since [`Meters::start_places`], longest first.
     pub fn places(&self) -> Vec<Window> {
         let mut windows: Vec<Window> = self.places.iter().flatten().map(|(_, w)| *w).collect();
         windows.sort_by_key(|w| std::cmp::Reverse(w.cycles));
@@ -133,21 +134,21 @@ impl Meters {
         self.booted
     }
 
-    /// Interrupts being served.
+    /// Number of nested interrupts that are being served.
     #[inline]
     pub fn depth(&self) -> usize {
         self.frames.len()
     }
 
-    /// The time so far of an interrupt, without those nested in it, if it is what runs: not interrupted,
-    /// and not nested in itself.
+    /// Returns the time of an interrupt so far, without the interrupts nested in it. `None` unless it is the running
+    /// one: not interrupted, and not nested in itself.
     pub fn serving(&self, vector: u8, now: u64) -> Option<u64> {
         let (top, below) = self.frames.split_last()?;
         let outermost = top.vector == vector && below.iter().all(|f| f.vector != vector);
         outermost.then(|| (now - top.began).saturating_sub(top.nested))
     }
 
-    /// The instruction at `pc`, begun at `began`, was executed.
+    /// Takes note that the instruction at `pc`, begun at `began`, was executed.
     #[inline]
     pub fn executed(&mut self, cpu: Cpu, pc: u32, began: u64) {
         let on = cpu.interrupts_on();
@@ -155,7 +156,8 @@ impl Meters {
             self.was_on = on;
             if on { self.went_on(cpu, pc) } else { self.went_off(pc, began) }
         } else if !on && cpu.opcode(pc) == LOOKS_FOR_TICK {
-            // Whoever looks calls the handler.
+            // A handler that checks for a tick also calls the step interrupt if a tick is due, so the window ends
+            // here.
             self.went_on(cpu, pc);
             self.went_off(pc, cpu.cycle());
         }
@@ -189,8 +191,8 @@ impl Meters {
     }
 
     fn sank(&mut self, cpu: Cpu, pc: u32, sp: u16) {
-        // A stack pointer is written in two halves, high half first, with one instruction in
-        // between. In the meantime it means nothing.
+        // A stack pointer is written in two halves, high half first, with one instruction in between. Between the
+        // halves its value is meaningless.
         let is_half = |pc: u32| cpu.opcode(pc) & OUT_MASK == OUT_SPH;
         let half_written = is_half(pc) || is_half(pc.saturating_sub(2));
         if !half_written && sp >= self.ram_start {
@@ -198,7 +200,7 @@ impl Meters {
         }
     }
 
-    /// An interrupt was accepted at cycle `at`; its flag went up at `raised`, if that is known.
+    /// Takes note that an interrupt was accepted at cycle `at`. Its flag went up at `raised`, if that is known.
     pub fn entered(&mut self, vector: u8, at: u64, pc: u32, raised: Option<u64>) {
         self.frames.push(Frame { vector, began: at, nested: 0 });
         self.was_on = false;
@@ -215,7 +217,7 @@ impl Meters {
         self.frames.last().is_some_and(|frame| frame.vector == vector)
     }
 
-    /// The handler of an interrupt was called by another one instead.
+    /// Takes note that another handler called the handler of an interrupt, instead of the interrupt being accepted.
     pub fn called(&mut self, vector: u8, cpu: Cpu) {
         self.went_on(cpu, cpu.pc());
         self.entered(vector, cpu.cycle(), cpu.pc(), None);

@@ -1,8 +1,8 @@
 //! Where a job must end: a second reading of the same G-code.
 //!
-//! It shares no code with the firmware and knows nothing of motion, only of positions. All
-//! arithmetic is in whole numbers: a position is in units of 0.1 um (0.0001 degree), to which each
-//! axis word is rounded, and steps follow from it by one division, halves away from zero.
+//! It shares no code with the firmware, and reads only positions, not motion. All arithmetic is in whole numbers. A
+//! position is in units of 0.1 um (0.0001 degree), and each axis word is rounded to that. The steps follow from the
+//! position by one division, halves away from zero.
 
 mod exact;
 mod words;
@@ -30,9 +30,9 @@ const LETTERS: [char; AXES] = ['X', 'Y', 'Z', 'A', 'B', 'C'];
 /// A motor's settings.
 #[derive(Clone, Copy, Debug)]
 pub struct MotorSetup {
-    /// The axis it moves (`ma`), counted from 0. X if it drives X and Y together.
+    /// The axis that the motor moves (`ma`), counted from 0. X if it drives X and Y together.
     pub axis: usize,
-    /// How much of Y it drives besides: the whole of it, less the whole, or nothing.
+    /// The sign with which the motor also drives Y, as on a CoreXY machine: 1, -1, or 0 for not at all.
     pub besides: i64,
     /// Degrees per full step (`sa`).
     pub step_angle: Decimal,
@@ -40,9 +40,9 @@ pub struct MotorSetup {
     pub travel: Decimal,
     /// Microsteps per full step (`mi`).
     pub microsteps: u32,
-    /// Turns the other way round (`po`).
+    /// Whether the motor turns the other way round (`po`).
     pub inverted: bool,
-    /// Steps on a falling edge (`sp`).
+    /// Whether the motor steps on a falling edge (`sp`).
     pub active_low: bool,
 }
 
@@ -58,12 +58,12 @@ impl MotorSetup {
 }
 
 impl MotorSetup {
-    /// Where it is when the axes are there.
+    /// Returns the motor's position when the axes are at `position`.
     fn place(&self, position: &[i64; AXES]) -> i64 {
         position[self.axis] + self.besides * position[1]
     }
 
-    /// Whether all that it drives is to move.
+    /// Whether all axes that the motor drives may move.
     fn moves(&self, modes: &[AxisMode; AXES]) -> bool {
         let standard = |axis: usize| modes[axis] == AxisMode::Standard;
         standard(self.axis) && (self.besides == 0 || standard(1))
@@ -71,8 +71,8 @@ impl MotorSetup {
 }
 
 impl Setup {
-    /// What each motor moves, for the meter of pauses. Two that drive X and Y together go as far as two axes do that are turned by 45
-    /// degrees, times the root of 2.
+    /// Returns what each motor moves, for the meter of pauses. Two motors that drive X and Y together are treated as
+    /// two axes turned by 45 degrees, with lengths multiplied by the root of 2.
     pub fn travels(&self) -> [Travel; MOTORS] {
         std::array::from_fn(|m| {
             let motor = &self.motors[m];
@@ -87,17 +87,17 @@ impl Setup {
     }
 }
 
-/// How an axis takes its words (`am`).
+/// How an axis treats its words (`am`).
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum AxisMode {
     /// Its words are ignored.
     Disabled,
-    /// As usual.
+    /// The axis moves as its words say.
     #[default]
     Standard,
-    /// Planned, but its motors stand still.
+    /// The axis is planned, but its motors stand still.
     Inhibited,
-    /// Its words are lengths along a circumference. A job that uses it is unclear: the angle is
+    /// Words of the axis are lengths along a circumference. A job that uses it is [`Unclear`], because the angle is
     /// no decimal number.
     Radius,
 }
@@ -116,7 +116,7 @@ pub struct Setup {
 pub struct Outcome {
     /// Machine position of each axis, in units.
     pub position: [i64; AXES],
-    /// Steps each motor has made on balance.
+    /// Steps up minus steps down of each motor.
     pub steps: Vec<i64>,
     /// Longest dwell, in milliseconds.
     pub longest_dwell_ms: u64,
@@ -127,7 +127,7 @@ pub struct Outcome {
 pub struct Unclear {
     /// Line number in the job, from 1.
     pub line: usize,
-    /// What it is about.
+    /// The code that makes it unclear.
     pub what: String,
 }
 
@@ -151,8 +151,8 @@ pub fn run<'a>(
     Ok(reader.finish())
 }
 
-/// Where each line ends, in steps of each motor: its number, and what [`run`] would say if the job ended there.
-/// Lines from one that is unclear on are left out.
+/// Returns for each line its number and the steps of each motor that [`run`] would return if the job ended there. The
+/// list ends before the first line that is unclear.
 pub fn ends<'a>(
     lines: impl IntoIterator<Item = (usize, &'a str)>,
     setup: &Setup,
@@ -165,20 +165,20 @@ pub fn ends<'a>(
     clear.collect()
 }
 
-/// The longest dwell of a job, in milliseconds, of the lines that can be read.
+/// Returns the longest dwell of a job, in milliseconds. Lines that cannot be read are skipped.
 pub fn longest_dwell_ms<'a>(
     lines: impl IntoIterator<Item = (usize, &'a str)>,
     setup: &Setup,
 ) -> u64 {
     let mut reader = Reader::new(setup);
     for (_, text) in lines {
-        // What is not known of it is of no account here.
+        // Errors do not matter here.
         let _ = reader.line(text);
     }
     reader.longest_dwell_ms
 }
 
-/// What a line does once, G-code times ten.
+/// What a line does once, named by its G code times ten.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Once {
     Dwell,
@@ -190,7 +190,7 @@ enum Once {
 struct Reader<'a> {
     setup: &'a Setup,
     position: [i64; AXES],
-    /// Where the motors would be counted from: moved by G28.3.
+    /// The position from which steps count; G28.3 moves it.
     origin: [i64; AXES],
     steps: Vec<i64>,
     moving: bool,
@@ -272,17 +272,18 @@ impl<'a> Reader<'a> {
             910 => self.incremental = true,
             530 => *machine = true,
             540 | 550 | 560 | 570 | 580 | 590 => self.system = (tenths / 10 - 53) as usize,
-            // Planes, feed modes, path modes, arc distance, cutter compensation and tool length off, retract modes.
+            // Codes without effect on the end position: planes, feed modes, path modes, arc distance, cutter
+            // compensation and tool length off, retract modes.
             170 | 180 | 190 | 930 | 940 | 950 | 610 | 611 | 640 | 901 | 911 | 400 | 490 | 980
             | 990 => {}
-            // What S is.
+            // The meaning of S.
             960 | 970 => {}
             _ => return Err(format!("G{}", tenths as f64 / 10.0)),
         }
         Ok(())
     }
 
-    /// True when the program ends.
+    /// Executes an M code. Returns true when the program ends.
     fn m_code(&mut self, tenths: i64) -> Result<bool, String> {
         match tenths {
             20 | 300 => Ok(true),
@@ -307,7 +308,7 @@ impl<'a> Reader<'a> {
             }
             let inches = self.inches && axis < FIRST_ROTARY;
             let unit = if inches { UNITS_PER_INCH } else { UNITS };
-            // Half of a diameter.
+            // In diameter mode an X word is twice the distance.
             let unit = if self.diameters && axis == 0 { unit / 2 } else { unit };
             values[axis] = Some(word.value.scaled(unit));
         }
@@ -387,12 +388,12 @@ impl<'a> Reader<'a> {
         self.moving = false;
     }
 
-    /// Adds the steps from `origin` to the position.
+    /// Adds the steps from `origin` to the position to the count.
     fn count_steps(&mut self) {
         self.steps = self.steps_here();
     }
 
-    /// The steps made so far, with those from `origin` to the position.
+    /// Returns the steps so far, including the steps from `origin` to the position.
     fn steps_here(&self) -> Vec<i64> {
         let counted = self.setup.motors.iter().zip(&self.steps);
         let here = counted.map(|(motor, steps)| {

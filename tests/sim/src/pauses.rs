@@ -1,10 +1,11 @@
-//! Pauses: places where the step stream runs dry in mid-motion and starts again at speed.
+//! Finds pauses: places where the step stream runs dry in mid-motion and starts again at speed.
 //!
-//! The meter sees what a motor sees, the steps, and when the step timer stands still. A pause is an interval
-//! between two steps of the leading motor that is longer than [`RATIO`] times the interval before it and the one
-//! after it, while the path moves at [`SLOWEST`] or more on both sides. The leading motor is the one that steps
-//! most: during the interval no other motor steps twice. A motor that turns round stands still on purpose, and so
-//! does one whose velocity falls towards the interval and rises after it at a rate that leads through zero there.
+//! The meter sees what a motor sees: the steps, and the times when the step timer stands still. A pause is an
+//! interval between two steps of the leading motor that is longer than [`RATIO`] times the interval before it and the
+//! one after it, while the path moves at [`SLOWEST`] or more on both sides. The leading motor is the one that steps
+//! most: during the interval no other motor steps twice. Two cases are no pauses. A motor that reverses stands still
+//! on purpose. So does a motor whose velocity falls before the interval and rises after it at rates that lead through
+//! zero within the interval.
 
 use std::collections::VecDeque;
 
@@ -16,13 +17,13 @@ mod side;
 
 use side::Side;
 
-/// How much longer than its neighbours an interval is that counts.
+/// How much longer than its neighbours an interval must be to count.
 pub const RATIO: f64 = 2.5;
 /// Velocity of the path from which pauses count, mm/s.
 pub const SLOWEST: f64 = 8.0;
-/// A side of a pause is judged by what happens within so many seconds.
+/// The time on each side of a pause that is looked at, s.
 const SIGHT_S: f64 = 0.010;
-/// Steps kept: more than four motors make in the time that is judged.
+/// Number of steps kept: more than four motors make in the time that is looked at.
 const KEPT: usize = 1 << 14;
 
 /// What the meter needs to know of the machine and of its job.
@@ -43,33 +44,33 @@ pub struct Travel {
     pub axis: usize,
     /// Length of a step, mm or degrees.
     pub step: f64,
-    /// The axis turns.
+    /// Whether the axis is rotary.
     pub rotary: bool,
 }
 
 /// A pause.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Pause {
-    /// Cycle of the step before it.
+    /// Cycle of the step before the pause.
     pub cycle: u64,
-    /// Cycles to the step after it.
+    /// Cycles from the step before the pause to the step after it.
     pub cycles: u64,
-    /// Velocity of the path beside it, mm/s: the lower of the two sides.
+    /// Velocity of the path beside the pause, mm/s: the lower of the two sides.
     pub velocity: f64,
     /// The line of the job that was on its way, if the ends of lines are known.
     pub line: Option<usize>,
 }
 
-/// What has been found.
+/// What the meter has found.
 #[derive(Clone, Default, PartialEq, Debug)]
 pub struct Found {
-    /// Long intervals of the leading motor.
+    /// Intervals of the leading motor that are too long.
     pub pauses: Vec<Pause>,
-    /// Times that the step timer stood still in motion, long enough for a pause or not.
+    /// Standstills of the step timer in motion, whether or not they are long enough for a pause.
     pub starved: Vec<Pause>,
 }
 
-/// Something that is judged as soon as enough of what comes after it has been seen.
+/// A possible pause. It is judged as soon as enough steps after it are known.
 #[derive(Clone, Copy, Debug)]
 struct Candidate {
     kind: Kind,
@@ -92,21 +93,21 @@ pub struct Meter {
     recent: VecDeque<Step>,
     /// The last three steps of each motor, the newest first.
     times: [[Option<u64>; 3]; MOTORS],
-    /// The line during which the newest step but one of each motor came.
+    /// The lines during which the newest two steps of each motor came, the newest first.
     lines: [[Option<usize>; 2]; MOTORS],
     position: [i64; MOTORS],
-    /// How many of the lines have been carried out.
+    /// Number of lines that have been carried out.
     done: usize,
-    /// The last step before the timer stopped, and the line.
+    /// The last step before the timer stopped, and the line at that time.
     stopped: Option<(u64, Option<usize>)>,
-    /// The timer runs again, but no step has come yet.
+    /// Whether the timer runs again, but no step has come yet.
     restarted: bool,
     waiting: VecDeque<Candidate>,
     found: Found,
 }
 
 impl Meter {
-    /// A meter for motors at rest, whose positions count from here.
+    /// A meter for motors at rest. Positions count from here.
     pub fn new(scale: Scale) -> Self {
         let mut meter = Meter {
             scale,
@@ -124,7 +125,7 @@ impl Meter {
         meter
     }
 
-    /// A step.
+    /// Takes a step.
     pub fn step(&mut self, step: Step) {
         let line = self.line();
         if self.recent.len() == KEPT {
@@ -143,18 +144,18 @@ impl Meter {
         }
     }
 
-    /// The step timer runs, or not.
+    /// Takes note that the step timer was started or stopped.
     pub fn timer(&mut self, runs: bool) {
         if runs {
             self.restarted = self.stopped.is_some();
         } else if let Some(last) = self.recent.back() {
-            // One that stops again before a step came goes on standing still.
+            // If the timer stops again before a step has come, the standstill goes on.
             self.stopped = self.stopped.or(Some((last.cycle, self.line())));
             self.restarted = false;
         }
     }
 
-    /// What has been found so far.
+    /// Returns what has been found so far.
     pub fn found(&self) -> Found {
         let mut found = self.found.clone();
         for candidate in &self.waiting {
@@ -221,13 +222,14 @@ fn judge(scale: &Scale, recent: &VecDeque<Step>, candidate: Candidate, found: &m
     }
     let pause = Pause { cycle: from, cycles: to - from, velocity, line };
     let list = if kind == Kind::Stop { &mut found.starved } else { &mut found.pauses };
-    // Motors that step alike pause alike.
+    // Several motors may lead alike and show the same pause. It counts once.
     if list.last().is_none_or(|last| pause.cycle >= last.cycle + last.cycles) {
         list.push(pause);
     }
 }
 
-/// Whether the motor leads from its step before `begin` to the one at or behind `end`, and goes on the way it went.
+/// Whether the motor leads from its step before `begin` to its step at or behind `end`, and steps in the same
+/// direction on both sides.
 fn leads(recent: &VecDeque<Step>, motor: u8, begin: usize, end: usize) -> bool {
     let mut others = [0; MOTORS];
     for step in recent.range(begin..end) {
@@ -241,11 +243,13 @@ fn leads(recent: &VecDeque<Step>, motor: u8, begin: usize, end: usize) -> bool {
     others.iter().all(|n| *n <= 1) && before == after
 }
 
-/// Whether motion comes to rest in a gap of so many seconds and leaves it from rest, by the velocities beside it.
+/// Whether motion comes to rest within a gap of so many seconds and starts from rest again, as the velocities beside
+/// it show.
 fn planned(gap: f64, before: &Side, after: &Side) -> bool {
-    /// Slices of constant velocity, two of which hide how velocity changes, take 2 ms.
+    /// Segments have constant velocity and take 2 ms; two of them hide how velocity changes.
     const SLICES_S: f64 = 0.004;
-    /// Motion that was ended by a switch or a stop, not by a plan, begins anew much later.
+    /// Gap after which the motion before it need not slow down, s. A motion that a switch or a stop has ended does
+    /// not slow down as planned, and the next motion begins much later.
     const ENDED_S: f64 = 0.100;
     let reach = 0.6 * gap + SLICES_S;
     after.rest <= reach && (before.rest <= reach || gap > ENDED_S)

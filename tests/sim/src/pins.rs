@@ -1,8 +1,8 @@
-//! Interrupts of pins: INT0 to INT7 at the most, and PCINT0 to PCINT31.
+//! Pin interrupts: INT0 to INT7 at most, and PCINT0 to PCINT31.
 //!
-//! In place of simavr's: a flag stays raised while it is masked, each group of eight pins has one flag, and an edge
-//! counts at its cycle. An edge is one that comes from outside; the firmware's own outputs raise nothing here. The
-//! low level of an INT is taken for its falling edge.
+//! They replace simavr's pin interrupts. A flag stays raised while it is masked, each group of eight pins has one
+//! flag, and an edge counts at its cycle. Only edges from outside count; the firmware's own outputs raise no flag
+//! here. The low-level mode of an INT is treated as its falling edge.
 
 /// The registers, in the data space.
 const PCIFR: u16 = 0x3B;
@@ -12,13 +12,13 @@ const PCICR: u16 = 0x68;
 const EICRA: u16 = 0x69;
 const EICRB: u16 = 0x6A;
 
-/// Which pins have which interrupts. All the rest is alike on all chips.
+/// Which pins have which interrupts. All else is alike on all chips.
 pub struct PinLayout {
     /// The vector of INT0; the others follow.
     pub external_vector: u8,
     /// The vector of PCINT0 to PCINT7; the others follow.
     pub change_vector: u8,
-    /// The mask of each eight pins, PCMSK0 first.
+    /// The mask register of each eight pins, PCMSK0 first.
     masks: &'static [u16],
     /// Pins with an INT.
     externals: &'static [Pins],
@@ -26,7 +26,7 @@ pub struct PinLayout {
     changes: &'static [Pins],
 }
 
-/// Pins of a port, beside each other, whose interrupts have numbers beside each other.
+/// Adjacent pins of a port whose interrupts have consecutive numbers.
 struct Pins {
     port: char,
     first: u8,
@@ -38,7 +38,7 @@ const fn pins(port: char, first: u8, count: u8, number: u8) -> Pins {
     Pins { port, first, count, number }
 }
 
-/// Those of the ATmega2560.
+/// The pin interrupts of the ATmega2560.
 pub const ATMEGA2560: PinLayout = PinLayout {
     external_vector: 1,
     change_vector: 9,
@@ -47,7 +47,7 @@ pub const ATMEGA2560: PinLayout = PinLayout {
     changes: &[pins('B', 0, 8, 0), pins('E', 0, 1, 8), pins('J', 0, 7, 9), pins('K', 0, 8, 16)],
 };
 
-/// Those of the ATmega1284P.
+/// The pin interrupts of the ATmega1284P.
 pub const ATMEGA1284P: PinLayout = PinLayout {
     external_vector: 1,
     change_vector: 4,
@@ -57,7 +57,7 @@ pub const ATMEGA1284P: PinLayout = PinLayout {
 };
 
 impl PinLayout {
-    /// The vectors, as a bit set.
+    /// Returns the vectors of all pin interrupts, as a bit set.
     pub fn vectors(&self) -> u64 {
         let externals: u8 = self.externals.iter().map(|pins| pins.count).sum();
         let bits = |count: u64| (1 << count) - 1;
@@ -65,7 +65,7 @@ impl PinLayout {
             | bits(self.masks.len() as u64) << self.change_vector
     }
 
-    /// Every register.
+    /// Returns the addresses of all registers.
     pub fn registers(&self) -> impl Iterator<Item = u16> {
         [PCIFR, EIFR, EIMSK, PCICR, EICRA, EICRB].into_iter().chain(self.masks.iter().copied())
     }
@@ -75,7 +75,7 @@ impl PinLayout {
     }
 }
 
-/// The number of the interrupt of a pin.
+/// Returns the number of a pin's interrupt; `None` if the pin has none.
 fn number(of: &[Pins], port: char, bit: u8) -> Option<u8> {
     of.iter().filter(|pins| pins.port == port).find_map(|pins| {
         bit.checked_sub(pins.first).filter(|n| *n < pins.count).map(|n| pins.number + n)
@@ -95,10 +95,10 @@ pub struct PinInterrupts {
 }
 
 impl PinInterrupts {
-    /// The two of flags, of which SBI touches one flag only.
+    /// The two flag registers, where SBI touches one flag only.
     pub const FLAGS: [u16; 2] = [PCIFR, EIFR];
 
-    /// As after reset.
+    /// The registers in their state after reset.
     pub fn new(layout: &'static PinLayout) -> Self {
         PinInterrupts {
             layout,
@@ -128,7 +128,7 @@ impl PinInterrupts {
         }
     }
 
-    /// What a register reads.
+    /// Returns the value of a register.
     pub fn read(&self, addr: u16) -> u8 {
         match addr {
             PCIFR => self.change_flags,
@@ -158,7 +158,7 @@ impl PinInterrupts {
         }
     }
 
-    /// The interrupt is being served.
+    /// Takes note that the interrupt is being served: its flag is cleared.
     pub fn acknowledge(&mut self, vector: u8) {
         match vector.checked_sub(self.layout.change_vector) {
             Some(group) => self.change_flags &= !(1 << group),

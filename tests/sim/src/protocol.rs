@@ -1,17 +1,17 @@
-//! Lines that the firmware sends, told apart.
+//! Classifies the lines that the firmware sends.
 
 use serde_json::Value;
 
 /// A line from the firmware.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Incoming {
-    /// The sign of life after a reset.
+    /// The banner after a reset.
     Banner,
     /// The answer to a line.
     Response(Response),
-    /// A report that nobody asked for: `sr`, `qr`, `er` and so on.
+    /// An unsolicited report: `sr`, `qr`, `er` and so on.
     Report(Value),
-    /// The greeting in another dialect, which comes where nothing has decided for one yet.
+    /// A greeting in another dialect. It comes where no dialect is settled yet.
     OtherGreeting,
     /// Anything else.
     Other(String),
@@ -20,9 +20,9 @@ pub enum Incoming {
 /// The answer to a line.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Response {
-    /// As it came.
+    /// The line as it came.
     pub raw: String,
-    /// What is under `r`.
+    /// The value under `r`.
     pub body: Value,
     /// Status code; 0 is good.
     pub status: i64,
@@ -37,13 +37,13 @@ const OTHER_GREETINGS: [&str; 2] = ["Grbl 1.1h ['$' for help]", "start"];
 pub const STATUS_NOOP: i64 = 3;
 
 impl Response {
-    /// Whether the line was taken.
+    /// Whether the line was accepted.
     pub fn is_ok(&self) -> bool {
         self.status == 0 || self.status == STATUS_NOOP
     }
 }
 
-/// Tells what a line is.
+/// Determines what a line is.
 pub fn classify(line: &str) -> Incoming {
     if OTHER_GREETINGS.contains(&line.trim_end()) {
         return Incoming::OtherGreeting;
@@ -72,7 +72,7 @@ pub fn classify(line: &str) -> Incoming {
     }
 }
 
-/// The line with its names in quotes, which `{js:0}` leaves out.
+/// Returns the line with its names in quotes, which `{js:0}` leaves out.
 fn quoted(line: &str) -> String {
     let (mut out, mut in_text) = (String::new(), false);
     let mut rest = line;
@@ -92,7 +92,7 @@ fn quoted(line: &str) -> String {
     out
 }
 
-/// The machine state in a report or in the body of a response.
+/// Returns the machine state from a report or from the body of a response.
 pub fn state_of(value: &Value) -> Option<i64> {
     let stat = value.get("stat").or_else(|| value.get("sr").and_then(|sr| sr.get("stat")));
     stat.and_then(Value::as_i64)
@@ -103,7 +103,7 @@ pub fn is_idle(stat: i64) -> bool {
     matches!(stat, 1 | 3 | 4)
 }
 
-/// The first name in a line of JSON other than wrapped G-code.
+/// Returns the first name in a line of JSON; `None` for wrapped G-code and other lines.
 pub fn control_name(line: &str) -> Option<String> {
     let inner = line.trim().strip_prefix('{')?;
     let end = inner.find(':')?;

@@ -13,7 +13,7 @@ use rustix::io::Errno;
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
-/// The machine's side.
+/// The machine's side of a pseudo-terminal.
 pub struct Pty {
     master: OwnedFd,
     path: PathBuf,
@@ -21,12 +21,12 @@ pub struct Pty {
     unwritten: Vec<u8>,
 }
 
-/// What the other side is doing.
+/// The state of the other side.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Peer {
-    /// Somebody has it open.
+    /// A program has the other side open.
     Open,
-    /// Nobody has.
+    /// No program has the other side open.
     Closed,
 }
 
@@ -49,8 +49,8 @@ impl Pty {
         &self.path
     }
 
-    /// Makes a symbolic link to the path; it goes when this does. An older link is replaced,
-    /// anything else is not.
+    /// Makes a symbolic link to the path. The link is removed when this `Pty` is dropped. An older link is replaced;
+    /// any other file is an error.
     pub fn link(&mut self, link: &Path) -> Result<()> {
         match fs::symlink_metadata(link) {
             Ok(meta) if meta.is_symlink() => fs::remove_file(link)?,
@@ -64,7 +64,7 @@ impl Pty {
         Ok(())
     }
 
-    /// Waits up to `timeout` for bytes. Tells whether the other side is open.
+    /// Waits up to `timeout` for bytes. Returns whether the other side is open.
     pub fn wait(&self, timeout: Duration) -> Result<Peer> {
         let mut fds = [PollFd::new(&self.master, PollFlags::IN)];
         let timeout = Timespec::try_from(timeout)?;
@@ -76,12 +76,12 @@ impl Pty {
         Ok(if closed { Peer::Closed } else { Peer::Open })
     }
 
-    /// Bytes from the other side; none when there are none.
+    /// Returns the bytes from the other side; empty if none have come.
     pub fn read(&self) -> Result<Vec<u8>> {
         let mut buffer = [0; 1024];
         match rustix::io::read(&self.master, &mut buffer) {
             Ok(n) => Ok(buffer[..n].to_vec()),
-            // EIO is what Linux says when nobody has the other side open.
+            // Linux returns EIO while no program has the other side open.
             Err(Errno::AGAIN | Errno::INTR | Errno::IO) => Ok(Vec::new()),
             Err(e) => Err(e).context("cannot read from the pseudo-terminal"),
         }
@@ -110,13 +110,13 @@ impl Pty {
 impl Drop for Pty {
     fn drop(&mut self) {
         if let Some(link) = &self.link {
-            // It may be gone already; nothing more can be done about it here.
+            // The link may be gone already, and an error cannot be handled here.
             let _ = fs::remove_file(link);
         }
     }
 }
 
-/// Puts the other side into raw mode; it stays so while the machine's side is open.
+/// Puts the other side into raw mode, which lasts as long as the machine's side is open.
 fn make_raw(path: &Path) -> Result<()> {
     let slave = open(path, OFlags::RDWR | OFlags::NOCTTY, Mode::empty())
         .with_context(|| format!("cannot open {}", path.display()))?;

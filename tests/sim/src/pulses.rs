@@ -1,4 +1,4 @@
-//! What the registers of a 16-bit timer say of the pulses on one of its pins (data sheet, 17.9 to 17.11).
+//! The pulses on a timer's pin, computed from the registers of the timer (data sheet, 17.9 to 17.11).
 
 use kerf::boards::{Pin, Pwm};
 
@@ -10,15 +10,15 @@ const TCCR2A: u16 = 0xB0;
 /// Pulses on a pin.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Pulses {
-    /// How many a second; 0 for none.
+    /// Pulses in a second; 0 for none.
     pub hertz: f64,
-    /// The part of its period that the pin is high.
+    /// Duty cycle: the share of its period in which the pin is high.
     pub share: f64,
 }
 
 impl Machine {
-    /// The pulses that the spindle is driven by: none on a board without the output, or while the timer does not
-    /// drive its pin, which is low or high then as of its port.
+    /// Returns the pulses that drive the spindle. There are none on a board without the output, nor while the timer
+    /// does not drive its pin. The pin then has the level of its port.
     pub fn pulses(&self) -> Pulses {
         let Some(pwm) = self.board().pwm else { return Pulses { hertz: 0.0, share: 0.0 } };
         let drives = self.peek(pwm.pin().port.address() as u16 - 1) >> pwm.pin().bit & 1 != 0;
@@ -29,7 +29,8 @@ impl Machine {
         })
     }
 
-    /// The part of the time that an output is high: that of timer 2's pulses while it drives the pin, else 0 or 1 as of the port.
+    /// Returns the share of time that an output is high: the duty cycle of timer 2 while the timer drives the pin,
+    /// else 0 or 1 from the port.
     pub fn power_at(&self, pin: Pin) -> f64 {
         let is_output = self.peek(pin.port.address() as u16 - 1) >> pin.bit & 1 != 0;
         let (a, b) = (self.peek(TCCR2A), self.peek(TCCR2A + 1));
@@ -37,7 +38,7 @@ impl Machine {
         if !is_output || connection == 0 {
             return f64::from(u8::from(is_output && self.is_high(pin)));
         }
-        // Up to 255 and down again, cleared on the way up, and running: the only mode that is known here.
+        // Counts up to 255 and down again, clears on the way up, and runs: the only mode that is supported here.
         assert_eq!((a & 3, connection), (1, 0b10), "TCCR2A {a:#x}");
         assert!(b & 7 != 0 && b & 8 == 0, "TCCR2B {b:#x}");
         let compare = self.peek(TCCR2A + 3 + u16::from(pin.channel().unwrap_or(0)));
@@ -54,7 +55,7 @@ impl Machine {
         if clock == 0 || connection == 0 {
             return None;
         }
-        // Phase and frequency correct up to ICR, cleared on the way up: the only mode that is known here.
+        // Phase and frequency correct up to ICR, cleared on the way up: the only mode that is supported here.
         assert_eq!(
             (a & 3, b >> 3 & 3, connection),
             (0, 0b10, 0b10),

@@ -1,4 +1,4 @@
-//! What the step and direction pins do.
+//! Records what the step and direction pins do.
 
 use std::ffi::c_void;
 use std::ptr::NonNull;
@@ -12,14 +12,14 @@ use crate::mechanics::SpindlePin;
 use crate::pauses::{Found, Meter, Scale};
 use crate::trace::Trace;
 
-/// A step: when, which motor (0 is motor 1), which way.
+/// A step: its time, its motor (0 is motor 1) and its direction.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Step {
     /// Cycle at which the pulse begins.
     pub cycle: u64,
     /// Motor, counted from 0.
     pub motor: u8,
-    /// Direction pin low.
+    /// Whether the direction pin is low.
     pub positive: bool,
 }
 
@@ -37,7 +37,7 @@ pub struct Sums {
 pub struct Motor {
     /// Steps up minus steps down; a low direction pin is up.
     pub position: i64,
-    /// All steps.
+    /// Steps in both directions together.
     pub steps: u64,
     /// Shortest time between two steps.
     pub min_interval: Option<u64>,
@@ -45,7 +45,7 @@ pub struct Motor {
     pub pulse: Option<(u64, u64)>,
     /// Shortest time from a change of direction to the next step.
     pub min_setup: Option<u64>,
-    /// Steps on a falling edge: the pin rests high.
+    /// Whether the motor steps on a falling edge, so that the pin rests high.
     active_low: bool,
     step_high: bool,
     dir_high: bool,
@@ -123,7 +123,7 @@ impl Recorder {
         &self.motors
     }
 
-    /// Steps of all motors.
+    /// Number of steps of all motors.
     pub fn steps(&self) -> u64 {
         self.motors.iter().map(|m| m.steps).sum()
     }
@@ -143,33 +143,33 @@ impl Recorder {
         self.log = Some(Vec::new());
     }
 
-    /// The steps kept.
+    /// Returns the steps that were kept.
     pub fn log(&self) -> &[Step] {
         self.log.as_deref().unwrap_or_default()
     }
 
-    /// When a motor stepped, of the steps kept.
+    /// Returns the cycles of a motor's steps, among the steps that were kept.
     pub fn steps_of(&self, motor: u8) -> Vec<u64> {
         self.log().iter().filter(|s| s.motor == motor).map(|s| s.cycle).collect()
     }
 
-    /// Looks for pauses from now on, motors being at rest.
+    /// Looks for pauses from now on. The motors must be at rest.
     pub fn meter_pauses(&mut self, scale: Scale) {
         self.pauses = Some(Meter::new(scale));
     }
 
-    /// The pauses found; none if nobody has asked to look for them.
+    /// Returns the pauses found; none if `meter_pauses` was not called.
     pub fn pauses(&self) -> Found {
         self.pauses.as_ref().map(Meter::found).unwrap_or_default()
     }
 
-    /// The times that the step timer has run, from cycle to cycle, while steps were kept; one that still runs ends at
+    /// The runs of the step timer, from cycle to cycle, while steps were kept. A run that has not ended ends at
     /// [`u64::MAX`].
     pub fn timer_runs(&self) -> &[(u64, u64)] {
         &self.runs
     }
 
-    /// The step timer was started or stopped.
+    /// Takes note that the step timer was started or stopped.
     pub(crate) fn timer(&mut self, runs: bool, now: u64) {
         if self.log.is_some() && runs {
             self.runs.push((now, u64::MAX));
@@ -185,7 +185,7 @@ impl Recorder {
         std::mem::replace(&mut self.trace, trace)
     }
 
-    /// Forgets all but the levels of the pins.
+    /// Forgets everything except the levels of the pins.
     pub fn clear(&mut self) {
         for m in &mut self.motors {
             let Motor { active_low, step_high, dir_high, .. } = *m;
@@ -198,21 +198,21 @@ impl Recorder {
         }
     }
 
-    /// Which motors step on a falling edge, as bits, from now on.
+    /// Sets which motors step on a falling edge from now on, as bits.
     pub fn set_active_low(&mut self, motors: u8) {
         for (bit, m) in self.motors.iter_mut().enumerate() {
             m.active_low = motors & 1 << bit != 0;
         }
     }
 
-    /// A reset has made all pins inputs; the drivers see them low.
+    /// Takes note of a reset, which makes all pins inputs; the drivers see low levels.
     pub(crate) fn pins_released(&mut self) {
         for m in &mut self.motors {
             (m.step_high, m.dir_high) = (false, false);
         }
     }
 
-    /// An edge of a step pin. If it is a step, whether that is upwards.
+    /// Takes an edge of a step pin. If it is a step, returns whether the step is upwards; else `None`.
     fn step_edge(&mut self, motor: usize, high: bool, now: u64, sums: Sums) -> Option<bool> {
         let m = &mut self.motors[motor];
         if m.step_high == high {
@@ -254,19 +254,19 @@ impl Recorder {
     }
 }
 
-/// What a pin's callback needs to know.
+/// The data of a pin's callback.
 pub(crate) struct Probe {
     bus: NonNull<Bus>,
     what: What,
 }
 
-/// What an output does.
+/// What an output is for.
 #[derive(Clone, Copy)]
 enum What {
     Step(usize),
     Dir(usize),
     Spindle(SpindlePin),
-    /// Selects something on SPI.
+    /// Selects a device on SPI.
     Select(Pin),
 }
 
@@ -277,7 +277,8 @@ pub(crate) fn attach(bus: NonNull<Bus>, cpu: Cpu, board: &Board) -> Vec<Probe> {
     watch(bus, cpu, &pins.collect::<Vec<_>>())
 }
 
-/// Listens to the spindle's pins, of which one may be there for its pulses' width. As `attach`.
+/// Listens to the spindle's pins. `pulse` is the pin of its pulse-width drive, if there is one. The probes must live as
+/// long as the CPU.
 pub(crate) fn attach_spindle(
     bus: NonNull<Bus>,
     cpu: Cpu,
@@ -291,7 +292,7 @@ pub(crate) fn attach_spindle(
     watch(bus, cpu, &pins.collect::<Vec<_>>())
 }
 
-/// Listens to a pin that selects something on SPI. As `attach`.
+/// Listens to a pin that selects a device on SPI. The probes must live as long as the CPU.
 pub(crate) fn attach_select(bus: NonNull<Bus>, cpu: Cpu, pin: Pin) -> Vec<Probe> {
     watch(bus, cpu, &[(pin, What::Select(pin))])
 }

@@ -19,13 +19,13 @@ const AXIS_NAMES: [char; AXES] = ['X', 'Y', 'Z', 'A', 'B', 'C'];
 pub struct Rejected {
     /// Its number in the job.
     pub line: usize,
-    /// What it says.
+    /// Text of the line.
     pub text: String,
-    /// Why it was refused.
+    /// Status with which the firmware refused it.
     pub status: i64,
 }
 
-/// What the job's driver knows when it ends.
+/// What the runner of the job knows when the job ends.
 pub struct Measured {
     /// Lines in the job.
     pub lines: usize,
@@ -39,17 +39,17 @@ pub struct Measured {
     pub restarts: usize,
     /// Segments that were late since the reset, as the firmware counts them.
     pub late_segments: Option<u64>,
-    /// What came and should not have.
+    /// Lines that came from the firmware and should not have come.
     pub strays: Vec<String>,
-    /// From the first line to rest.
+    /// Time from the first line to rest, s.
     pub seconds_to_idle: f64,
-    /// From the first line to the last answer.
+    /// Time from the first line to the last answer, s.
     pub seconds_to_answer: f64,
     /// Motors and axes.
     pub setup: Setup,
-    /// What the oracle says.
+    /// What the oracle expects.
     pub expected: Result<Outcome, Unclear>,
-    /// What ended the job before its time.
+    /// The fault that ended the job early.
     pub fault: Option<String>,
 }
 
@@ -58,32 +58,32 @@ pub struct Measured {
 pub struct PauseReport {
     /// The line of the job that was on its way, if it is known.
     pub line: Option<usize>,
-    /// When it began, from the first step.
+    /// When it began, counted from the first step.
     pub seconds: f64,
     /// How long it took.
     pub ms: f64,
-    /// Velocity of the path beside it, mm/s.
+    /// Velocity of the path beside the pause, mm/s.
     pub velocity: f64,
 }
 
 /// One motor in a report.
 #[derive(Clone, Serialize, Debug)]
 pub struct MotorReport {
-    /// From 1.
+    /// Number of the motor, from 1.
     pub motor: usize,
     /// The axis it moves.
     pub axis: char,
-    /// Steps on balance.
+    /// Steps up minus steps down.
     pub steps: i64,
-    /// The oracle's.
+    /// The steps that the oracle expects.
     pub expected: Option<i64>,
     /// Steps in both directions.
     pub total: u64,
-    /// By the shortest time between two steps.
+    /// Highest step rate, from the shortest time between two steps.
     pub highest_rate_hz: Option<f64>,
     /// Shortest and longest pulse.
     pub pulse_us: Option<(f64, f64)>,
-    /// Shortest time from direction to step.
+    /// Shortest time from a change of direction to a step.
     pub dir_setup_us: Option<f64>,
 }
 
@@ -92,9 +92,9 @@ pub struct MotorReport {
 pub struct AxisReport {
     /// Its letter.
     pub axis: char,
-    /// By the steps made.
+    /// Position from the steps that were made.
     pub position: f64,
-    /// The oracle's.
+    /// The position that the oracle expects.
     pub expected: f64,
 }
 
@@ -129,11 +129,12 @@ pub struct VectorReport {
 /// How a job went.
 #[derive(Clone, Serialize, Debug)]
 pub struct Report {
-    /// Everything as it should be.
+    /// Whether everything is as it should be.
     pub ok: bool,
-    /// What is not.
+    /// What is wrong.
     pub problems: Vec<String>,
-    /// From where on, and why, nobody knows where the job should end: its ends are not checked, all else is.
+    /// The line from which on the oracle cannot tell where the job should end, and why. The ends are then not
+    /// checked; all else is.
     pub unchecked: Option<String>,
     /// The board.
     pub board: &'static str,
@@ -155,25 +156,25 @@ pub struct Report {
     pub motors: Vec<MotorReport>,
     /// The axes that have motors.
     pub axes: Vec<AxisReport>,
-    /// Share of time not asleep, from the first step to the last.
+    /// Share of time that the CPU is awake, from the first step to the last.
     pub cpu_load: Option<f64>,
-    /// Share of time in interrupts, likewise.
+    /// Share of time in interrupts, from the first step to the last.
     pub interrupt_load: Option<f64>,
     /// Longest time in which no tick could come in, outside the step interrupt.
     pub interrupts_off: WindowReport,
-    /// Longest time with interrupts off inside it.
+    /// Longest time with interrupts off inside the step interrupt.
     pub interrupts_off_in_step: WindowReport,
     /// Bytes never touched between static data and stack.
     pub free_stack: Option<i32>,
-    /// Bytes that came in faster than they were read.
+    /// Bytes that were lost because they were not read in time.
     pub uart_overruns: u64,
     /// Pauses in the step stream ([`crate::pauses`]).
     pub pauses: Vec<PauseReport>,
-    /// Times that the step timer stood still in mid-motion.
+    /// Standstills of the step timer in mid-motion.
     pub starved: Vec<PauseReport>,
-    /// Segments that were late since the reset, as the firmware counts them: 255 for more.
+    /// Segments that were late since the reset, as the firmware counts them; 255 means 255 or more.
     pub late_segments: Option<u64>,
-    /// Tops of the step timer written behind its counter.
+    /// Tops of the step timer that were written when the counter had already passed them.
     pub missed_tops: u64,
     /// Resets by the watchdog.
     pub resets: u64,
@@ -185,13 +186,13 @@ pub struct Report {
     pub heat: Vec<Heat>,
     /// The interrupts that were served.
     pub vectors: Vec<VectorReport>,
-    /// Motors and axes, as the firmware has them.
+    /// Motors and axes, as the firmware reports them.
     #[serde(skip)]
     pub setup: Setup,
 }
 
 impl Report {
-    /// Puts together what the driver and the meters know.
+    /// Puts together what the runner of the job and the meters know.
     pub fn new(machine: &Machine, measured: Measured) -> Self {
         let expected = measured.expected.as_ref().ok();
         let recorder = machine.recorder();
@@ -239,21 +240,21 @@ impl Report {
         report
     }
 
-    /// Threads of the job, if it has any: what is wrong with them is a problem of the job.
+    /// Adds the threads of the job, if it has any. What is wrong with them becomes a problem of the job.
     pub fn add_threads(&mut self, threads: Option<Threads>) {
         self.problems.extend(threads.as_ref().and_then(Threads::problem));
         self.ok = self.problems.is_empty();
         self.threads = threads;
     }
 
-    /// What only prints have: steps that do not follow the file are a problem of the job.
+    /// Adds the results that only prints have. Steps that do not follow the file are a problem of the job.
     pub fn add_print(&mut self, followed: Option<Followed>, heat: Vec<Heat>) {
         self.problems.extend(followed.as_ref().and_then(Followed::problem));
         self.ok = self.problems.is_empty();
         (self.followed, self.heat) = (followed, heat);
     }
 
-    /// Pauses and stops of the step timer, whichever are more.
+    /// Number of pauses or of standstills of the step timer, whichever is larger.
     pub fn dry(&self) -> usize {
         self.pauses.len().max(self.starved.len())
     }
@@ -307,7 +308,7 @@ impl Report {
     }
 }
 
-/// How many there are, and the longest; `None` if there are none.
+/// Says how many pauses there are and which is the longest; `None` if there are none.
 fn worst(what: &str, pauses: &[PauseReport]) -> Option<String> {
     let longest = pauses.iter().max_by(|a, b| a.ms.total_cmp(&b.ms))?;
     Some(format!("{} {what}, the longest {longest}", pauses.len()))
@@ -349,7 +350,7 @@ fn motor_report(
     let us = |cycles| microseconds(machine, cycles);
     MotorReport {
         motor: index + 1,
-        // Of two that drive X and Y together the second stands for Y.
+        // Of two motors that drive X and Y together, the second is reported as Y.
         axis: AXIS_NAMES[setup.axis.max(usize::from(setup.besides < 0))],
         steps: if setup.inverted { -motor.position } else { motor.position },
         expected: expected.map(|e| e.steps[index]),
@@ -360,7 +361,7 @@ fn motor_report(
     }
 }
 
-/// Each axis once, by its first motor.
+/// Returns each axis once, with the position of its first motor.
 fn axis_reports(motors: &[MotorReport], setup: &Setup, expected: &Outcome) -> Vec<AxisReport> {
     let mut axes: Vec<AxisReport> = Vec::new();
     for (motor, of) in motors.iter().zip(&setup.motors) {
@@ -410,7 +411,8 @@ fn vector_reports(machine: &Machine) -> Vec<VectorReport> {
         .collect()
 }
 
-/// Whether the firmware only tells what a program has asked for: a stop that waits for a cycle start (38), a tool without a length (180).
+/// Whether a line is only a notice that the program has caused: a stop that waits for a cycle start (38), or a tool
+/// without a length (180).
 fn is_notice(line: &str) -> bool {
     line.starts_with("{\"er\":") && ["\"st\":38,", "\"st\":180,"].iter().any(|st| line.contains(st))
 }

@@ -17,7 +17,7 @@ use kerf_sim::threads::Threads;
 
 use crate::cli::RunArgs;
 
-/// The board of this name.
+/// Returns the board of this name; an error lists the known boards.
 pub fn board(name: &str) -> Result<&'static Board> {
     boards::by_name(name).ok_or_else(|| {
         let known: Vec<_> = boards::ALL.iter().map(|b| b.name).collect();
@@ -25,7 +25,7 @@ pub fn board(name: &str) -> Result<&'static Board> {
     })
 }
 
-/// Runs a job. True when all went well.
+/// Runs a job. Returns true when all went well.
 pub fn run(args: &RunArgs) -> Result<bool> {
     let lines = job::read_lines(&args.job)?;
     let board = board(&args.target.board)?;
@@ -101,7 +101,7 @@ fn run_emulated(args: &RunArgs, board: &'static Board, lines: &job::Lines) -> Re
     Ok(report.problems.is_empty())
 }
 
-/// A bar on a terminal, nothing elsewhere.
+/// A progress bar if the output is a terminal, else a hidden one.
 fn progress_bar(lines: usize, quiet: bool) -> Result<ProgressBar> {
     if quiet {
         return Ok(ProgressBar::hidden());

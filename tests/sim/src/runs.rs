@@ -4,23 +4,23 @@ use anyhow::Result;
 
 use crate::machine::Machine;
 
-/// A board that runs, and the sender's end of its line.
+/// A board that runs, and the sender's end of its serial line.
 pub trait Runs {
-    /// Its time, in cycles of its clock.
+    /// The current time, in cycles of its clock.
     fn cycle(&self) -> u64;
     /// Cycles in so many milliseconds.
     fn cycles(&self, ms: u64) -> u64;
-    /// Runs to a cycle, or to the end of the next line that it says.
+    /// Runs to a cycle, or to the end of the next line that the firmware sends.
     fn run_until_line(&mut self, cycle: u64) -> Result<()>;
-    /// Puts bytes on the line.
+    /// Queues bytes on the line.
     fn send(&mut self, bytes: &[u8]);
-    /// Puts a byte on the line ahead of those that wait.
+    /// Queues a byte ahead of the bytes that still wait.
     fn send_now(&mut self, byte: u8);
-    /// Takes what it has said.
+    /// Takes the bytes that the firmware has sent.
     fn receive(&mut self) -> Vec<u8>;
-    /// The sender goes on at this rate.
+    /// Changes the speed of the sender's side.
     fn set_baud(&mut self, baud: u32);
-    /// Bytes that came at another rate than the sender's.
+    /// Number of bytes that came at another speed than the sender's.
     fn garbled(&self) -> u64;
     /// The cycle of the last step, if there was one.
     fn last_step(&self) -> Option<u64>;

@@ -20,25 +20,26 @@ use crate::gdb::Gdb;
 use crate::pty::{Peer, Pty};
 use crate::run::board;
 
-/// How often the two sides are looked at.
+/// Time between two checks of the two sides.
 const TICK: Duration = Duration::from_millis(2);
-/// AVR time between two looks at full speed.
+/// AVR time between two checks at full speed.
 const SLICE_MS: u64 = 2;
-/// At full speed, how long a sender is waited for behind a slice in which nothing has happened: the computer is not kept busy by a machine at rest,
-/// whose time passes ten times as fast as real time still.
+/// At full speed, how long a sender is waited for after a slice in which nothing has happened. The wait keeps a
+/// machine at rest from using up the computer, while its time still passes ten times as fast as real time.
 const REST: Duration = Duration::from_micros(100);
-/// Cycles by which slices are no whole ms until the firmware listens: else each of them might end within the tick's interrupt, in which it
-/// does not.
+/// Cycles that are added to each slice until the firmware listens. If slices took whole milliseconds, each of them
+/// might end within the tick's interrupt, in which the firmware does not listen.
 const STRIDE: u64 = 1_009;
-/// From opening to the reset, as on a board that DTR resets; senders flush their input meanwhile.
+/// Time from opening the port to the reset, as on a board that DTR resets. Senders flush their input during this
+/// time.
 const RESET_DELAY: Duration = Duration::from_millis(100);
-/// A machine further behind than this does not try to catch up.
+/// Most lag behind real time. A machine that is further behind does not try to catch up.
 const MAX_LAG: Duration = Duration::from_millis(200);
 
-/// What is said when a sender opens the port.
+/// The message when a sender opens the port.
 const OPENED: &str = "the port has been opened: the board resets, as a real one does, and no longer knows where it is";
 
-/// Where the plate is that can be probed: from the lower hard end of Z, mm.
+/// Height of the plate for probing, from the lower hard end of Z, mm.
 const PLATE_MM: f64 = 45.0;
 
 /// Bytes that may wait for the serial line, as in the buffer of a real port.
@@ -54,16 +55,17 @@ struct Server {
     speed: Speed,
     peer: Peer,
     reset_at: Option<Instant>,
-    /// The firmware has begun to take bytes since the last reset.
+    /// Whether the firmware has begun to take bytes since the last reset.
     listens: bool,
-    /// In the last turn no byte went either way, and no motor moved.
+    /// Whether in the last turn no byte went either way and no motor moved.
     rests: bool,
-    /// The cycle that belongs to an instant.
+    /// An instant of real time and the cycle that belongs to it.
     anchor: (Instant, u64),
     boots: u64,
 }
 
-/// Serves until interrupted, or until the standard input ends if a job is expected. True when the firmware was still alive then, and where it was expected.
+/// Serves until interrupted. If a job is expected, serves until the standard input ends. Returns true when the
+/// firmware was still alive at the end and the motors were where the job ends.
 pub fn serve(args: &ServeArgs) -> Result<bool> {
     let stop = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&stop);
@@ -96,12 +98,12 @@ pub fn serve(args: &ServeArgs) -> Result<bool> {
     Ok(end.is_ok() && arrived)
 }
 
-/// The machine that a sender finds: in the middle of its travel, with a plate to probe some way below.
+/// The machine that a sender finds: in the middle of its travel, with a plate for probing below it.
 fn around(board: &Board) -> Build {
     Build { plate: Some(PLATE_MM), ..Build::of(board) }
 }
 
-/// Stops when the standard input ends: when whoever started this wants the verdict, or is gone.
+/// Stops when the standard input ends. Then the program that started this one wants the verdict, or has ended.
 fn stop_with_input(stop: Arc<AtomicBool>) {
     std::thread::spawn(move || {
         let _ = std::io::copy(&mut std::io::stdin(), &mut std::io::sink());
@@ -109,7 +111,7 @@ fn stop_with_input(stop: Arc<AtomicBool>) {
     });
 }
 
-/// What the other side is doing; with `rests`, waits [`REST`] for its bytes.
+/// Returns whether the other side is open. With `rests`, waits up to [`REST`] for its bytes.
 fn wait(pty: &Pty, rests: bool) -> Result<Peer> {
     let peer = pty.wait(if rests { REST } else { Duration::ZERO })?;
     if rests && peer == Peer::Closed {
@@ -147,7 +149,7 @@ impl Server {
         })
     }
 
-    /// Looks at the sender, runs the machine, carries bytes both ways.
+    /// Does one turn: reads from the sender, runs the machine, carries bytes both ways.
     fn turn(&mut self) -> Result<()> {
         let peer = wait(&self.pty, self.rests && self.speed == Speed::Max)?;
         let steps = self.machine.recorder().steps();
@@ -180,8 +182,8 @@ impl Server {
         Ok(())
     }
 
-    /// Whether bytes go to the machine. Before the reset, and until the firmware listens after it, they wait in the
-    /// pseudo-terminal; a board loses them.
+    /// Whether bytes go to the machine. Before the reset, and after it until the firmware listens, they wait in the
+    /// pseudo-terminal; a real board would lose them.
     fn takes_bytes(&mut self) -> bool {
         self.listens = self.listens || self.machine.is_listening();
         self.listens && self.reset_at.is_none() && self.machine.wire().backlog() < BACKLOG
@@ -198,7 +200,7 @@ impl Server {
         Ok(())
     }
 
-    /// Another machine, whose memory is empty.
+    /// Returns another machine with empty memory.
     fn fresh(&self) -> Result<Machine> {
         let mut fresh = Machine::new(self.image.clone(), self.machine.board())?;
         fresh.build(&around(fresh.board()));
@@ -223,7 +225,7 @@ impl Server {
         Ok(())
     }
 
-    /// The cycle that it is now, or a little earlier for a machine that lags far behind.
+    /// Returns the cycle that corresponds to the present time. For a machine that lags far behind it is earlier.
     fn pace(&mut self, factor: f64) -> u64 {
         let hz = f64::from(self.machine.board().clock_hz) * factor;
         let target = self.anchor.1 + (self.anchor.0.elapsed().as_secs_f64() * hz) as u64;
@@ -234,14 +236,14 @@ impl Server {
         target.min(most)
     }
 
-    /// Waits for bytes when there is nothing to catch up with.
+    /// Waits for bytes, unless the machine runs at full speed.
     fn pause(&self) {
         if self.speed != Speed::Max {
             std::thread::sleep(TICK);
         }
     }
 
-    /// Prints where the last sender's job has brought the motors.
+    /// Prints where the last sender's job has brought the motors. Returns whether that is exact.
     fn has_arrived(&mut self, job: &Path) -> Result<bool> {
         let mut twin = self.fresh()?;
         twin.set_eeprom(self.machine.eeprom());

@@ -1,7 +1,8 @@
-//! SPI as a master, and what is on it: MAX6675s, and an SD card.
+//! SPI as a master, and the devices on it: MAX6675s, and an SD card.
 //!
-//! A byte takes eight bits of the clock that the registers ask for. A byte that is written before the one before it is done sets WCOL and is lost.
-//! Nothing is exchanged while the pins of the clock, of MOSI and of SS are no outputs. Not modelled: the interrupt, a slave, modes but 0.
+//! A byte takes eight bits of the clock that the registers select. A byte that is written before the previous one is
+//! done sets WCOL and is lost. Nothing is exchanged unless the pins of the clock, of MOSI and of SS are outputs. Not
+//! modelled: the interrupt, a slave, modes other than 0.
 
 use kerf::boards::Pin;
 
@@ -22,27 +23,27 @@ const COLLISION: u8 = 1 << 6;
 const DOUBLE: u8 = 1;
 /// SS, SCK and MOSI.
 const OUTPUTS: u8 = 0b111;
-/// A line that nobody drives has a pull-up.
+/// What a line reads that no device drives: it has a pull-up.
 const IDLE: u8 = 0xFF;
 
-/// How long a MAX6675 converts, ms.
+/// Time that a MAX6675 takes for a conversion, ms.
 const CONVERTS_MS: u64 = 220;
 
-/// A chip that is selected by a pin which is low.
+/// A chip that is selected while its pin is low.
 trait Device {
-    /// It is selected from now on, or no more.
+    /// Takes note that the chip is selected or deselected.
     fn select(&mut self, selected: bool, cycle: u64);
-    /// A byte is sent to it: what it sends meanwhile.
+    /// Sends a byte to the chip, and returns the byte that it sends at the same time.
     fn exchange(&mut self, byte: u8, cycle: u64) -> u8;
 }
 
 /// A MAX6675 with its thermocouple.
 pub struct Max6675 {
-    /// How hot the thermocouple is; `None` while a wire of it is off.
+    /// Temperature of the thermocouple, degrees; `None` while one of its wires is off.
     pub degrees: Option<f64>,
-    /// Words that have been read, and conversions that a reading has ended too early.
+    /// Words that have been read.
     pub read: u64,
-    /// See `read`.
+    /// Conversions that a reading has ended too early.
     pub spoilt: u64,
     is_there: bool,
     cycles_per_ms: u64,
@@ -68,7 +69,7 @@ impl Max6675 {
         }
     }
 
-    /// It is taken off the lines.
+    /// Takes the chip off the lines.
     pub fn unplug(&mut self) {
         self.is_there = false;
     }
@@ -104,15 +105,15 @@ impl Device for Max6675 {
     }
 }
 
-/// The registers, and what is on the lines.
+/// The registers, and the devices on the lines.
 #[derive(Default)]
 pub struct Spi {
     control: u8,
     status: u8,
     received: u8,
-    /// When the byte that is under way is there.
+    /// Cycle at which the byte under way is complete.
     done_at: Option<u64>,
-    /// The status has been read with the flag set: the next look at the data clears it.
+    /// Whether the status was read with the flag set. The next access to the data register then clears the flag.
     seen: bool,
     thermocouples: Vec<(Pin, Max6675)>,
     card: Option<(Pin, SdCard)>,
@@ -122,12 +123,12 @@ impl Spi {
     /// Registers.
     pub const REGISTERS: [u16; 3] = [SPCR, SPSR, SPDR];
 
-    /// As after a reset, with nothing on it.
+    /// The registers in their state after a reset, with no device.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// A reset; what is on the lines keeps its state.
+    /// Resets the registers; the devices keep their state.
     pub fn reset(&mut self) {
         let thermocouples = std::mem::take(&mut self.thermocouples);
         *self = Self { thermocouples, card: self.card.take(), ..Self::new() };
@@ -153,7 +154,7 @@ impl Spi {
         self.thermocouples.iter_mut().find(|(pin, _)| *pin == select).map(|(_, chip)| chip)
     }
 
-    /// The level of a pin that selects something.
+    /// Takes a level of a pin that selects a device.
     pub fn select(&mut self, pin: Pin, high: bool, cycle: u64) {
         for (_, device) in self.thermocouples.iter_mut().filter(|(select, _)| *select == pin) {
             device.select(!high, cycle);

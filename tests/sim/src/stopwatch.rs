@@ -1,18 +1,19 @@
-//! What functions of the firmware cost, found by their names, without the interrupts nested in them.
+//! Measures what functions of the firmware cost, without the interrupts nested in them. Functions are found by their
+//! names.
 //!
 //! The image needs no preparation, but the function must not be inlined.
 
 use crate::cpu::Cpu;
 use crate::meters::Meters;
 
-/// Cycles of something that happened several times.
+/// Cycles of something that has happened several times.
 #[derive(Clone, Copy, Default, PartialEq, Eq, Debug)]
 pub struct Cost {
-    /// How often.
+    /// How often it happened.
     pub count: u64,
-    /// All of it.
+    /// Sum of all cycles.
     pub sum: u64,
-    /// The most at once.
+    /// The most cycles of one time.
     pub max: u64,
 }
 
@@ -23,7 +24,7 @@ impl Cost {
         self.max = self.max.max(cycles);
     }
 
-    /// Cycles each; 0 if it never happened.
+    /// Mean cycles; 0 if it never happened.
     pub fn mean(&self) -> f64 {
         self.sum as f64 / self.count.max(1) as f64
     }
@@ -39,21 +40,21 @@ struct Call {
 
 #[derive(Clone)]
 enum Kind {
-    /// Calls from thread code, from the first instruction to behind the return.
+    /// Calls from thread code, from the first instruction to the end of the return.
     Calls { under_way: Option<Call> },
-    /// Calls from an interrupt: its own time when the call under way began, and the stack pointer.
+    /// Calls from an interrupt. `under_way` has the stack pointer, and the interrupt's own time when the call began.
     CallsIn { vector: u8, under_way: Option<(u16, u64)> },
-    /// Laps of an interrupt: each call of the function ends one. What the interrupt does behind the last
-    /// one belongs to that; runs without a call are spread over all.
+    /// Laps of an interrupt: each call of the function ends one. What the interrupt does after its last call belongs
+    /// to the last lap. The time of runs without a call is spread over all laps.
     Laps { vector: u8, lap: Lap },
 }
 
-/// The lap that is not over.
+/// The lap that has not ended.
 #[derive(Clone, Copy, Default)]
 struct Lap {
-    /// The interrupt's own time when the lap before ended.
+    /// The interrupt's own time when the previous lap ended.
     from: u64,
-    /// The lap that ended last in this run of the interrupt, to be counted when it cannot grow.
+    /// The lap that ended last in this run of the interrupt. It is counted when it can no longer grow.
     ended: Option<u64>,
 }
 
@@ -76,18 +77,19 @@ impl Stopwatch {
         Stopwatch { entry, kind: Kind::CallsIn { vector, under_way: None }, cost: Cost::default() }
     }
 
-    /// Times an interrupt from call to call of the function at `entry`.
+    /// Times an interrupt from one call of the function at `entry` to the next.
     pub fn laps(vector: u8, entry: u32) -> Self {
         let kind = Kind::Laps { vector, lap: Lap::default() };
         Stopwatch { entry, kind, cost: Cost::default() }
     }
 
-    /// What was measured.
+    /// Returns the measurements.
     pub fn cost(&self) -> Cost {
         self.cost
     }
 
-    /// The instruction at `pc`, begun at `began`, was executed. `left`: it was the end of an interrupt.
+    /// Takes note that the instruction at `pc`, begun at `began`, was executed. `left` says that it ended an
+    /// interrupt.
     #[inline]
     pub(crate) fn executed(
         &mut self,
@@ -105,7 +107,7 @@ impl Stopwatch {
                     let sp = cpu.sp() + u16::from(cpu.opcode(pc) & PUSH_MASK == PUSH);
                     *under_way = Some(Call { sp, began, in_interrupts });
                 }
-                // Anywhere else the stack pointer may be half written.
+                // The stack pointer is read only at a RET. Elsewhere it may be half written.
                 Some(call) if cpu.opcode(pc) == RET && cpu.sp() > call.sp => {
                     *under_way = None;
                     self.cost.add(cpu.cycle() - call.began - (in_interrupts - call.in_interrupts));

@@ -1,13 +1,13 @@
-//! A report as text for people.
+//! A report as text for readers.
 
 use std::fmt::{self, Display, Formatter};
 
 use crate::report::{PauseReport, Report, WindowReport};
 use crate::threads::Threads;
 
-/// Refused lines that are shown; the rest is only counted.
+/// Most refused lines that are shown; the rest is only counted.
 const REJECTED_SHOWN: usize = 20;
-/// Pauses that are shown; the rest is only counted.
+/// Most pauses that are shown; the rest is only counted.
 const PAUSES_SHOWN: usize = 10;
 
 impl Display for Report {
@@ -64,7 +64,7 @@ fn window(f: &mut Formatter<'_>, name: &str, w: &WindowReport) -> fmt::Result {
     row(f, name, format!("{} cycles ({:.1} us) in {}: {}", w.cycles, w.us, w.context, w.place))
 }
 
-/// How many, the longest, and the first few.
+/// Writes the number of pauses, the longest one, and the first few.
 fn pauses(f: &mut Formatter<'_>, name: &str, pauses: &[PauseReport]) -> fmt::Result {
     let Some(longest) = pauses.iter().max_by(|a, b| a.ms.total_cmp(&b.ms)) else {
         return row(f, name, "none");
@@ -79,7 +79,7 @@ fn pauses(f: &mut Formatter<'_>, name: &str, pauses: &[PauseReport]) -> fmt::Res
     Ok(())
 }
 
-/// A number, or a dash.
+/// Returns a number as text, or a dash.
 fn or_dash(value: Option<impl Display>) -> String {
     value.map_or("-".to_string(), |v| v.to_string())
 }

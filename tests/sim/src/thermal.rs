@@ -1,7 +1,8 @@
-//! The heaters of a printer around the chip: its pins heat them, and its converter reads their sensors.
+//! The heaters of a printer around the chip. The chip's pins heat them, and its converter reads their sensors.
 //!
-//! [`Plant`] says where the heat goes. Each [`EVERY_MS`] the levels of the pins are looked at, the temperatures worked out, and the voltages of
-//! the sensors, with noise, put at the converter's channels. A sensor can be broken while the machine runs.
+//! [`Plant`] models where the heat goes. Every [`EVERY_MS`] the levels of the pins are read, the temperatures
+//! computed, and the voltages of the sensors, with noise, put at the converter's channels. A sensor can be broken
+//! while the machine runs.
 
 use kerf::boards::Heaters;
 use kerf::heat::sensor::{Kind, share};
@@ -13,26 +14,26 @@ mod plant;
 
 pub use plant::{AIR, Plant};
 
-/// Time between two looks at the pins, ms.
+/// Time between two computations, ms.
 pub const EVERY_MS: u64 = 1;
-/// How often a sample is kept, looks.
+/// Number of computations between two samples.
 const SAMPLE: u64 = 100;
 /// The converter's supply, mV.
 const SUPPLY: f64 = 5_000.0;
-/// Noise of a sensor's wire, mV from end to end.
+/// Peak-to-peak noise of a sensor's wire, mV.
 const NOISE: f64 = 8.0;
 
-/// A heater of a printer.
+/// Index of the hot end among the heaters.
 pub const HOT_END: usize = 0;
-/// See [`HOT_END`].
+/// Index of the bed among the heaters.
 pub const BED: usize = 1;
 
-/// Temperatures at one time, in degrees.
+/// Temperatures at one time, degrees.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Sample {
     /// The cycle.
     pub cycle: u64,
-    /// What the sensors of the hot end and the bed feel.
+    /// The temperatures that the sensors of the hot end and the bed feel.
     pub degrees: [f64; 2],
 }
 
@@ -40,9 +41,9 @@ pub struct Sample {
 pub struct Thermal {
     pins: Heaters,
     plants: [Plant; 2],
-    /// Which sensor each of them has.
+    /// The kind of each heater's sensor.
     kinds: [Kind; 2],
-    /// What a wire that is off, or shorted, makes of a sensor, mV.
+    /// The voltage of each sensor whose wire is open or shorted, mV; `None` for a sensor that works.
     broken: [Option<u32>; 2],
     random: Random,
     looks: u64,
@@ -50,7 +51,7 @@ pub struct Thermal {
 }
 
 impl Thermal {
-    /// At the temperature of the room.
+    /// Heaters at room temperature.
     pub fn new(pins: Heaters) -> Self {
         Self {
             pins,
@@ -63,22 +64,22 @@ impl Thermal {
         }
     }
 
-    /// A heater and what its sensor feels.
+    /// Returns the model of a heater and its sensor.
     pub fn plant(&self, heater: usize) -> &Plant {
         &self.plants[heater]
     }
 
-    /// A heater, to be made hot or cold.
+    /// Returns the model of a heater, to be made hot or cold.
     pub fn plant_mut(&mut self, heater: usize) -> &mut Plant {
         &mut self.plants[heater]
     }
 
-    /// From now on the wire of a sensor has this voltage, mV, whatever the sensor feels; `None` mends it.
+    /// Sets the voltage on the wire of a sensor from now on, mV, whatever the sensor feels; `None` mends the wire.
     pub fn break_wire(&mut self, heater: usize, millivolts: Option<u32>) {
         self.broken[heater] = millivolts;
     }
 
-    /// The temperatures so far, ten in a second.
+    /// Returns the temperatures so far, ten samples in a second.
     pub fn samples(&self) -> &[Sample] {
         &self.samples
     }
@@ -88,7 +89,8 @@ impl Thermal {
         &self.pins
     }
 
-    /// Time passes with so much of their power at the heaters and the fan, 1 for all; what the converter's channels are at from then on, mV.
+    /// Advances the time by [`EVERY_MS`], with the given share of full power (0 to 1) at the heaters and the fan.
+    /// Returns the converter's channels with their new voltages, mV.
     pub(crate) fn pass(&mut self, power: [f64; 2], fan: f64, cycle: u64) -> [(u8, u32); 2] {
         let seconds = EVERY_MS as f64 / 1e3;
         self.plants
@@ -107,7 +109,7 @@ impl Thermal {
         })
     }
 
-    /// The voltage of a sensor, mV.
+    /// Returns the voltage of a sensor, mV.
     fn felt(&mut self, heater: usize) -> u32 {
         let noise = (self.random.below(1 << 16) as f64 / 65_536.0 - 0.5) * NOISE;
         let volts = share(self.kinds[heater], self.plants[heater].sensor) * SUPPLY;

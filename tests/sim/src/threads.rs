@@ -1,8 +1,9 @@
-//! Whether the threads of a job are threads: where Z is at the index pulses of the spindle, turn by turn.
+//! Checks whether the threads of a job are threads: where Z is at the index pulses of the spindle, turn by turn.
 //!
-//! The leads are read from the job's own lines (G33 and G32: K, G76: P), and everything else from the pins: a turn in which Z goes by a lead, and X not at all, is
-//! a turn of a thread. Where Z is then, modulo the lead, is the *phase*. It is to be alike in all turns of all passes. A compound slide (Q of G76) shifts a pass
-//! by its depth, which X tells. Lengths are in millimetres; a job in inches is not looked at.
+//! The leads are read from the job's own lines (G33 and G32: K, G76: P), and everything else from the pins. A turn in
+//! which Z moves by a lead, and X not at all, is a turn of a thread. The position of Z at the index pulse, modulo the
+//! lead, is the *phase*. It must be alike in all turns of all passes. A compound slide (Q of G76) shifts a pass by
+//! its depth, which is read from X. Lengths are in millimetres; a job in inches is not checked.
 
 use serde::Serialize;
 
@@ -14,45 +15,47 @@ use crate::plot::{Position, SAMPLE_S, positions};
 const X: usize = 0;
 const Z: usize = 2;
 
-/// A turn may differ from the lead by this part of it: far more than a phase may be off.
+/// Share of the lead by which the distance in a turn may differ from it. This is far more than a phase may be off.
 const ALIKE: f64 = 0.02;
 
 /// What a job asks for.
 #[derive(Clone, Copy, Debug)]
 struct Asked {
     lead: f64,
-    /// How far Z begins further on for a mm that X is further out.
+    /// How much further Z begins for each mm that X is further out.
     slide: f64,
 }
 
-/// What was cut.
+/// The threads that were cut.
 #[derive(Clone, Serialize, Debug)]
 pub struct Threads {
-    /// Passes.
+    /// Number of passes.
     pub passes: usize,
-    /// Their turns at a steady depth.
+    /// Number of turns at a steady depth, in all passes.
     pub turns: usize,
     /// From the lowest phase to the highest.
     pub spread_mm: f64,
-    /// What that may be: a step, and one more with a compound slide.
+    /// Most spread that is allowed: a step, and one more with a compound slide.
     pub most_mm: f64,
-    /// Error over the length, pass by pass: Z, and how far it is from where the spindle says.
+    /// Errors over the length, for each pass: the position of Z, and its distance from where the spindle's angle puts
+    /// it.
     #[serde(skip)]
     pub errors: Vec<Vec<(f64, f64)>>,
 }
 
-/// A turn of the spindle in which Z follows.
+/// A turn of the spindle in which Z follows it.
 struct Turn {
-    /// Cycles of the index pulses at both ends.
+    /// Cycles of the index pulses at both ends of the turn.
     cycles: [u64; 2],
-    /// Z at both ends.
+    /// Positions of Z at both ends of the turn.
     z: [f64; 2],
     phase: f64,
     lead: f64,
 }
 
 impl Threads {
-    /// What was cut in a job, of whose steps the recorder may have kept a log; `None` if it has no threads.
+    /// Evaluates the threads of a job. The recorder may have kept a log of its steps. `None` if the job has no
+    /// threads.
     pub fn of(machine: &Machine, setup: &Setup, lines: &[(usize, String)]) -> Option<Threads> {
         let asked: Vec<Asked> = lines.iter().filter_map(|(_, line)| asked(line)).collect();
         let mechanics = machine.mechanics()?;
@@ -86,7 +89,7 @@ impl Threads {
         slides: bool,
     ) -> Threads {
         let mean = turns.iter().flatten().next().map_or(0.0, |turn| turn.phase);
-        // From the first phase, which may be next to 0 or 1.
+        // Difference from the first phase. Phases wrap from 1 to 0, so the difference is taken modulo 1.
         let off = |turn: &Turn| {
             let off = turn.phase - mean;
             (off - off.round()) * turn.lead
@@ -122,7 +125,7 @@ impl Threads {
         }
     }
 
-    /// What is wrong with them.
+    /// Returns what is wrong with the threads; `None` if nothing is.
     pub fn problem(&self) -> Option<String> {
         if self.turns == 0 {
             return Some("the job has threads, but Z never went by a lead in a turn".into());
@@ -133,7 +136,7 @@ impl Threads {
     }
 }
 
-/// The samples of a turn: Z, and how far it is off.
+/// Returns the samples of a turn: the position of Z, and its error.
 fn errors(
     turn: &Turn,
     off: f64,
@@ -148,14 +151,14 @@ fn errors(
         .map(|n| {
             let share = (n as f64 * SAMPLE_S - from) / (to - from);
             let z = samples[n][Z];
-            // The end of the turn is `off` from where it should be.
+            // The end of the turn is `off` from its ideal place.
             let ideal = turn.z[1] - off - way * (1.0 - share);
             (z, z - ideal)
         })
         .collect()
 }
 
-/// The lead and the slide of a line.
+/// Returns the lead and the slide of a line; `None` for a line without a thread.
 fn asked(line: &str) -> Option<Asked> {
     let line = line.split(['(', ';']).next().unwrap_or_default().to_ascii_uppercase();
     let word = |letter: char| {
@@ -174,12 +177,12 @@ fn asked(line: &str) -> Option<Asked> {
     Some(Asked { lead, slide: 0.0 })
 }
 
-/// The first motor of an axis.
+/// Returns the first motor of an axis.
 fn motor_of(setup: &Setup, axis: usize) -> Option<usize> {
     setup.motors.iter().position(|motor| motor.axis == axis)
 }
 
-/// Millimetres in a step.
+/// Returns the millimetres in a step.
 fn step_of(motor: &MotorSetup) -> f64 {
     const FAR: i64 = 1_000_000;
     FAR as f64 / motor.steps(FAR * UNITS as i64) as f64

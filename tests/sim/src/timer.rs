@@ -1,26 +1,26 @@
 //! The 8-bit and 16-bit timers.
 //!
-//! Counting in normal, CTC and fast PWM modes from a free-running prescaler. A stopped timer keeps
-//! its count and starts from it; a flag raised while its interrupt is masked stays raised; a match
-//! is blocked for one timer clock after the counter was written. The TEMP register of the 16-bit
-//! timers is there, so an access torn by an interrupt goes wrong as on the chip. The phase-correct
-//! modes count like fast PWM. Not modelled: input capture, external clocks, waveform pins.
+//! Timers count in normal, CTC and fast PWM modes from a free-running prescaler. A stopped timer keeps its count and
+//! continues from it. A flag raised while its interrupt is masked stays raised. A match is blocked for one timer
+//! clock after the counter was written. The TEMP register of the 16-bit timers is modelled, so an access torn by an
+//! interrupt goes wrong as on the chip. The phase-correct modes count like fast PWM. Not modelled: input capture,
+//! external clocks, waveform pins.
 //!
-//! Nothing here happens at each cycle: a timer knows the cycle of its next flag, and its count at
-//! any time follows from the last count known.
+//! Nothing here runs in each cycle. A timer knows the cycle of its next flag, and its count at any time follows from
+//! the last known count.
 
 mod layout;
 
 pub use layout::{ATMEGA1284P, ATMEGA2560, Layout};
 
-/// Never.
+/// The cycle of an event that never comes.
 const NEVER: u64 = u64::MAX;
 
 // Bits of TIFR and TIMSK; compare channel n is bit `COMPARE + n`.
 const OVERFLOW: usize = 0;
 pub(crate) const COMPARE: usize = 1;
 const CAPTURE: usize = 5;
-/// Not a flag: when double-buffered compare values take effect.
+/// The event at which double-buffered compare values take effect; it has no flag.
 const LATCH: usize = 6;
 const EVENTS: usize = 7;
 
@@ -50,16 +50,16 @@ pub struct Timer {
     prescale: u64,
     top: u32,
     compare: [u32; 3],
-    /// What was written to the compare registers; in PWM modes it waits for the next wrap.
+    /// The values written to the compare registers; in PWM modes they wait for the next wrap.
     compare_buffer: [u32; 3],
     capture: u32,
     temp: u8,
     flags: u8,
     mask: u8,
-    /// The count was `count` at timer clock `tick` (cycle / prescale).
+    /// `count` was the count at timer clock `tick` (cycle / prescale).
     count: u32,
     tick: u64,
-    /// No match in the timer clock of `tick`.
+    /// Whether matches are blocked in the timer clock `tick`.
     blocked: bool,
     next: [u64; EVENTS],
     due: u64,
@@ -68,7 +68,7 @@ pub struct Timer {
 }
 
 impl Timer {
-    /// A timer as it is after reset.
+    /// A timer in its state after reset.
     pub fn new(layout: &'static Layout) -> Self {
         let max = if layout.wide { 0xFFFF } else { 0xFF };
         Timer {
@@ -106,12 +106,12 @@ impl Timer {
         self.last_event
     }
 
-    /// CTC tops that were written behind the counter; each costs a whole wrap.
+    /// Number of CTC tops that were written when the counter had already passed them. Each costs a whole wrap.
     pub fn missed(&self) -> u64 {
         self.missed
     }
 
-    /// Whether it counts.
+    /// Whether the timer counts.
     pub fn runs(&self) -> bool {
         self.prescale != 0
     }
@@ -127,7 +127,7 @@ impl Timer {
         lines
     }
 
-    /// The interrupt is being served: its flag goes.
+    /// Takes note that the interrupt is being served: its flag is cleared.
     pub fn acknowledge(&mut self, vector: u8, now: u64) {
         if let Some(bit) = self.layout.vectors.iter().position(|v| *v == vector) {
             self.clear(1 << bit, now);
@@ -257,7 +257,7 @@ impl Timer {
         cycle.checked_div(self.prescale).map_or(0, |tick| tick.max(self.tick))
     }
 
-    /// The count at a timer clock not before `tick`.
+    /// Returns the count at a timer clock not before `tick`.
     fn count_at(&self, tick: u64) -> u32 {
         let period = u64::from(self.top) + 1;
         let reached = u64::from(self.count) + tick.saturating_sub(self.tick);
@@ -285,7 +285,7 @@ impl Timer {
         }
     }
 
-    /// Timer clock at which the flag of a match with `value` goes up: one after the match.
+    /// Returns the timer clock at which the flag of a match with `value` goes up: one after the match.
     fn match_tick(&self, value: u32) -> u64 {
         let (count, top) = (u64::from(self.count), u64::from(self.top));
         let value = u64::from(value);
@@ -303,7 +303,7 @@ impl Timer {
         self.tick + wait + 1
     }
 
-    /// Timer clock at which the counter is 0 again.
+    /// Returns the timer clock at which the counter is 0 again.
     fn wrap_tick(&self) -> u64 {
         let last = if self.count > self.top { self.max } else { self.top };
         self.tick + u64::from(last - self.count) + 1
@@ -313,7 +313,7 @@ impl Timer {
         self.flags >> bit & 1 == 0
     }
 
-    /// Works out when each flag that is down goes up next.
+    /// Computes when each flag that is down goes up next.
     fn plan(&mut self) {
         self.next = [NEVER; EVENTS];
         self.due = NEVER;

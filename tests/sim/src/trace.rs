@@ -1,5 +1,5 @@
-//! Step and direction signals as a VCD file, for GTKWave: for each motor its pins, and its velocity in
-//! steps a second, which is 0 again when no step has come for a while.
+//! Step and direction signals as a VCD file, for GTKWave. For each motor it has the pins, and the velocity in steps a
+//! second, which returns to 0 when no step has come for a while.
 
 use std::fs::File;
 use std::io::{self, BufWriter};
@@ -9,14 +9,14 @@ use anyhow::{Context, Result};
 use kerf::boards::MOTORS;
 use vcd::{IdCode, TimescaleUnit, Value, Writer};
 
-/// A motor that makes no step for so long stands.
+/// A motor that makes no step for so long stands still, ms.
 const STILL_MS: u64 = 200;
 
 struct Signals {
     step: IdCode,
     dir: IdCode,
     velocity: IdCode,
-    /// The last step, while the velocity is not 0.
+    /// Cycle of the last step, while the velocity is not 0.
     stepped_at: Option<u64>,
 }
 
@@ -88,7 +88,7 @@ impl Trace {
         Ok(())
     }
 
-    /// Writes the time, and before it that motors have come to rest since the time before.
+    /// Writes the time. Before it, writes the velocity 0 of each motor that has come to rest since the last time.
     fn stamp(&mut self, cycle: u64) -> io::Result<()> {
         let still = u64::from(self.clock_hz) * STILL_MS / 1000;
         let due = |s: &Signals| s.stepped_at.map(|at| at + still).filter(|at| *at < cycle);
@@ -118,7 +118,7 @@ impl Trace {
         }
     }
 
-    /// Ends the file, with all motors at rest; any error on the way is reported here.
+    /// Ends the file, with all motors at rest. Reports any error that has occurred while writing.
     pub fn finish(mut self) -> Result<()> {
         let last = self.signals.iter().filter_map(|s| s.stepped_at).max();
         if let Some(last) = last {

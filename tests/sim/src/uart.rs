@@ -1,9 +1,9 @@
 //! The USARTs as asynchronous serial ports.
 //!
-//! A frame takes exactly its bits. The receiver has a two-byte FIFO behind the shift register; a
-//! third byte waits in the shift register and is lost when a fourth begins. FE and DOR are kept in the FIFO with the byte
-//! that is to be read next, as the data sheet has it: FE says that its stop bit was low, DOR that bytes before it were
-//! lost. RXC and UDRE are levels: they ask for service as long as their condition holds, so UDRIE makes a
+//! A frame takes exactly as long as its bits. The receiver has a two-byte FIFO behind the shift register. A third
+//! byte waits in the shift register and is lost when a fourth begins. FE and DOR are kept in the FIFO with the byte
+//! that is to be read next, as in the data sheet: FE says that the byte's stop bit was low, DOR that bytes before it
+//! were lost. RXC and UDRE are levels: they ask for service as long as their condition holds. So UDRIE makes a
 //! software interrupt out of a transmitter that is never written to.
 
 use std::collections::VecDeque;
@@ -18,14 +18,14 @@ const FE: u8 = 1 << 4;
 const DOR: u8 = 1 << 3;
 const U2X: u8 = 1 << 1;
 const MPCM: u8 = 1;
-// UCSRnB; the interrupt enables are at the bits of their flags.
+// UCSRnB. Each interrupt enable has the bit position of its flag.
 const RXEN: u8 = 1 << 4;
 const TXEN: u8 = 1 << 3;
 // UCSRnC
 const PARITY: u8 = 1 << 5;
 const TWO_STOPS: u8 = 1 << 3;
 
-/// Bit time mismatch that a receiver no longer copes with.
+/// Relative mismatch of bit times from which on a receiver fails.
 const TOLERANCE: f64 = 0.045;
 
 // Register offsets from UCSRnA.
@@ -55,7 +55,7 @@ pub struct Uart {
     control: u8,
     format: u8,
     divisor: u16,
-    /// Bytes received, the errors of each (FE, DOR) beside it.
+    /// Bytes received, each with its errors (FE, DOR).
     fifo: VecDeque<(u8, u8)>,
     receiving: Option<Frame>,
     /// A complete byte that found the FIFO full.
@@ -69,7 +69,8 @@ pub struct Uart {
 }
 
 impl Uart {
-    /// A USART as it is after reset, by its first register and its first vector: see [`Chip`](crate::chip::Chip).
+    /// A USART in its state after reset, given its first register and its first vector: see
+    /// [`Chip`](crate::chip::Chip).
     pub fn new((base, vector): (u16, u8)) -> Self {
         Uart {
             base,
@@ -90,7 +91,7 @@ impl Uart {
         }
     }
 
-    /// Cycle at which a frame is complete next.
+    /// Cycle at which the next frame is complete.
     pub fn due(&self) -> u64 {
         let rx = self.receiving.map_or(NEVER, |f| f.done);
         let tx = self.sending.map_or(NEVER, |f| f.done);
@@ -106,7 +107,7 @@ impl Uart {
         (rx | empty << 1 | done << 2) << self.vector
     }
 
-    /// The interrupt is being served. Only TXC goes by itself.
+    /// Takes note that the interrupt is being served. Only TXC is cleared by that.
     pub fn acknowledge(&mut self, vector: u8) {
         if vector == self.vector + 2 {
             self.status &= !TXC;
@@ -152,26 +153,27 @@ impl Uart {
         1 + data + parity + stops
     }
 
-    /// A start bit of a sender with `bit_cycles` per bit begins at cycle `now`.
+    /// A sender with `bit_cycles` cycles per bit begins a start bit at cycle `now`.
     pub fn start_bit(&mut self, byte: u8, bit_cycles: f64, now: u64) {
         self.advance(now);
         if self.control & RXEN == 0 || self.receiving.is_some() {
             return;
         }
-        // The next byte that gets into the FIFO tells of it.
+        // The next byte that gets into the FIFO carries DOR.
         let lost = self.waiting.take().is_some();
         self.overruns += u64::from(lost);
         let own = self.bit_cycles() as f64;
         let broken = (own - bit_cycles).abs() > bit_cycles * TOLERANCE;
         self.misframed += u64::from(broken);
         let byte = if broken { !byte } else { byte };
-        // Complete in the middle of the stop bit.
+        // The frame is complete in the middle of its stop bit.
         let done = now + self.bit_cycles() * (2 * self.frame_bits() - 1) / 2;
         let errors = (u8::from(broken) * FE) | (u8::from(lost) * DOR);
         self.receiving = Some(Frame { byte, errors, done });
     }
 
-    /// The stop bit of the frame that is being received is low: noise, or the sender has let go of the line.
+    /// Makes the stop bit of the frame that is being received low, as noise or a sender that lets go of the line
+    /// would.
     pub fn break_frame(&mut self) {
         if let Some(frame) = &mut self.receiving {
             frame.errors |= FE;

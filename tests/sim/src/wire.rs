@@ -1,4 +1,4 @@
-//! The serial line between the host and USART0, at the host's exact pace.
+//! The serial line between the host and a USART, at the host's exact speed.
 
 use std::collections::VecDeque;
 
@@ -9,7 +9,7 @@ const NEVER: u64 = u64::MAX;
 
 /// Bits of a frame as the host sends it: start, eight data, stop.
 const FRAME_BITS: f64 = 10.0;
-/// Speed mismatch that the host's receiver no longer copes with.
+/// Relative mismatch of speeds from which on the host's receiver fails.
 const TOLERANCE: f64 = 0.045;
 
 /// Both directions of the line.
@@ -23,12 +23,13 @@ pub struct Wire {
     lines_waiting: usize,
     garbled: u64,
     sent: u64,
-    /// Goes along when the machine changes its speed; and the machine's cycles per bit before.
+    /// Whether the host's speed follows when the machine changes its own, and the machine's cycles per bit before the
+    /// change.
     follows: bool,
     own_before: f64,
-    /// One byte of so many has a bit turned over on its way to the machine.
+    /// One in so many bytes gets a bit flipped on its way to the machine.
     spoils: Option<(u64, Random)>,
-    /// One byte of so many has no stop bit.
+    /// One in so many bytes loses its stop bit on its way to the machine.
     breaks: Option<(u64, Random)>,
 }
 
@@ -56,8 +57,8 @@ impl Wire {
         self.bit_cycles = f64::from(clock_hz) / f64::from(baud);
     }
 
-    /// From now on the host's speed goes along with the machine's, once the two understand each other: as
-    /// on a line that has no speed, such as USB or a pseudo-terminal.
+    /// Makes the host's speed follow the machine's from now on, provided that both had the same speed before. This
+    /// models a line that has no speed, such as USB or a pseudo-terminal.
     pub fn follow(&mut self) {
         self.follows = true;
     }
@@ -71,7 +72,7 @@ impl Wire {
         self.due
     }
 
-    /// Bytes that still wait for their turn.
+    /// Number of bytes that still wait to be sent.
     pub fn backlog(&self) -> usize {
         self.outgoing.len()
     }
@@ -81,7 +82,7 @@ impl Wire {
         self.sent
     }
 
-    /// Bytes that came at a speed the host cannot read.
+    /// Number of bytes that came at a speed the host cannot read.
     pub fn garbled(&self) -> u64 {
         self.garbled
     }
@@ -92,18 +93,18 @@ impl Wire {
         self.due = if self.outgoing.is_empty() { NEVER } else { self.free_at.max(now) };
     }
 
-    /// Puts a byte in front of those that wait.
+    /// Queues a byte ahead of the bytes that still wait.
     pub fn send_first(&mut self, byte: u8, now: u64) {
         self.outgoing.push_front(byte);
         self.due = self.free_at.max(now);
     }
 
-    /// From now on one byte of so many has a bit turned over on its way to the machine; `None` ends that.
+    /// From now on flips a bit in one of `one_in` bytes on their way to the machine; `None` ends that.
     pub fn spoil(&mut self, one_in: Option<u64>, seed: u64) {
         self.spoils = one_in.map(|n| (n.max(1), Random::new(seed)));
     }
 
-    /// From now on one byte of so many comes to the machine without its stop bit; `None` ends that.
+    /// From now on removes the stop bit of one of `one_in` bytes on their way to the machine; `None` ends that.
     pub fn break_frames(&mut self, one_in: Option<u64>, seed: u64) {
         self.breaks = one_in.map(|n| (n.max(1), Random::new(seed)));
     }
@@ -132,7 +133,7 @@ impl Wire {
         self.due = if self.outgoing.is_empty() { NEVER } else { self.free_at };
     }
 
-    /// Takes what the machine has sent.
+    /// Takes the bytes that the machine has sent.
     pub fn listen(&mut self, uart: &mut Uart) {
         let own = uart.bit_cycles() as f64;
         if own != self.own_before {
@@ -156,7 +157,7 @@ impl Wire {
         self.lines_waiting > 0
     }
 
-    /// Everything that has come.
+    /// Takes all bytes that have come.
     pub fn take_received(&mut self) -> Vec<u8> {
         self.lines_waiting = 0;
         self.received.drain(..).collect()

@@ -1,5 +1,5 @@
-//! Pressure advance on the chip: the extruder's steps at the pins agree with its line and K times its velocity, no segment comes late, and at
-//! rest the extruder is where its line ends.
+//! Pressure advance on the chip: at the pins, the steps of the extruder agree with its line plus K times its
+//! velocity, no segment comes late, and at rest the extruder is where its line ends.
 
 use kerf::boards::RAMPS14;
 use kerf_sim::job;
@@ -8,10 +8,10 @@ use kerf_sim::{Host, Machine, Step};
 use crate::common::{booted, set};
 
 const HZ: f64 = 16e6;
-/// Steps of a mm along X, and of filament.
+/// Steps in a mm along X, and in a mm of filament.
 const X: f64 = 80.0;
 const E: f64 = 3_200.0 / 34.4086;
-/// Filament for each mm, and K.
+/// Filament for each mm of the path, and K.
 const RATIO: f64 = 0.0333;
 
 fn printer() -> (Machine, Host) {
@@ -43,7 +43,7 @@ fn run(machine: &mut Machine, host: &mut Host, lines: &str) {
     assert!(found.starved.is_empty(), "{found:?}");
 }
 
-/// A way along X of so many lines of `length` mm, in three parts of their own feed rates.
+/// A path along X of `lines` lines of `length` mm, in three parts with different feeds.
 fn along_x(lines: usize, length: f64) -> String {
     (1..=lines)
         .map(|n| {
@@ -54,7 +54,7 @@ fn along_x(lines: usize, length: f64) -> String {
         .collect()
 }
 
-/// Where a motor is between its steps, at a time.
+/// Returns the position of a motor at a time, interpolated between its steps.
 fn place(steps: &[u64], time: f64) -> f64 {
     let n = steps.partition_point(|step| (*step as f64) < time);
     if n == 0 || n == steps.len() {
@@ -65,7 +65,7 @@ fn place(steps: &[u64], time: f64) -> f64 {
     n as f64 + ((time - before) / span).min(1.0) - 0.5
 }
 
-/// The worst that the extruder is off, steps.
+/// Returns the largest error of the extruder, steps.
 fn worst(log: &[Step], k: f64) -> f64 {
     let x: Vec<_> = log.iter().filter(|step| step.motor == 0).map(|step| step.cycle).collect();
     let half = 0.003 * HZ;
@@ -75,7 +75,7 @@ fn worst(log: &[Step], k: f64) -> f64 {
         let way = place(&x, time + half) - place(&x, time - half);
         let velocity = way / X / (2.0 * half / HZ);
         let model = (place(&x, time) / X + k * velocity) * RATIO * E;
-        // Half of the step lies before it.
+        // Half of the step comes before its pulse.
         let way = if step.positive { 1 } else { -1 };
         worst = worst.max((f64::from(at) + f64::from(way) / 2.0 - model).abs());
         at += way;

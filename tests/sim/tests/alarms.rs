@@ -1,4 +1,4 @@
-//! Alarms on the image: how soon the spindle's outputs and the coolant's are off.
+//! Alarms on the image: how soon the outputs of spindle and coolant are off.
 
 use kerf::boards::{Board, MEGA2560_GRBL, Pin, RAMPS14, inputs};
 use kerf_sim::mechanics::Build;
@@ -6,12 +6,12 @@ use kerf_sim::{Host, Machine};
 
 use crate::common::{MS, booted, say_line, say_now, set};
 
-/// From the last bit of a line, which is read between others: 250 moves a second at 32,000 steps a second leave little of
-/// the CPU. Measured: 22.7 ms; in a long move 7.2.
+/// Longest time from the last bit of a line, ms. The line is read between others: 250 moves a second at 32,000 steps
+/// a second leave little of the CPU. Measured: 22.7 ms; in a long move 7.2.
 const LINE_MS: f64 = 30.0;
-/// From the edge of a switch: a turn of the tasks, and the interrupts meanwhile. Measured: 2.5 ms.
+/// Longest time from the edge of a switch, ms: a turn of the tasks, and the interrupts meanwhile. Measured: 2.5 ms.
 const SWITCH_MS: f64 = 4.0;
-/// From the last bit of `^x`, by way of the watchdog. Measured: 28.5 ms.
+/// Longest time from the last bit of `^x`, ms; the watchdog makes the reset. Measured: 28.5 ms.
 const RESET_MS: f64 = 35.0;
 
 /// What raises an alarm.
@@ -23,7 +23,7 @@ enum Cause {
 }
 use Cause::{Line, Reset, Switch};
 
-/// A machine with a turning spindle, coolant on, in the midst of a long move or of many short ones.
+/// A machine with the spindle turning and the coolant on, in a long move or in many short ones.
 fn running(board: &'static Board, short: bool) -> (Machine, Host) {
     let (mut machine, mut host) = booted(board);
     machine.build(&Build::of(board));
@@ -64,7 +64,7 @@ fn on(machine: &Machine) -> [bool; 4] {
     [enable, is_output && machine.pulses().share > 0.0, mist, flood]
 }
 
-/// Raises the alarm, and returns the cycle at which it was told all of it.
+/// Raises the alarm, and returns the cycle at which the machine had received all of it.
 fn raise(machine: &mut Machine, host: &mut Host, cause: Cause) -> u64 {
     match cause {
         Switch(input) => {
@@ -76,7 +76,7 @@ fn raise(machine: &mut Machine, host: &mut Host, cause: Cause) -> u64 {
     }
 }
 
-/// How long it takes until all is off, cycles.
+/// Returns how long it takes until all is off, cycles.
 fn off_after(machine: &mut Machine, host: &mut Host, cause: Cause) -> u64 {
     let from = raise(machine, host, cause);
     let end = from + 100 * MS;
@@ -85,7 +85,7 @@ fn off_after(machine: &mut Machine, host: &mut Host, cause: Cause) -> u64 {
         machine.step(end).unwrap();
     }
     let after = machine.cycle().saturating_sub(from);
-    // And stays off.
+    // All stays off.
     for _ in 0..100 {
         host.run_for_ms(machine, 1).unwrap();
         assert!(!on(machine).contains(&true), "{cause:?}: {:?}", on(machine));

@@ -1,4 +1,4 @@
-//! Thread mode has its turns however hard the mathematics of a ramp is: whoever asks in the midst of it is answered.
+//! Thread mode gets its turns however hard the mathematics of a ramp is: a question during the ramp is answered.
 
 use kerf::boards::MEGA2560_GRBL;
 use kerf_sim::bench::{curve, spiral};
@@ -44,28 +44,29 @@ fn a_request_is_answered_in_small_fast_arcs() {
     }
 }
 
-/// The number of a line that asks.
+/// The number of a line that is a question.
 const ASKED: usize = usize::MAX;
-/// What both ports are asked.
+/// The question that both ports are asked.
 const QUESTION: &str = "{stat:n}";
 /// The usual speed of the line, and a fast one.
 const USUAL_BAUD: u32 = 115_200;
 /// See [`USUAL_BAUD`].
 const FAST_BAUD: u32 = 500_000;
 
-/// What so many bytes take on the line, ms.
+/// Returns the time that so many bytes take on the line, ms.
 fn bytes_ms(bytes: usize, baud: u32) -> f64 {
     bytes as f64 * 1e4 / f64::from(baud)
 }
 
-/// Asks on USB. Returns how long the last bit of the question takes to arrive, behind what the sender has said before, ms.
+/// Asks on USB. Returns how long the last bit of the question takes to arrive, ms, including the bytes that the
+/// sender has sent before.
 fn ask_usb(machine: &mut Machine, host: &mut Host, baud: u32) -> f64 {
     host.send(machine, ASKED, QUESTION);
     bytes_ms(machine.wire().backlog(), baud)
 }
 
-/// Asks on both ports, so many times, while a sender streams on USB at this speed: the longest waits from the last bit of the question to that of its
-/// answer, ms of AVR time, on each.
+/// Asks on both ports, `times` times, while a sender streams on USB at this speed. Returns, for each port, the
+/// longest wait from the last bit of a question to the last bit of its answer, ms of AVR time.
 fn longest_waits(machine: &mut Machine, host: &mut Host, baud: u32, times: u64) -> [f64; 2] {
     let mut longest = [0.0f64; 2];
     for n in 0..times {
@@ -92,8 +93,9 @@ fn longest_waits(machine: &mut Machine, host: &mut Host, baud: u32, times: u64) 
     longest
 }
 
-/// A sender that streams arcs as fast as the motors may go, with status reports ten times a second, and asks on both ports: the
-/// longest waits from the last bit of the question to that of its answer, ms of AVR time, on each.
+/// Streams arcs as fast as the motors may go, with status reports ten times a second, and asks on both ports.
+/// Returns, for each port, the longest wait from the last bit of a question to the last bit of its answer, ms of AVR
+/// time.
 fn longest_on_both(line: &str, setup: &[&str]) -> [f64; 2] {
     let (mut machine, mut host) = booted(&MEGA2560_GRBL);
     for line in setup {
@@ -123,11 +125,11 @@ fn requests_on_both_ports_are_answered_in_arcs_at_the_highest_step_rate() {
     }
 }
 
-/// Streams a job on USB at 500,000 baud, with as many lines in flight as the firmware keeps: this sender is always ahead. Returns the longest waits, as
-/// [`longest_waits`] does.
+/// Streams a job on USB at 500,000 baud, with as many lines in flight as the firmware stores, so that the sender is
+/// always ahead. Returns the longest waits, as [`longest_waits`].
 fn longest_beside_stream(job: &str, acceleration: u32) -> [f64; 2] {
     const IN_FLIGHT: usize = 2 * LINES_IN_FLIGHT;
-    /// More often than it is made meanwhile.
+    /// More copies of the job than are made in the time of the measurement.
     const REPEATS: usize = 6;
     let (mut machine, mut host) = (firmware(&MEGA2560_GRBL), Host::new(IN_FLIGHT));
     host.boot(&mut machine, 1_000).unwrap();
@@ -139,7 +141,7 @@ fn longest_beside_stream(job: &str, acceleration: u32) -> [f64; 2] {
         let limits = format!("vm:2000000,fr:2000000,jd:0.01,jm:1000000,ac:{acceleration}");
         set(&mut machine, &mut host, &format!("{{{axis}:{{{limits}}}}}"));
     }
-    // Settings are in the EEPROM after this.
+    // Time after which the settings are in the EEPROM.
     host.run_for_ms(&mut machine, 3_000).unwrap();
     (0..REPEATS).flat_map(|_| job.lines()).enumerate().for_each(|(n, line)| host.queue(n, line));
     host.run_for_ms(&mut machine, 500).unwrap();
@@ -162,8 +164,8 @@ fn a_sender_of_short_moves_that_is_always_ahead_does_not_hold_up_the_other_port(
     }
 }
 
-/// The longest wait for an answer on USB in a zigzag at the highest step rate, while the second port asks this one time after the
-/// other, ms of AVR time.
+/// Returns the longest wait for an answer on USB, ms of AVR time, in a zigzag at the highest step rate, while the
+/// second port sends the question `other` again and again.
 fn longest_beside(other: &str) -> f64 {
     let (mut machine, mut host) = booted(&MEGA2560_GRBL);
     let axis = "vm:4680,fr:4680,jm:20000,ac:2000";
@@ -212,7 +214,7 @@ fn groups_that_one_port_reads_do_not_hold_up_the_other() {
     }
 }
 
-/// Lines of USB that take much of thread mode, while the machine rests.
+/// Lines on USB that take much time in thread mode while the machine rests.
 const HEAVY: [&str; 8] = [
     "{mch:2}",
     "{mch:0}",
@@ -224,7 +226,8 @@ const HEAVY: [&str; 8] = [
     "{txt:\"$$\"}",
 ];
 
-/// How long a question on the second port waits for its answer when it ends so many us behind a line on USB, ms of AVR time.
+/// Returns how long a question on the second port waits for its answer, ms of AVR time, if it ends `us` us after a
+/// line on USB.
 fn waits_behind(machine: &mut Machine, host: &mut Host, line: &str, us: u64) -> f64 {
     host.send(machine, 0, line);
     while machine.wire().backlog() > 0 {

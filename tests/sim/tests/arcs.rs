@@ -1,4 +1,4 @@
-//! The way of an arc on the image, not only its end: how far each motor goes in all.
+//! The path of an arc on the image, not only its end: the total distance of each motor.
 
 use std::fmt::Write;
 
@@ -11,8 +11,8 @@ use crate::common::{booted, firmware, set};
 /// Steps in a millimetre.
 const MM: u64 = 1280;
 
-/// Arcs of 2 mm radius around (0, 0) that begin at (2, 0) of the plane: the words with `@` for the first
-/// axis and `#` for the second, and the way of both axes, mm.
+/// Arcs of 2 mm radius around (0, 0) that begin at (2, 0) of the plane: the words, with `@` for the first axis and
+/// `#` for the second, and the distances of both axes, mm.
 const ARCS: [(&str, u64, u64); 6] = [
     ("g3 @0 #2", 2, 2),
     ("g2 @0 #2", 6, 6),
@@ -53,16 +53,16 @@ fn every_arc_goes_its_way_round() {
     }
 }
 
-/// What axes may do, mm/s^2.
+/// The acceleration limit of axes, mm/s^2.
 const ACCEL: f64 = 500.0;
-/// The time over which velocities are taken, s.
+/// The time over which velocities are averaged, s.
 const WINDOW_S: f64 = 0.01;
-/// The part of all windows in which the acceleration is no greater.
+/// The share of all windows in which the acceleration is no greater than the result.
 const PERCENTILE: f64 = 0.99;
 /// mm in a step.
 const STEP_MM: f64 = 0.0125;
 
-/// Arcs of 0.2 to 30 mm that go on into each other, left and right in turns, and a helix.
+/// A chain of arcs of 0.2 to 30 mm radius, left and right in turns, and a helix.
 fn garland() -> String {
     let mut job = "g21 g90 g17 g64 f6000\n".to_string();
     let mut x = 0.0;
@@ -74,7 +74,7 @@ fn garland() -> String {
     job + "g3 z-2 i-6 p3\n"
 }
 
-/// Where a motor is at the end of each window, mm: between two steps on the line through both.
+/// Returns the position of a motor at the end of each window, mm, interpolated between steps.
 fn positions(machine: &Machine, motor: u8) -> Vec<f64> {
     let log = machine.recorder().log();
     let hertz = f64::from(machine.board().clock_hz);
@@ -82,7 +82,7 @@ fn positions(machine: &Machine, motor: u8) -> Vec<f64> {
     let mut at = 0.0;
     for step in log.iter().filter(|step| step.motor == motor) {
         let way = if step.positive { STEP_MM } else { -STEP_MM };
-        // A step is made when half of it is behind.
+        // A step's pulse comes when half of the step is done.
         steps.push((step.cycle as f64 / hertz, at + way / 2.0));
         at += way;
     }
@@ -101,7 +101,7 @@ fn positions(machine: &Machine, motor: u8) -> Vec<f64> {
     (0..=windows).map(&mut position).collect()
 }
 
-/// Accelerations of X and Y in windows, mm/s^2: the percentile, and the time that the job takes, s.
+/// Returns the percentile of the accelerations of X and Y in windows, mm/s^2, and the time that the job takes, s.
 fn acceleration(job: &str, settings: &[String]) -> (f64, f64) {
     let mut machine = firmware(&MEGA2560_GRBL);
     machine.recorder_mut().keep_log();

@@ -1,6 +1,8 @@
-//! The chip's arithmetic in assembly gives what its twin on the host gives, to the bit: for all pairs of edge cases, and for random numbers.
+//! The chip's arithmetic in assembly has the same results as its twin on the host, to the bit: for all pairs of edge
+//! cases, and for random numbers.
 //!
-//! `cargo xtask examples` makes the image that does it, of `tests/chip/arithmetic.rs`. `KERF_SEED` and `KERF_CASES` choose the random cases.
+//! `cargo xtask examples` builds the image that does it from `tests/chip/arithmetic.rs`. `KERF_SEED` and `KERF_CASES`
+//! choose the random cases.
 
 use core::num::FpCategory;
 
@@ -12,19 +14,19 @@ use kerf_sim::mechanics::Random;
 
 use crate::common::part;
 
-/// Random cases that are usual.
+/// Number of random cases by default.
 const USUAL: u64 = 30_000;
 /// Pairs of marks and values.
 const PAIRS: usize = 8;
-/// Cycles between two looks whether the results are there.
+/// Cycles between two checks for the results.
 const LOOK: u64 = 100;
-/// Far more than all of the arithmetic takes.
+/// Longest wait for the results, cycles: far more than all of the arithmetic takes.
 const PATIENCE: u64 = 100_000;
 
-/// What the chip is given.
+/// The operands for the chip.
 #[derive(Clone, Copy, Debug, Default)]
 struct Case {
-    /// The first operand; the functions of fewer bits take the lowest.
+    /// The first operand. Functions with fewer bits take its lowest bits.
     a: u64,
     b: u32,
     marks: [u8; PAIRS],
@@ -32,26 +34,27 @@ struct Case {
     counts: [u8; 2],
 }
 
-/// What comes out.
+/// The results.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Results {
-    /// Where the quotient fits.
+    /// The quotient and the remainder; `None` where the quotient does not fit.
     divide: Option<(u16, u16)>,
     inlined_quotient: Option<u16>,
-    /// Where the quotient fits.
+    /// `None` where the quotient does not fit.
     wide_quotient: Option<u32>,
     product: u32,
     times: u32,
     high_product: u8,
     root: u16,
     inverse_root: u16,
-    /// Its bits; those of one NaN for all.
+    /// The bits of the quotient of two floats, as returned by [`bits`].
     ratio: u32,
     whole: u32,
     passed_over: u8,
 }
 
-/// The bits of a quotient. All NaNs have those of one. A subnormal quotient has its sign alone: the library of the chip cuts it off, and the host rounds it.
+/// Returns the bits of a quotient. All NaNs become one NaN. A subnormal quotient keeps only its sign, because the
+/// chip's library flushes it to zero and the host rounds it.
 fn bits(quotient: f32) -> u32 {
     match quotient.classify() {
         FpCategory::Nan => f32::NAN.to_bits(),
@@ -76,7 +79,7 @@ impl Case {
         self.a >> 32 < self.b.into()
     }
 
-    /// What the host makes of it.
+    /// Returns the host's results.
     fn on_host(&self) -> Results {
         let (a, b) = (self.a as u32, self.b);
         let [of_marks, of_values] = self.counts.map(usize::from);
@@ -97,7 +100,7 @@ impl Case {
     }
 }
 
-/// The chip, and where its operands and results are.
+/// The chip, and the addresses of its operands and results.
 struct Chip {
     machine: Machine,
     turn: u16,
@@ -124,7 +127,7 @@ impl Chip {
         .started()
     }
 
-    /// Behind the start-up, which clears the memory.
+    /// Waits for the start-up, which clears the memory.
     fn started(mut self) -> Self {
         self.machine.run_for_ms(10).unwrap();
         self
@@ -136,7 +139,7 @@ impl Chip {
         }
     }
 
-    /// What the chip makes of a case.
+    /// Returns the chip's results.
     fn results(&mut self, case: &Case) -> Results {
         self.put(self.operands, case.a.to_le_bytes().into_iter().chain(case.b.to_le_bytes()));
         self.put(self.marks, case.marks);
@@ -165,14 +168,14 @@ impl Chip {
         }
     }
 
-    /// The chip gives what the host gives.
+    /// Checks that the chip and the host agree.
     fn agrees(&mut self, case: &Case) {
         let (chip, host) = (self.results(case), case.on_host());
         assert_eq!(chip, host, "the chip, and the host, of {case:x?}");
     }
 }
 
-/// 0, powers of two and their neighbours, and the greatest.
+/// Returns 0, the powers of two and their neighbours, and the largest number.
 fn edges() -> Vec<u32> {
     let powers = (0..32).map(|n| 1u32 << n);
     let mut all: Vec<u32> = powers.flat_map(|power| [power - 1, power, power + 1]).collect();
@@ -192,30 +195,31 @@ fn floats() -> Vec<u32> {
     all.flat_map(|upper| MANTISSAS.map(|mantissa| upper | mantissa)).collect()
 }
 
-/// A number of any length up to so many bits.
+/// Returns a number of any length up to `most` bits.
 fn number(random: &mut Random, most: u64) -> u64 {
     let any = random.below(1 << 32) << 32 | random.below(1 << 32);
     any >> (64 - most) >> random.below(most)
 }
 
-/// Operands of all kinds, and what is passed over.
+/// Returns operands of all kinds, and marks and values.
 fn random_case(random: &mut Random) -> Case {
     let b = number(random, 32) as u32;
     let mut case = match random.below(5) {
         0 => Case::new(number(random, 64), b),
-        // A quotient of 16 bits that is exact, or nearly, or leaves the greatest rest.
+        // A quotient of 16 bits that is exact, or nearly, or leaves the largest remainder.
         1 => {
             let b = (b as u16).max(1);
             let rest = [0, 1, u32::from(b) - 1][random.below(3) as usize].min(u32::from(b) - 1);
             Case::new(u64::from(number(random, 16) as u32 * u32::from(b) + rest), b.into())
         }
-        // A quotient of 32 bits that is exact, or nearly, or leaves the greatest rest.
+        // A quotient of 32 bits that is exact, or nearly, or leaves the largest remainder.
         2 => {
             let b = u64::from(b.max(1));
             let rest = [0, 1, b - 1][random.below(3) as usize].min(b - 1);
             Case::new(number(random, 32) * b + rest, b as u32)
         }
-        // Floats whose quotient is exact, or just beside: on the way the rest is the divisor, or just below.
+        // Floats whose quotient is exact or nearly: during the division the remainder equals the divisor or is just
+        // below it.
         3 => {
             let length = 1 + random.below(23) as u32;
             let mut of = |bits: u32| (1 << bits) + number(random, 32) as u32 % (1 << bits);
@@ -223,7 +227,7 @@ fn random_case(random: &mut Random) -> Case {
             let x = ((quotient * y) as f32).to_bits() + random.below(3) as u32 - 1;
             Case::new(x.into(), (y as f32).to_bits())
         }
-        // Floats that are alike.
+        // Floats close to each other.
         _ => {
             let near = |random: &mut Random| {
                 (100 + random.below(60)) << 23 | random.below(2) << 31 | random.below(1 << 23)
@@ -233,7 +237,7 @@ fn random_case(random: &mut Random) -> Case {
     };
     for (mark, value) in case.marks.iter_mut().zip(&mut case.values) {
         *mark = if random.below(8) == 0 { 0x80 } else { 0 } | random.below(128) as u8;
-        // Seldom below the least.
+        // A value is seldom below the least one.
         *value = number(random, 16) as u16 | if random.below(8) == 0 { 0 } else { case.b as u16 };
     }
     case.counts = [random.below(9) as u8, random.below(9) as u8];
@@ -250,7 +254,7 @@ fn the_chip_gives_what_the_host_gives_of_edge_cases() {
     let edges = edges();
     for b in &edges {
         for a in &edges {
-            // Also above it, to divide by 32 bits.
+            // The operand also goes into the upper half, for the division by 32 bits.
             chip.agrees(&Case::new(u64::from(*a) << 32 | u64::from(!*a), *b));
             chip.agrees(&Case::new(u64::from(*a), *b));
         }

@@ -6,14 +6,14 @@ use kerf_sim::mechanics::Build;
 
 use crate::common::{booted, firmware, set};
 
-/// Steps in a millimetre of X, Y and Z, as `{mch:3}` has them.
+/// Steps in a millimetre of X, Y and Z, as `{mch:3}` sets them.
 const STEPS: [f64; 3] = [80.0, 80.0, 400.0];
-/// Where the carriages are when the machine is at 0: off their switches by the hysteresis and the zero back-off.
+/// Position of the carriages when the machine is at 0: off their switches by the hysteresis and the zero back-off.
 const ZERO: f64 = 2.0 + 0.2 + 1.0;
 /// The bed: its height at 0, and how much it rises along X and along Y.
 const BED: [f64; 3] = [0.3, 0.004, -0.006];
 
-/// What of a plane is at a place.
+/// Returns the height of a plane at a place.
 fn height(plane: [f64; 3], x: f64, y: f64) -> f64 {
     plane[0] + plane[1] * x + plane[2] * y
 }
@@ -21,9 +21,9 @@ fn height(plane: [f64; 3], x: f64, y: f64) -> f64 {
 /// How X and Y are driven.
 #[derive(Clone, Copy, PartialEq)]
 enum Drive {
-    /// By a motor each.
+    /// By one motor each.
     Alone,
-    /// By the sum and the difference of two.
+    /// By the sum and the difference of two motors.
     CoreXy,
 }
 
@@ -56,7 +56,7 @@ impl Printer {
         machine.build(&build);
         let mut printer = Self { machine, drive, said: String::new() };
         printer.run(1_000);
-        // It decides for the dialect where there are several.
+        // This line settles the dialect where there are several.
         assert!(printer.ask_all("M105").starts_with("ok T:"));
         assert_eq!(printer.ask("M302 P1"), "");
         assert_eq!(printer.ask("G28"), "");
@@ -68,13 +68,13 @@ impl Printer {
         self.said += &String::from_utf8(self.machine.receive()).unwrap();
     }
 
-    /// Sends a line and waits for `ok`: what came before it.
+    /// Sends a line and waits for `ok`. Returns the lines before that.
     fn ask(&mut self, line: &str) -> String {
         let said = self.ask_all(line);
         said.trim_end_matches("ok\n").to_owned()
     }
 
-    /// Sends a line and waits for a line that begins with `ok`: all that is said.
+    /// Sends a line and waits for a line that begins with `ok`. Returns all lines.
     fn ask_all(&mut self, line: &str) -> String {
         self.said.clear();
         self.machine.send(format!("{line}\n").as_bytes());
@@ -92,7 +92,7 @@ impl Printer {
         [0, 1, 2].map(|motor| self.machine.recorder().motors()[motor].position)
     }
 
-    /// Where X, Y and Z are, in steps of an axis, the motors being there.
+    /// Returns the positions of X, Y and Z, in steps of an axis, from the positions of the motors.
     fn axes(&self, [a, b, z]: [i64; 3]) -> [f64; 3] {
         let [a, b, z] = [a, b, z].map(|steps| steps as f64);
         match self.drive {
@@ -101,7 +101,7 @@ impl Printer {
         }
     }
 
-    /// Where the machine is called 0, in steps.
+    /// Returns the place whose position is 0, in steps.
     fn zero(&mut self) -> [i64; 3] {
         let told = self.ask("M114");
         let count = told.split("Count ").nth(1).unwrap();
@@ -119,7 +119,8 @@ impl Printer {
         });
     }
 
-    /// How far Z is from a plane at most, in steps, in lines that are carried out; the machine is at the first corner.
+    /// Executes lines, with the machine at the first corner. Returns the largest distance of Z from a plane, in
+    /// steps.
     fn off(&mut self, zero: [i64; 3], plane: [f64; 3], lines: &[&str]) -> f64 {
         self.machine.recorder_mut().keep_log();
         let mut at = self.steps();
@@ -143,7 +144,7 @@ impl Printer {
     }
 }
 
-/// The plane through the points of an answer to G29.
+/// Returns the plane through the points of an answer to G29.
 fn plane(told: &str) -> [f64; 3] {
     let points: Vec<[f64; 3]> = told
         .lines()
@@ -186,7 +187,7 @@ fn follow(mut printer: Printer) {
         assert!(off.abs() <= 1.6, "{off} steps at {x} {y}");
     }
     let zero = printer.zero();
-    // At Z 0.2 Z is that above the bed.
+    // A Z of 0.2 is 0.2 mm above the bed.
     let raised = [found[0] + 0.2, found[1], found[2]];
     printer.ask("G1 X30 Y30 Z0.2 F6000");
     printer.ask("M400");
@@ -194,7 +195,7 @@ fn follow(mut printer: Printer) {
     let square = ["G1 X170 Y30 F6000", "G1 X170 Y170", "G1 X30 Y170", "G1 X30 Y30"];
     let off = printer.off(zero, raised, &square);
     println!("a square: {off:.2} steps off");
-    // A step, and what three decimals of the points leave out.
+    // A step, plus the error of three decimals in the points.
     assert!(off < 1.3, "{off}");
     let circle = ["G2 X30 Y30 I20 J20", "G91", "G1 X12.34 Y5.67", "G90"];
     let off = printer.off(zero, raised, &circle);
@@ -202,7 +203,7 @@ fn follow(mut printer: Printer) {
     assert!(off < 1.8, "{off}");
     let told = printer.ask("M114");
     assert!(told.starts_with("X:42.340 Y:35.670 Z:0.200 "), "{told}");
-    // G92 counts on top of it, and without the plane no motor moves.
+    // G92 counts on top of the plane. When the plane is switched off no motor moves.
     let steps = printer.steps();
     printer.ask("G92 Z5");
     assert!(printer.ask("M114").starts_with("X:42.340 Y:35.670 Z:5.000 "));
@@ -210,7 +211,7 @@ fn follow(mut printer: Printer) {
     printer.ask("M420 S1");
     assert!(printer.ask("M114").starts_with("X:42.340 Y:35.670 Z:5.000 "));
     assert_eq!(printer.steps(), steps);
-    // Home is where it was.
+    // Homing ends where it ended before.
     assert_eq!(printer.ask("G28"), "");
     let again = printer.zero();
     assert!((0..3).all(|n| (again[n] - zero[n]).abs() <= 1), "{zero:?} {again:?}");
@@ -225,7 +226,7 @@ fn the_limits_of_z_hold_for_what_it_really_does() {
     printer.ask("G1 X10 Y10 Z5 F12000");
     printer.ask("M400");
     printer.machine.recorder_mut().keep_log();
-    // 1 mm/s of Z, which rises by 1 in 25: 25 mm/s of X instead of 200, for 2 s.
+    // Z is limited to 1 mm/s and rises by 1 in 25, so X moves at 25 mm/s instead of 200, for 2 s.
     printer.ask("G1 X60 F12000");
     printer.ask("M400");
     printer.run(50);
@@ -242,7 +243,7 @@ fn the_limits_of_z_hold_for_what_it_really_does() {
 #[test]
 fn a_stop_within_it_and_a_probe_that_never_closes_leave_no_plane() {
     let mut printer = Printer::homed(&RAMPS14, Drive::Alone);
-    // No bed: Z goes down to its end, and no further.
+    // Without a bed Z goes down to its end, and no further.
     let told = printer.ask("G29 Z2");
     assert!(told.contains("Error:probing failed") && told.contains("Error:alarm"), "{told}");
     assert!(printer.ask("G1 X1").contains("Error:alarm"));

@@ -9,7 +9,7 @@ fn keeps_to_its_floor(name: &str) {
     let row = row(name).unwrap();
     let bed = Bed::new(&image(&MEGA2560_GRBL), &MEGA2560_GRBL).unwrap();
     if name.starts_with("print") {
-        // It is looked for beside the other one.
+        // The bench looks for this image beside the other one.
         image(&RAMPS14);
     }
     row.keep_to_floor(&bed).unwrap();

@@ -1,4 +1,5 @@
-//! Files as the posts of CAM programs write them, on the simulated board; and what a dry run says of them beforehand.
+//! Files as the post-processors of CAM programs write them, on the simulated board, and what a dry run predicts for
+//! them.
 
 #[path = "../../../src/cli/check.rs"]
 mod check;
@@ -13,7 +14,7 @@ use kerf_sim::report::Report;
 
 use crate::common::firmware;
 
-/// The profile of a router, and a machine that has been homed: G28 is refused before.
+/// The profile of a router, and a machine that counts as homed, because G28 is refused before homing.
 const ROUTER: [&str; 2] = ["{mch:1}", "{gc:\"g28.3x0y0z0\"}"];
 
 fn run(path: &Path) -> Report {
@@ -23,7 +24,7 @@ fn run(path: &Path) -> Report {
     job::run(&mut machine, &lines, &options, |_| {}).unwrap()
 }
 
-/// Seconds that a dry run says, and whether it says that the board may take longer.
+/// Returns the seconds that a dry run predicts, and whether it says that the board may take longer.
 fn estimate(path: &Path) -> (f64, bool) {
     let text = fs::read_to_string(path).unwrap();
     let question = Question { machine: "router", settings: &[], zero: None };
@@ -53,7 +54,7 @@ fn example(name: &str) -> PathBuf {
     PathBuf::from(format!("../../../examples/{name}.gcode"))
 }
 
-/// By how much the time of a dry run differs from that of the board.
+/// Returns the relative difference between the predicted time and the time on the board.
 fn off(path: &Path, said: f64) -> f64 {
     let takes = run(path).seconds_to_idle;
     let off = said / takes - 1.0;
@@ -71,7 +72,8 @@ fn a_dry_run_tells_the_time_within_one_percent() {
     }
 }
 
-/// The host takes no time to reckon; the chip does. With 500 and more moves of 0.1 mm a second its CPU is the limit.
+/// The host needs no time for computing, but the chip does. With 500 and more moves of 0.1 mm a second the chip's CPU
+/// is the limit.
 #[test]
 fn a_dry_run_says_when_the_board_may_take_longer() {
     let path = example("spiral");

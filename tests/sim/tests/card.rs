@@ -1,4 +1,5 @@
-//! A print from an SD card on the chip: files of a card that another program has formatted, steps at the pins, faults of the card.
+//! Prints from an SD card on the chip: files on a card that another program has formatted, steps at the pins, faults
+//! of the card.
 
 use std::io::{Cursor, Read, Seek, SeekFrom, Write};
 
@@ -12,7 +13,7 @@ use crate::common::{booted, firmware, set};
 const FIRST: usize = 63;
 const BLOCK: usize = 512;
 
-/// A part of a file that is a volume.
+/// A part of a file that holds a volume.
 struct Volume<'a>(Cursor<&'a mut [u8]>);
 
 impl Read for Volume<'_> {
@@ -39,7 +40,7 @@ impl Seek for Volume<'_> {
 
 /// A card with a partition and these files.
 fn image(fat: FatType, files: &[(&str, String)]) -> Vec<u8> {
-    // Small clusters, so that the chain of a file is long.
+    // Clusters are small, so that the chain of a file is long.
     let (kind, blocks, cluster) = match fat {
         FatType::Fat32 => (0x0C, 80_000, 512),
         _ => (0x06, 20_000, 1_024),
@@ -102,13 +103,13 @@ impl Printer {
         panic!("no {text:?} in {ms} ms: {:?}", self.said);
     }
 
-    /// Sends a line and waits for `ok`: what came before it.
+    /// Sends a line and waits for `ok`. Returns the lines before that.
     fn ask(&mut self, line: &str) -> String {
         self.said.clear();
         self.machine.send(line.as_bytes());
         self.machine.send(b"\n");
         self.until("ok", 5_000);
-        // The rest of a line that begins so.
+        // Time for the rest of the line that begins with `ok`.
         self.run(2);
         let said = std::mem::take(&mut self.said);
         said.trim_end().trim_end_matches("ok").to_owned()
@@ -127,7 +128,7 @@ impl Printer {
     }
 }
 
-/// A zigzag of so many moves of 0.2 mm, with E, and comments.
+/// A zigzag of `moves` moves of 0.2 mm, with E and comments.
 fn zigzag(moves: usize) -> String {
     let mut text = String::from("; a slicer's\nG90\nM83\nG92 X0 Y0 E0\nG1 F3600\n");
     for n in 1..=moves {
@@ -184,7 +185,7 @@ fn circle(moves: usize) -> String {
     text
 }
 
-/// What the image `ramps14` keeps of these settings.
+/// Returns what the image `ramps14` stores of these settings.
 fn settings(lines: &[&str]) -> [u8; 4096] {
     let (mut machine, mut host) = booted(&RAMPS14);
     lines.iter().for_each(|line| set(&mut machine, &mut host, line));
@@ -192,7 +193,7 @@ fn settings(lines: &[&str]) -> [u8; 4096] {
     *machine.eeprom()
 }
 
-/// How long a host that has four lines on their way takes for a file, s.
+/// Returns how long a file takes from a host that has four lines in flight, s.
 fn over_the_wire(kept: &[u8; 4096], text: &str) -> f64 {
     let mut machine = firmware(&RAMPS14_SD);
     machine.set_eeprom(kept);
@@ -210,7 +211,8 @@ fn over_the_wire(kept: &[u8; 4096], text: &str) -> f64 {
     printer.machine.seconds(last - first)
 }
 
-/// At the speed of a host at 115,200 baud, unless the card is slow; and who asks for temperatures is answered. Settings are those that the image `ramps14` has kept.
+/// A print from a card is as fast as a print from a host at 115,200 baud, unless the card is slow. A host that asks
+/// for temperatures is answered. The settings are those that the image `ramps14` has stored.
 #[test]
 fn a_print_from_a_card_is_as_fast_as_the_planner() {
     let kept = settings(&["{mch:3}", "{xjm:100000}", "{yjm:100000}", "{ajm:100000}", "{he1k:6}"]);
@@ -250,7 +252,7 @@ fn a_print_from_a_card_is_as_fast_as_the_planner() {
             printer.said
         );
         let chip = printer.machine.max6675(select).unwrap();
-        // The first is asked for before the chip has been on for long enough.
+        // The first conversion is read before the chip has been on for long enough.
         assert!(chip.read > 10 && chip.spoilt <= 1, "{} read, {} spoilt", chip.read, chip.spoilt);
         let place = printer.ask("M114");
         let x = 40.0 * (moves as f64 * 0.2 / 40.0).cos();
@@ -277,7 +279,7 @@ fn a_pause_a_flush_and_a_card_that_is_pulled_end_it() {
     }
     printer.run(300);
     assert_ne!(printer.steps(), paused);
-    // The host's lines come between.
+    // Lines of the host come between.
     printer.ask("M117 hello");
     printer.ask("M112");
     printer.run(500);
@@ -285,7 +287,7 @@ fn a_pause_a_flush_and_a_card_that_is_pulled_end_it() {
     printer.ask("M999");
     printer.run(500);
     assert_eq!(printer.steps(), stopped);
-    // From the start again, and the card is pulled.
+    // The print begins again from the start, and the card is pulled.
     printer.begin("A.G");
     printer.ask("M24");
     printer.run(500);
@@ -320,7 +322,8 @@ fn a_print_begins_at_a_byte_of_the_file_or_at_once() {
     assert!(place.contains("X:13.000"), "{place}");
 }
 
-/// What a host sends meanwhile has its turn, also if it is answered at rest: the print waits for it.
+/// Lines that a host sends during a print have their turn, even those that are answered at rest: the print waits for
+/// them.
 #[test]
 fn a_host_waits_for_rest_while_a_card_prints() {
     let mut printer = Printer::new(FatType::Fat16, true, &[("A.GCO", zigzag(3_000))]);
@@ -331,7 +334,8 @@ fn a_host_waits_for_rest_while_a_card_prints() {
         printer.ask(line);
         assert!(printer.ask("M27").contains("SD printing byte"), "{line}");
     }
-    // Paused, it is no print to OctoPrint, which would take it for one that has been begun at the printer.
+    // A paused print is not reported as a print, because OctoPrint would take it for one that was started at the
+    // printer.
     printer.ask("M25");
     printer.ask("M400");
     assert_eq!(printer.ask("M27"), "Not SD printing\n");
@@ -339,7 +343,7 @@ fn a_host_waits_for_rest_while_a_card_prints() {
     assert!(printer.ask("M27").contains("SD printing byte"));
 }
 
-/// Lines that are longer than a read, and blocks that are waited for: a pause comes in the middle of many.
+/// Lines are longer than a read, and blocks must be waited for, so that pauses come in the middle of many lines.
 #[test]
 fn a_pause_within_a_line_loses_none_of_it() {
     let line = format!("G1 X0.1 Y0.1 F3600 ; {}\r\n", "long ".repeat(30));

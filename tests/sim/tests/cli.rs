@@ -73,7 +73,7 @@ fn mistakes_are_explained() {
     }
 }
 
-/// Ends the server however the test ends.
+/// A server, which ends when the test ends, however that happens.
 struct Server(Child);
 
 impl Drop for Server {

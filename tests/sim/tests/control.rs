@@ -1,4 +1,4 @@
-//! Control gets through whatever data does, on the simulated chip: the crowds are those of `tests/control.rs`.
+//! Control gets through whatever data does, on the simulated chip, with the crowds of `tests/control.rs`.
 
 use kerf::boards::MEGA2560_GRBL;
 use kerf_sim::Machine;

@@ -1,4 +1,4 @@
-//! The runtime, `avr-embassy`: its examples do what they say, and it costs what its README says.
+//! The runtime, `avr-embassy`: its examples do what they are documented to do, and its costs are those of its README.
 
 use std::path::PathBuf;
 
@@ -11,15 +11,15 @@ use crate::common::{MS, firmware};
 /// The vector of the tick.
 const TICK: &str = "TIMER0_COMPA";
 const PORTB: u16 = 0x25;
-/// An Arduino's pins.
+/// Bits of port B that an Arduino's pins are at.
 const LED: u8 = 7;
 const PIN_12: u8 = 6;
 const PIN_11: u8 = 5;
 
-/// Every chip that the runtime has a file for, and the folder of its examples.
+/// Every chip for which the runtime has a file, and the folder of its examples.
 const CHIPS: [(&Chip, &str); 2] = [(&ATMEGA2560, "atmega2560"), (&ATMEGA1284P, "atmega1284p")];
 
-/// A chip at a clock that runs an example out of a folder.
+/// A chip at a clock rate that runs an example from a folder.
 fn chip(chip: &'static Chip, clock_hz: u32, folder: &str, name: &str) -> Machine {
     let images = std::env::var_os("KERF_ELF_DIR")
         .map_or_else(|| PathBuf::from("../../../target/firmware"), PathBuf::from);
@@ -33,12 +33,12 @@ fn uneven() -> Machine {
     chip(&ATMEGA1284P, 20_000_000, "atmega1284p-uneven-clock", "blink")
 }
 
-/// Each chip, at 16 MHz, that runs an example.
+/// For each chip, at 16 MHz, a machine that runs an example.
 fn example(name: &'static str) -> impl Iterator<Item = Machine> {
     CHIPS.into_iter().map(move |(of, folder)| chip(of, 16_000_000, folder, name))
 }
 
-/// The cycles at which each pin of port B turns over, up to a cycle.
+/// Returns the cycles at which each pin of port B changes, up to a cycle.
 fn edges(machine: &mut Machine, until: u64) -> [Vec<u64>; 8] {
     let mut edges: [Vec<u64>; 8] = Default::default();
     let mut before = machine.peek(PORTB);
@@ -55,7 +55,7 @@ fn edges(machine: &mut Machine, until: u64) -> [Vec<u64>; 8] {
     edges
 }
 
-/// The shortest and the longest time between two edges, cycles.
+/// Returns the shortest and the longest time between two edges, cycles.
 fn intervals(edges: &[u64]) -> (u64, u64) {
     let gaps = || edges.windows(2).map(|pair| pair[1] - pair[0]);
     (gaps().min().unwrap_or(0), gaps().max().unwrap_or(0))
@@ -75,8 +75,8 @@ fn two_tasks_blink_each_at_its_own_rate() {
     }
 }
 
-/// A millisecond of 20 MHz is 78 and an eighth counts of 256 cycles: each is one count longer than another at the most, and eight are
-/// exact.
+/// A millisecond at 20 MHz is 78 and an eighth counts of 256 cycles. So milliseconds differ by at most one count, and
+/// eight of them are exact.
 #[test]
 fn milliseconds_of_an_uneven_clock_are_exact_in_the_mean() {
     let mut machine = uneven();
@@ -92,12 +92,12 @@ fn milliseconds_of_an_uneven_clock_are_exact_in_the_mean() {
         before = now;
     }
     let cycles = |n: usize| ticks[n..].iter().zip(&ticks).map(move |(to, from)| to - from);
-    // To some cycles: a poll of a task may have interrupts off.
+    // Exact to some cycles: a poll of a task may have interrupts off.
     let (least, most) = (cycles(1).min().unwrap(), cycles(1).max().unwrap());
     assert!(least + 40 >= 78 * 256 && most <= 79 * 256 + 40, "{least} to {most}");
     assert!(cycles(8).all(|cycles| cycles.abs_diff(8 * 20_000) < 40), "eight are 8 ms");
     assert!(cycles(1_000).all(|cycles| cycles.abs_diff(20_000_000) < 40), "a second");
-    // Tasks see it: 50 ms each.
+    // Tasks see it in their times of 50 ms.
     let until = machine.cycle() + machine.cycles(1_001);
     let edges = &edges(&mut machine, until)[usize::from(PIN_12)];
     let (least, most) = intervals(edges);
@@ -123,13 +123,15 @@ fn a_task_of_interrupt_mode_preempts_one_of_thread_mode() {
     for mut machine in example("preempt") {
         let edges = edges(&mut machine, 450 * MS);
         let [pulse, work, tell] = [LED, PIN_12, PIN_11].map(|pin| &edges[usize::from(pin)]);
-        // On time to some cycles, although the CPU is never idle and no poll of `work` is shorter than 20 ms.
+        // The pulses are on time to some cycles, although the CPU is never idle and no poll of `work` is shorter than
+        // 20 ms.
         assert!(pulse.len() >= 448, "{} pulses", pulse.len());
         let (least, most) = intervals(pulse);
         assert!(least + 20 >= MS && most <= MS + 20, "{least} to {most} cycles");
         let (least, _) = intervals(work);
         assert!(work.len() >= 20 && least >= 20 * MS, "{} turns, {least}", work.len());
-        // The signal from interrupt mode reaches thread mode between two polls of `work`: at the latest behind the next one.
+        // The signal from interrupt mode reaches thread mode between two polls of `work`, at the latest after the
+        // next poll.
         assert_eq!(tell.len(), 4);
         let late =
             tell.iter().zip(pulse.iter().skip(99).step_by(100)).map(|(tell, pulse)| tell - pulse);
@@ -137,7 +139,8 @@ fn a_task_of_interrupt_mode_preempts_one_of_thread_mode() {
     }
 }
 
-/// Every 256 ms the tick carries with interrupts on. A task of interrupt mode that asked for the time then would get one of 256 ms ago.
+/// Every 256 ms the tick carries to the next byte with interrupts on. A task of interrupt mode that asked for the
+/// time then would get a time of 256 ms ago.
 #[test]
 fn interrupt_mode_is_kept_out_while_the_time_is_carried() {
     let mut machine = firmware(&MEGA2560_GRBL);
@@ -145,7 +148,7 @@ fn interrupt_mode_is_kept_out_while_the_time_is_carried() {
     let millis = variable(&machine, "avr_embassy::time::MILLIS");
     let closed = variable(&machine, "avr_embassy::assembly::CLOSED");
     machine.run_for_ms(250).unwrap();
-    // It may just be in a lock, for some hundred cycles.
+    // The firmware may just hold a lock, for some hundred cycles.
     let soon = machine.cycle() + 1_000;
     while machine.peek(closed) != 0 && machine.cycle() < soon {
         machine.step(soon).unwrap();
@@ -181,7 +184,7 @@ fn it_costs_what_the_readme_says() {
     assert!(wrong.is_empty(), "avr-embassy/README.md is to have these:\n{}", rows.join("\n"));
 }
 
-/// What `costs` has measured.
+/// Returns what `costs` has measured.
 fn costs(mut machine: Machine) -> Vec<u64> {
     machine.run_for_ms(20).unwrap();
     let variable = |name: &str| machine.image().variable(name).expect("a static of the example");
@@ -193,7 +196,7 @@ fn costs(mut machine: Machine) -> Vec<u64> {
         .collect()
 }
 
-/// What the tick costs while `blink` runs: see `TICKING`.
+/// Returns what the tick costs while `blink` runs: see `TICKING`.
 fn tick(mut machine: Machine) -> [u64; 3] {
     machine.run_for_ms(600).unwrap();
     let tick = machine.meters().service(machine.chip().vector(TICK));
@@ -204,7 +207,7 @@ fn tick(mut machine: Machine) -> [u64; 3] {
 const TICKING: [&str; 3] =
     ["the tick, each millisecond", "the tick, every 256 ms", "interrupts off, at most"];
 
-/// What `costs` measures, in its order.
+/// The names of what `costs` measures, in its order.
 const WHAT: [&str; 10] = [
     "`Event::set`",
     "`interrupt::lock`",

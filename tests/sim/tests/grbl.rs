@@ -1,7 +1,8 @@
-//! Random conversations in grbl's dialect with the image on the simulated chip: those of `tests/grbl_random.rs`, and shorter; what is judged is in
-//! `tests/support/grbl_session.rs`.
+//! Random conversations in grbl's dialect with the image on the simulated chip: shorter ones of the kind in
+//! `tests/grbl_random.rs`. `tests/support/grbl_session.rs` judges them.
 //!
-//! One machine has them all, one after the other: `KERF_SEED=47 KERF_CASES=1 cargo test -p kerf-sim-tests grbl::` has one.
+//! One machine plays them all in sequence: `KERF_SEED=47 KERF_CASES=1 cargo test -p kerf-sim-tests grbl::` plays a
+//! single one.
 
 use kerf::boards::MEGA2560_GRBL;
 use proptest::strategy::ValueTree;

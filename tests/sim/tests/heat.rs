@@ -1,4 +1,4 @@
-//! Heaters on the chip: the converter, the pins, faults, and steps meanwhile.
+//! The heaters on the chip: the converter, the pins, faults, and motion at the same time.
 
 use kerf::boards::{Heater, Heaters, Pin, RAMPS14};
 use kerf::heat::sensor::{Kind, share};
@@ -12,7 +12,7 @@ fn heaters() -> Heaters {
     RAMPS14.heaters.expect("RAMPS has heaters")
 }
 
-/// What selects the hot end's MAX6675.
+/// Returns the pin that selects the hot end's MAX6675.
 fn select() -> Pin {
     heaters().heaters[0].select.expect("RAMPS has a pin for it")
 }
@@ -24,9 +24,9 @@ struct Printer {
     hot_end: Plant,
     bed: Plant,
     noise: u32,
-    /// What a wire that is off, or shorted, makes of the hot end's sensor.
+    /// The voltage of the hot end's sensor if its wire is open or shorted; `None` for a sensor that works.
     broken: Option<u32>,
-    /// Its sensor is a MAX6675.
+    /// Whether the hot end's sensor is a MAX6675.
     digital: bool,
 }
 
@@ -45,14 +45,14 @@ impl Printer {
         self.machine.power_at(heater.pin) > 0.0
     }
 
-    /// Of a sensor, with noise.
+    /// Returns the voltage of a sensor, with noise.
     fn millivolts(&mut self, degrees: f64) -> u32 {
         self.noise = self.noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         let noise = f64::from(self.noise >> 16) / 65_536.0 - 0.5;
         (share(Kind::Semitec, degrees) * 5_000.0 + noise * 8.0).round().clamp(0.0, 5_000.0) as u32
     }
 
-    /// Runs for so many ms, and looks after each.
+    /// Runs for so many ms, and calls `look` after each.
     fn run(&mut self, ms: u64, mut look: impl FnMut(&Self)) {
         let Heaters { heaters: [hot_end, bed], fan } = heaters();
         for _ in 0..ms {
@@ -75,14 +75,14 @@ impl Printer {
         set(&mut self.machine, &mut self.host, line);
     }
 
-    /// The number that a question is answered with.
+    /// Asks for a value by its name.
     fn value(&mut self, name: &str) -> f64 {
         let text = format!("{{{name}:n}}");
         let answer = self.host.ask(&mut self.machine, &text, 1_000).unwrap();
         answer.body[name].as_f64().unwrap_or_else(|| panic!("{name}: {:?}", answer.body))
     }
 
-    /// How long after the wire breaks the hot end is off for good, ms.
+    /// Breaks the wire. Returns how long it takes until the hot end is off for good, ms.
     fn off_after(&mut self, millivolts: u32) -> u64 {
         self.broken = Some(millivolts);
         let (mut ms, mut off) = (0, None);
@@ -169,7 +169,7 @@ fn a_reset_and_a_stuck_machine_leave_heaters_off() {
     printer.run(1_000, |_| {});
     let [hot_end, _] = heaters().heaters;
     assert!(printer.is_on(hot_end));
-    // Thread mode has no turn any more: no tick wakes it.
+    // Thread mode gets no further turn, because no tick wakes it.
     printer.machine.withhold(21, true);
     let (mut ms, mut off) = (0, None);
     printer.run(1_200, |printer| {
@@ -207,12 +207,13 @@ fn cold_filament_is_not_moved() {
     assert_eq!(status(&mut printer, "g1 x1 a1 f1000"), 0);
     printer.ask("{he1mn:170}");
     assert_eq!(status(&mut printer, "g1 x1 a2 f1000"), 53);
-    // A rotary axis on a board without a hot end.
+    // A is a rotary axis on a board without a hot end.
     printer.ask("{he1k:0}");
     assert_eq!(status(&mut printer, "g1 x1 a2 f1000"), 0);
 }
 
-/// A MAX6675 takes 220 ms for a reading, and is asked each 240: no reading is spoilt, and an open thermocouple is seen with the second.
+/// A MAX6675 takes 220 ms for a conversion and is read every 240 ms. No conversion is spoilt, and an open
+/// thermocouple is noticed at the second reading.
 #[test]
 fn a_thermocouple_over_spi_is_read_and_its_break_is_seen() {
     let mut printer = Printer::new();
@@ -240,7 +241,7 @@ fn a_thermocouple_over_spi_is_read_and_its_break_is_seen() {
     assert_eq!(printer.value("stv"), 0.0);
 }
 
-/// Where no chip is, the line is high.
+/// Without a chip the line is high.
 #[test]
 fn a_missing_thermocouple_does_not_heat() {
     let mut printer = Printer::new();
@@ -254,7 +255,8 @@ fn a_missing_thermocouple_does_not_heat() {
     assert!(told.iter().any(|report| report["er"]["st"] == 48), "{told:?}");
 }
 
-/// Timer 2 makes the pulses of the hot end and the fan. Their ports' bits stay low, so that the pins are low once the timer has let go of them.
+/// Timer 2 makes the pulses of the hot end and the fan. The bits of their ports stay low, so that the pins are low
+/// when the timer has released them.
 #[test]
 fn power_is_pulses_of_a_timer_and_off_lets_go_of_the_pin() {
     let mut printer = Printer::new();
@@ -265,7 +267,7 @@ fn power_is_pulses_of_a_timer_and_off_lets_go_of_the_pin() {
     for line in ["m104 s65", "m106 s64", "m140 s60"] {
         printer.ask(line);
     }
-    // All at first, so that the fan begins to turn.
+    // The fan gets full power at first, so that it begins to turn.
     assert_eq!(printer.machine.power_at(fan), 1.0);
     printer.run(30_000, |printer| {
         assert!(!printer.machine.is_high(hot_end.pin) && !printer.machine.is_high(fan));
@@ -288,7 +290,7 @@ fn power_is_pulses_of_a_timer_and_off_lets_go_of_the_pin() {
     assert!(!printer.is_on(hot_end) && !printer.is_on(bed));
 }
 
-/// A fault, an alarm, a reset and what makes the machine safe let go of the pins.
+/// A fault, an alarm, a reset and anything that makes the machine safe releases the pins.
 #[test]
 fn every_way_off_lets_go_of_the_pins() {
     type Way = (&'static str, fn(&mut Printer));

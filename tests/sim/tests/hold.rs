@@ -1,4 +1,4 @@
-//! Feedhold on the image: how soon it slows down, how far it goes on, and where it ends.
+//! Feedhold on the image: how soon motion slows down, how far it goes on, and where it ends.
 
 use kerf::boards::MEGA2560_GRBL;
 use kerf_sim::{Host, Machine};
@@ -6,13 +6,13 @@ use kerf_sim::{Host, Machine};
 use crate::common::{booted, set};
 
 const CLOCK: f64 = 16e6;
-/// Steps in a mm, as axes are set up by default.
+/// Steps in a mm with the default setup of axes.
 const STEPS: f64 = 1280.0;
-/// mm/s^2, as the setting says.
+/// Acceleration limit of the setting, mm/s^2.
 const ACCEL: f64 = 1_000.0;
-/// mm/s.
+/// Velocity of the move, mm/s.
 const VELOCITY: f64 = 25.0;
-/// Millions of mm/min^3: a jerk that no acceleration limit knows of.
+/// Millions of mm/min^3: a jerk limit so high that it does not limit any acceleration.
 const SHARP: f64 = 1e6;
 
 /// A board with this jerk limit, and its sender.
@@ -26,7 +26,7 @@ fn board(jerk: f64) -> (Machine, Host) {
     (machine, host)
 }
 
-/// Runs for so many microseconds and says `!`: the cycle at which it does.
+/// Runs for `us` microseconds and sends `!`. Returns the cycle at which it is sent.
 fn hold_after(machine: &mut Machine, host: &mut Host, us: u64) -> u64 {
     let end = machine.cycle() + us * 16;
     host.run_until(machine, end).unwrap();
@@ -34,7 +34,7 @@ fn hold_after(machine: &mut Machine, host: &mut Host, us: u64) -> u64 {
     machine.cycle()
 }
 
-/// Runs until the machine says that it is so.
+/// Runs until the machine reports this state.
 fn until_stat(machine: &mut Machine, host: &mut Host, stat: i64) {
     let end = machine.cycle() + machine.cycles(20_000);
     while host.stat() != Some(stat) {
@@ -47,8 +47,8 @@ fn positions(machine: &Machine) -> [i64; 2] {
     [0, 1].map(|m| machine.recorder().motors()[m].position)
 }
 
-/// The first step of X after `from` that comes later than all at the feed do, and so do those behind it: one that is late by
-/// itself has waited for an interrupt.
+/// Returns the first step of X after `from` that is slower than the feed, together with all steps behind it. A single
+/// late step has only waited for an interrupt.
 fn first_slower(machine: &Machine, from: u64) -> u64 {
     let steady = (CLOCK / VELOCITY / STEPS) as u64;
     let steps = machine.recorder().steps_of(0);
@@ -60,7 +60,7 @@ fn first_slower(machine: &Machine, from: u64) -> u64 {
 #[test]
 fn it_slows_down_within_10_ms() {
     let one = vec!["g1 x100 f1500".to_string()];
-    // Blocks that take 4, 3 and 2 ms, sent meanwhile, keep everybody busy.
+    // Blocks that take 4, 3 and 2 ms, sent meanwhile, keep all tasks busy.
     let many = |way: f64| {
         let first = std::iter::once("g1 f1500".to_string());
         first.chain((1..400).map(|n| format!("x{:.3}", f64::from(n) * way))).collect()
@@ -70,7 +70,7 @@ fn it_slows_down_within_10_ms() {
         for n in 0..30 {
             let (mut machine, mut host) = board(SHARP);
             (0..).zip(&job).for_each(|(n, line)| host.queue(n, line));
-            // At all phases of a segment, and of status reports.
+            // Holds come at all phases of a segment and of status reports.
             let from = hold_after(&mut machine, &mut host, 300_000 + n * 5_137);
             host.run_for_ms(&mut machine, 100).unwrap();
             worst = worst.max(first_slower(&machine, from) - from);
@@ -84,8 +84,9 @@ fn it_slows_down_within_10_ms() {
 
 #[test]
 fn it_is_soon_the_last_of_moves_that_each_stop() {
-    // Moves to and fro, in mm and mm/s^2, and how long after it the last step may come, ms: one that has begun within 10 ms goes on for
-    // 2.5 ms if it is the shortest, and the others come to rest in the midst.
+    // Moves to and fro: length in mm, acceleration in mm/s^2, and the longest time from the hold to the last step,
+    // ms. A move that has begun within 10 ms goes on for 2.5 ms if it is one of the shortest; the others come to rest
+    // in the middle.
     for (way, accel, most) in
         [(0.03, 20_000.0, 13.0), (0.03, 1_000.0, 16.0), (0.003, 1_000.0, 13.0), (0.01, 200.0, 16.0)]
     {
@@ -108,7 +109,7 @@ fn it_is_soon_the_last_of_moves_that_each_stop() {
 
 #[test]
 fn it_stops_as_soon_as_the_limits_allow_and_ends_exactly() {
-    // A jerk limit that tells: the acceleration takes 22 ms to build up.
+    // A jerk limit that matters: the acceleration takes 22 ms to build up.
     for jerk in [SHARP, 5_000.0] {
         let (mut machine, mut host) = board(jerk);
         set(&mut machine, &mut host, "g1 x100 y10 f1500");
@@ -120,7 +121,7 @@ fn it_stops_as_soon_as_the_limits_allow_and_ends_exactly() {
         let way = after / STEPS * 101f64.sqrt() / 10.0;
         let build_up = if jerk == SHARP { 0.0 } else { ACCEL / (jerk * 1e6 / 216e3) };
         let best = 0.5 * VELOCITY * (VELOCITY / ACCEL + build_up);
-        // Beside what is queued when it is told.
+        // The distance of what is queued when the hold comes is added.
         let queued = 0.010 * VELOCITY;
         println!("stops in {way:.3} mm, {best:.3} at best, {queued:.3} queued");
         assert!(way >= best * 0.98 && way <= best * 1.02 + queued, "{way} mm, {best} at best");
@@ -135,7 +136,7 @@ fn it_stops_as_soon_as_the_limits_allow_and_ends_exactly() {
 fn what_is_dropped_leaves_no_step_behind() {
     let (mut machine, mut host) = board(5_000.0);
     for n in 0..15 {
-        // In the middle of something, at some phase of the steps of both axes.
+        // The hold comes in the middle of a move, at some phase of the steps of both axes.
         set(&mut machine, &mut host, "g91 g1 x30.123 y17.0071 f1500");
         set(&mut machine, &mut host, "g2 x6 y0 i3");
         set(&mut machine, &mut host, "g1 x-7.3 y3.3337");
@@ -143,7 +144,7 @@ fn what_is_dropped_leaves_no_step_behind() {
         machine.send(b"!%\n");
         let (x, y) = (n as i64 % 7 - 3, n as i64 % 5);
         set(&mut machine, &mut host, &format!("g90 g1 x{x} y{y} f1500"));
-        // Until no motor has moved for a while.
+        // Runs until no motor has moved for a while.
         let mut before = [0; 2];
         while before != positions(&machine) {
             before = positions(&machine);

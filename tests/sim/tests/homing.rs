@@ -1,4 +1,4 @@
-//! Homing on the image: carriages, switches that bounce and stick.
+//! Homing on the image, with carriages and with switches that bounce and stick.
 
 use kerf::boards::{Board, MEGA2560_GRBL, RAMPS14, inputs};
 use kerf_sim::mechanics::{Bounce, Build, Wiring};
@@ -6,7 +6,7 @@ use kerf_sim::{Host, Machine};
 
 use crate::common::{booted, set};
 
-/// A machine whose carriages stand near their homing switches, that bounce for a millisecond or so.
+/// A machine whose carriages stand near their homing switches. The switches bounce for about a millisecond.
 fn standing(board: &'static Board, wiring: Wiring, starts: [f64; 3]) -> (Machine, Host) {
     let (mut machine, mut host) = booted(board);
     let mut build = Build::of(board).wired(wiring);
@@ -20,7 +20,7 @@ fn standing(board: &'static Board, wiring: Wiring, starts: [f64; 3]) -> (Machine
         }
     });
     let kind = if wiring == Wiring::NormallyClosed { "{st:1}" } else { "{st:0}" };
-    // Quick, for the simulator's sake.
+    // Homing is fast, to save time in the simulator.
     let quick = "{x:{jh:2000,zb:0.5},y:{jh:2000,zb:0.5},z:{jh:2000,zb:0.5}}";
     for line in [kind, quick, "{sv:0}"] {
         set(&mut machine, &mut host, line);
@@ -29,11 +29,11 @@ fn standing(board: &'static Board, wiring: Wiring, starts: [f64; 3]) -> (Machine
     (machine, host)
 }
 
-/// Homes, and says what an exception has told, if one has.
+/// Homes, and returns the exception that was reported, if any.
 fn home(machine: &mut Machine, host: &mut Host, line: &str) -> Option<String> {
     host.take_reports();
     set(machine, host, line);
-    // It is carried out when the homing has come to its end.
+    // This line is executed when the homing has ended.
     let done = host.ask(machine, "g4 p0", 30_000).unwrap();
     assert_eq!(done.status, 0);
     host.run_for_ms(machine, 100).unwrap();
@@ -41,7 +41,7 @@ fn home(machine: &mut Machine, host: &mut Host, line: &str) -> Option<String> {
     told.chain(host.strays().iter().cloned()).find(|line| line.contains("\"er\""))
 }
 
-/// Where the carriages are, in steps from the lower hard ends.
+/// Returns the positions of the carriages, in steps from the lower hard ends.
 fn places(machine: &Machine) -> [i64; 3] {
     let mechanics = machine.mechanics().unwrap();
     [0, 1, 2].map(|axis| (mechanics.position(axis) * 1_280.0).round() as i64)
@@ -83,7 +83,7 @@ fn a_switch_that_sticks_is_told() {
     assert_eq!(host.ask(&mut machine, "g28.2 x0", 1_000).unwrap().status, 0);
 }
 
-/// The step from the lower hard end on which X ends: one off its switch, and the zero back-off.
+/// The step, from the lower hard end, at which X ends: one step off its switch, plus the zero back-off.
 const ENDS: i64 = 2_816 + 1 + 640;
 
 /// A machine whose X homes at these speeds, mm/min.
@@ -103,10 +103,10 @@ fn whatever_the_speed_it_ends_within_a_step() {
         for n in 0..3 {
             assert_eq!(home(&mut machine, &mut host, "g28.2 x0"), None);
             let off = places(&machine)[0] - ENDS;
-            // Measured: 0 at all of them.
+            // Measured: 0 at all speeds.
             assert!(off.abs() <= 1, "{off} steps at {search}, {latch} mm/min");
             assert_eq!(machine.mechanics().unwrap().lost(0), 0);
-            // From another phase of a step's interval.
+            // The next homing begins at another phase of a step's interval.
             set(&mut machine, &mut host, &format!("g1 f3000 x{}", 4.0 + 0.317 * f64::from(n)));
         }
     }

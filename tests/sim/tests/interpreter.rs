@@ -1,4 +1,4 @@
-//! What it costs to interpret a line, lexing included, and to find a row of the tables, in cycles of the chip.
+//! The cost of interpreting a line, lexing included, and of finding a row of the tables, in cycles of the chip.
 
 use kerf::boards::MEGA2560_GRBL;
 use kerf::store::record::{self, Record};
@@ -7,12 +7,12 @@ use kerf_sim::{Image, Machine, Stopwatch};
 
 use crate::common::image;
 
-/// What a typical G1 line may cost.
-// Its functions share their ends, which takes 60 of them: flash is full.
+/// Most cycles for a typical G1 line.
+// Shared ends of its functions take 60 cycles of that, because flash is full.
 const BUDGET: f64 = 6_100.0;
 const REPEATS: usize = 20;
 
-/// Cycles for one such line, mean of many. The lines before it set its modes.
+/// Returns the mean cycles for a line. The lines before it set its modes.
 fn cost(before: &[&str], line: &str) -> f64 {
     let elf = image(&MEGA2560_GRBL);
     let image = Image::read(&elf).unwrap();
@@ -52,7 +52,7 @@ fn typical_g1_lines_keep_to_the_budget() {
 
 #[test]
 fn a_row_of_the_tables_is_found_in_time() {
-    // The log is full, and of nothing that is sought, and has the room of the program: no search is longer.
+    // The log is full, and none of its records is the one that is looked for, which makes the longest search.
     let mut eeprom = [0xFF; 4_096];
     for (number, slot) in (0u16..).zip(eeprom.chunks_exact_mut(record::SIZE.into())) {
         let key = number.wrapping_mul(40_503);

@@ -1,7 +1,7 @@
 //! The example jobs on every board: right to the step, and within the promised budgets.
 //!
-//! Each job runs once, two at a time, and the tests look at what was measured. On RAMPS the motors
-//! have coarser steps and higher speeds, so that the long job ends sooner and other numbers are seen.
+//! Each job runs once, two at a time, and the tests check what was measured. On RAMPS the motors have coarser steps
+//! and higher speeds, so that the long job ends sooner and gives other numbers.
 
 use std::collections::VecDeque;
 use std::path::Path;
@@ -18,9 +18,9 @@ use crate::common::{booted, firmware};
 /// The longest first.
 const JOBS: [&str; 4] = ["bracket", "spiral", "engraving", "square"];
 
-/// Cycles in which no tick comes in, outside the step interrupt; pulses wait for longer.
+/// Longest time in which no tick is served, outside the step interrupt, cycles. Pulses wait for that long.
 const OFF_CYCLES: u64 = 42;
-/// Bytes between the statics and the deepest stack.
+/// Least number of bytes between the static data and the deepest stack.
 const FREE_STACK: i32 = 400;
 
 /// A job that has run.
@@ -50,7 +50,7 @@ static RUNS: LazyLock<Vec<Run>> = LazyLock::new(|| {
     done.into_inner().unwrap()
 });
 
-/// What a thread said when it panicked.
+/// Returns the message of a thread that has panicked.
 fn said(why: &(dyn std::any::Any + Send)) -> String {
     let text = why.downcast_ref::<String>().cloned();
     text.or_else(|| why.downcast_ref::<&str>().map(|s| s.to_string())).unwrap_or_default()
@@ -74,7 +74,7 @@ fn run(job: &str, board: &'static Board) -> Report {
     job::run(&mut firmware(board), &lines(job), &options, |_| {}).unwrap()
 }
 
-/// Fails with all that `check` finds wrong with the runs on a board, or on every board.
+/// Fails with everything that `check` finds wrong with the runs on a board, or on every board.
 fn every_run(board: Option<&Board>, check: impl Fn(&Run, &Report) -> Result<(), String>) {
     let of_board = |run: &&Run| board.is_none_or(|board| board.name == run.board.name);
     let wrong = RUNS.iter().filter(of_board).filter_map(|run| {
@@ -105,7 +105,8 @@ fn jobs_on_ramps_end_well_and_exact_to_the_step() {
     every_run(Some(&RAMPS14), ends_well);
 }
 
-/// The steps of each motor both ways, when each line moves each motor one way only: no arcs.
+/// Returns the steps of each motor in both directions together. Each line must move each motor in one direction only:
+/// no arcs.
 fn commanded(lines: &Lines, setup: &Setup) -> Vec<u64> {
     let (mut at, mut total) = (vec![0_i64; setup.motors.len()], vec![0; setup.motors.len()]);
     for end in 1..=lines.len() {
@@ -120,7 +121,7 @@ fn commanded(lines: &Lines, setup: &Setup) -> Vec<u64> {
 
 #[test]
 fn no_step_is_made_and_taken_back() {
-    // Motors and axes as they are by default; lines in a job change nothing of it.
+    // Motors and axes have their defaults, which lines of a job do not change.
     let (mut machine, mut host) = booted(&MEGA2560_GRBL);
     let setup = job::read_setup(&mut machine, &mut host).unwrap();
     every_run(Some(&MEGA2560_GRBL), |run, report| {
@@ -129,7 +130,8 @@ fn no_step_is_made_and_taken_back() {
         }
         let (want, got) = (commanded(&lines(run.job), &setup), report.motors.iter());
         let got: Vec<_> = got.map(|m| m.total).collect();
-        // Where a curve turns round less than the tolerance of G64 behind a step, that step is left out there and back.
+        // A curve may reverse just behind a step, within the tolerance of G64. The step there and the step back are
+        // then left out.
         let is_right = |(got, want): (&u64, &u64)| {
             got <= want && (want - got).is_multiple_of(2) && (want - got) * 10_000 <= *want
         };

@@ -1,4 +1,4 @@
-//! The encoder of a spindle on the chip: its speed, pulses that do not fit, and what its interrupts cost.
+//! The encoder of a spindle on the chip: its speed, pulses that do not fit, and the cost of its interrupts.
 
 use std::path::Path;
 
@@ -11,17 +11,17 @@ use kerf_sim::{Host, LINES_IN_FLIGHT, Machine};
 
 use crate::common::{firmware, scratch, set};
 
-/// The longest time in which no tick comes in outside the step interrupt.
+/// Longest time in which no tick is served outside the step interrupt, cycles.
 const OFF: u64 = 42;
 
-/// The exception that tells of a spindle that is lost.
+/// The exception that reports a lost spindle.
 const LOST: u64 = 44;
-/// The edges of the simulated encoder come so much later than its spindle turns, ms.
+/// Delay of the simulated encoder's edges behind the angle of its spindle, ms.
 const EDGES_LATE_MS: u64 = 1;
-/// The exception that tells of pulses which do not fit.
+/// The exception that reports pulses which do not fit.
 const MISFIT: u64 = 40;
 
-/// A board with a spindle that has so many marks, and turns so fast.
+/// A board with a spindle that has this many marks and turns at this speed.
 fn turning(
     board: &'static Board,
     marks: u32,
@@ -30,7 +30,7 @@ fn turning(
 ) -> (Machine, Host) {
     let mut machine = firmware(board);
     let mut build = Build::of(board);
-    // The pins of the sensors are theirs alone.
+    // The sensors' pins must not be shared with switches.
     for axis in &mut build.axes {
         (axis.min, axis.max) = (None, None);
         (axis.travel, axis.start) = (f64::INFINITY, 0.0);
@@ -46,7 +46,7 @@ fn turning(
     (machine, host)
 }
 
-/// A number that the machine tells.
+/// Asks the machine for a number.
 fn asked(machine: &mut Machine, host: &mut Host, name: &str) -> f64 {
     let raw = host.ask(machine, &format!("{{{name}:n}}"), 1_000).unwrap().raw;
     let (_, rest) = raw.split_once(&format!("\"{name}\":")).unwrap_or_else(|| panic!("{raw}"));
@@ -83,7 +83,7 @@ fn a_second_sensor_tells_the_direction() {
         host.run_for_ms(&mut machine, 1_500).unwrap();
         let measured = asked(&mut machine, &mut host, "sps");
         assert!((measured / rpm - 1.0).abs() < 0.001, "{marks} at {rpm}: {measured}");
-        // It turns round, and is measured anew.
+        // The spindle reverses, and is measured anew.
         machine.tamper(|mechanics, now| mechanics.force_spindle(-rpm, now));
         host.run_for_ms(&mut machine, 1_500).unwrap();
         let measured = asked(&mut machine, &mut host, "sps");
@@ -133,7 +133,7 @@ fn pulses_that_are_missing_or_too_many_are_counted_and_the_first_is_told() {
         assert_eq!(told, 1, "{marks}");
         assert_eq!(asked(&mut machine, &mut host, "spx"), 1.0, "{marks}");
         if marks > 8 {
-            // It might be within another.
+            // The spike might lie within another one.
             continue;
         }
         machine.tamper(|mechanics, now| {
@@ -171,7 +171,8 @@ fn lathe(marks: u32, rpm: f64, change: impl Fn(&mut Sensors)) -> (Machine, Host)
     (machine, host)
 }
 
-/// Where Z is against the thread at each index pulse from `from` to `to` mm of way, in mm modulo the lead.
+/// Returns the position of Z in the thread at each index pulse from `from` to `to` mm along it, in mm modulo the
+/// lead.
 fn phases(machine: &Machine, since: usize, lead: f64, from: f64, to: f64) -> Vec<f64> {
     let mechanics = machine.mechanics().unwrap();
     let start = mechanics.indexed()[since].1[Z];
@@ -181,7 +182,7 @@ fn phases(machine: &Machine, since: usize, lead: f64, from: f64, to: f64) -> Vec
     inside.map(|way| (way / lead - (way / lead).round()) * lead).collect()
 }
 
-/// Cuts along Z and returns the phases in the middle of it.
+/// Cuts along Z and returns the phases in the middle of the pass.
 fn pass(machine: &mut Machine, host: &mut Host, length: f64, lead: f64) -> Vec<f64> {
     let since = machine.mechanics().unwrap().indexed().len() - 1;
     set(machine, host, &format!("g91 g33 z-{length} k{lead}"));
@@ -192,7 +193,7 @@ fn pass(machine: &mut Machine, host: &mut Host, length: f64, lead: f64) -> Vec<f
     phases(machine, since, lead, 1.5 * lead, length - 1.5 * lead)
 }
 
-/// Runs until the machine has moved and rests.
+/// Runs until the machine has moved and is at rest.
 fn wait_for_rest(machine: &mut Machine, host: &mut Host, most_ms: u64) {
     let mut waited = 0;
     while machine.recorder().steps() == 0 || host.stat() == Some(5) {
@@ -209,7 +210,7 @@ fn spread(phases: &[f64]) -> f64 {
     most - least
 }
 
-/// The most that a phase may be off: a step.
+/// Most that a phase may be off: a step.
 const STEP: f64 = 1.0 / STEPS + 1e-9;
 
 #[test]
@@ -226,13 +227,13 @@ fn z_is_where_the_spindle_says_at_each_index_whatever_its_speed() {
             assert!(window.cycles <= OFF, "{} cycles", window.cycles);
             all.extend(phases);
         }
-        // Each pass lies in the others.
+        // All passes have the same phase.
         println!("N {marks}, all speeds: spread {:.4}", spread(&all));
         assert!(spread(&all) < STEP, "{marks}: {all:?}");
     }
 }
 
-/// Begins a pass and runs until it has come so far, mm. Where the index pulses of it begin.
+/// Begins a pass and runs until it has come `far` mm. Returns the index of its first index pulse.
 fn begin(machine: &mut Machine, host: &mut Host, line: &str, far: f64) -> usize {
     let since = machine.mechanics().unwrap().indexed().len() - 1;
     let start = machine.recorder().motors()[Z].position;
@@ -255,7 +256,7 @@ fn a_slower_spindle_is_followed() {
         let since = begin(&mut machine, &mut host, "g91 g33 z-20 k1", 5.0);
         let phase = *phases(&machine, since, 1.0, 1.5, 5.0).last().unwrap();
         let turns = machine.mechanics().unwrap().indexed().len();
-        // 0.5 s to two thirds of the way.
+        // The spindle's speed takes 0.5 s to come two thirds of the way.
         machine.tamper(|mechanics, now| mechanics.drive_spindle_to(240.0, now));
         wait_for_rest(&mut machine, &mut host, 20_000);
         let off: Vec<f64> =
@@ -287,13 +288,13 @@ fn a_pulse_that_is_missing_shifts_nothing() {
 fn a_load_that_swings_is_followed() {
     for (marks, most) in [(4, 0.015), (100, 0.01)] {
         let (mut machine, mut host) = lathe(marks, 300.0, |_| {});
-        // 2 % of the speed at 3 Hz.
+        // A swing of 2 % of the speed, at 3 Hz.
         let swing = 6.0 * 3.0 * std::f64::consts::TAU;
         machine.tamper(|mechanics, now| mechanics.load_spindle(0.0, swing, 3.0, now));
         let phases = pass(&mut machine, &mut host, 20.0, 1.0);
         println!("N {marks}, 2 % at 3 Hz: spread {:.4}", spread(&phases));
         assert!(spread(&phases) < most, "{marks}: {phases:.3?}");
-        // It does swing.
+        // The speed does swing.
         let indexed = machine.mechanics().unwrap().indexed();
         let last: Vec<u64> =
             indexed[indexed.len() - 15..].windows(2).map(|pair| pair[1].0 - pair[0].0).collect();
@@ -319,11 +320,12 @@ fn a_taper_is_in_step_along_the_axis_that_moves_farther() {
     assert!(phases.len() >= 5 && spread(&phases) < STEP, "{phases:.3?}");
 }
 
-/// Z at each index pulse of the passes of a threading cycle, in mm modulo the lead, pass by pass: at the middle of the thread.
+/// Returns Z at each index pulse in the middle of the thread, in mm modulo the lead, for each pass of a threading
+/// cycle.
 fn cycle(machine: &mut Machine, host: &mut Host, line: &str, lead: f64) -> Vec<Vec<f64>> {
     let since = machine.mechanics().unwrap().indexed().len() - 1;
     set(machine, host, line);
-    // Till a report says that it runs.
+    // Time until a report says that the machine runs.
     host.run_for_ms(machine, 1_000).unwrap();
     wait_for_rest(machine, host, 120_000);
     let end = machine.recorder().motors()[Z].position as f64 / STEPS;
@@ -332,7 +334,7 @@ fn cycle(machine: &mut Machine, host: &mut Host, line: &str, lead: f64) -> Vec<V
     for pair in indexed.windows(2) {
         let (before, at) = (pair[0].1[Z] as f64 / STEPS, pair[1].1[Z] as f64 / STEPS);
         let turned = before - at;
-        // In the cut a turn is a lead; on the way back and at rest it is not.
+        // In the cut Z moves a lead in a turn. On the way back and at rest it does not.
         if (turned - lead).abs() < 0.02 && at > end + 0.3 {
             if passes.is_empty() || before > -1.5 {
                 passes.push(Vec::new());
@@ -373,7 +375,7 @@ fn tapers_and_the_compound_slide_stay_in_step() {
     let all: Vec<f64> = passes.iter().flatten().map(|at| at - (2.0 * at).round() / 2.0).collect();
     println!("tapers: {} turns, spread {:.4}", all.len(), spread(&all));
     assert!(all.len() >= 18 && spread(&all) < STEP, "{passes:.3?}");
-    // On the tapers X is where Z says.
+    // On the tapers X is where Z requires it.
     let per_mm = machine.recorder().motors()[0].position as f64 / 5.0;
     let indexed = &machine.mechanics().unwrap().indexed()[since..];
     for (_, steps) in indexed {
@@ -388,7 +390,7 @@ fn tapers_and_the_compound_slide_stay_in_step() {
 
 #[test]
 fn feeds_a_turn_go_by_the_measured_speed() {
-    // S is 300, and the spindle turns at 240: 0.1 mm a turn are 24 mm/min.
+    // S is 300, but the spindle turns at 240: 0.2 mm a turn are 48 mm/min.
     let (mut machine, mut host) = lathe(4, 240.0, |_| {});
     set(&mut machine, &mut host, "g95 f0.2 m3 s300");
     machine.tamper(|mechanics, now| mechanics.force_spindle(240.0, now));
@@ -403,7 +405,7 @@ fn feeds_a_turn_go_by_the_measured_speed() {
     let feed = went(&mut machine, &mut host, 3_000) / 12.0;
     println!("G95 F0.2: {feed:.4} mm a turn at 240 rpm, of S300");
     assert!((feed / 0.2 - 1.0).abs() < 0.01, "{feed}");
-    // It follows a change, and waits for a spindle that stands still.
+    // The feed follows a change of speed, and motion waits for a spindle that stands still.
     machine.tamper(|mechanics, now| mechanics.force_spindle(120.0, now));
     host.run_for_ms(&mut machine, 1_200).unwrap();
     let feed = went(&mut machine, &mut host, 3_000) / 6.0;
@@ -423,7 +425,7 @@ fn feeds_a_turn_go_by_the_measured_speed() {
     assert!(took < 250.0 * 1.03 + 40.0, "{took} ms");
     host.run_for_ms(&mut machine, 10).unwrap();
     assert_eq!(went(&mut machine, &mut host, 1_000), 0.0);
-    // A traverse does not wait, and feeds a minute do not.
+    // A traverse does not wait, nor does a feed per minute.
     machine.tamper(|mechanics, now| mechanics.force_spindle(300.0, now));
     wait_for_rest(&mut machine, &mut host, 60_000);
     assert_eq!(way(&machine), 20.0);
@@ -447,7 +449,7 @@ fn the_example_cuts_a_thread() {
     assert!(report.ok, "{report}");
     let threads = Threads::of(&machine, &report.setup, &lines).unwrap();
     assert_eq!((threads.passes, threads.problem()), (11, None), "{threads:?}");
-    // Z stays with the spindle between two index pulses, too.
+    // Z also follows the spindle between two index pulses.
     let most = threads.errors.iter().flatten().map(|(_, off)| off.abs()).fold(0.0, f64::max);
     println!(
         "{} turns, {:.4} mm at the index, {most:.4} between",
@@ -480,7 +482,7 @@ fn a_spindle_that_stops_dead_stops_the_axis() {
         println!(
             "N {marks}, {rpm} rpm: at rest {took:.0} ms after a dead stop, two pulses are {two_pulses:.0}"
         );
-        // 20 ms are for what is queued and the ramp; from 5 mm/s on the ramp alone takes longer within the limits.
+        // 20 ms are for queued segments and the ramp. From 5 mm/s on the ramp alone takes longer within the limits.
         let ramp = rpm / 60.0 / 500.0 * 1e3;
         let rest = 20.0f64.max(9.0 + 0.02 * two_pulses + ramp);
         assert!(took <= two_pulses + rest, "{marks}, {rpm}: {took} ms");
@@ -497,7 +499,7 @@ fn run_for_quarter(machine: &mut Machine) {
     machine.run_until(machine.cycle() + machine.cycles(1) / 4).unwrap();
 }
 
-/// A lathe whose X leaves the cut by 2 mm: 200 steps/mm and 500 mm/s2 there, too.
+/// A lathe whose X leaves the cut by 2 mm, also with 200 steps/mm and 500 mm/s2.
 fn retracting(marks: u32, rpm: f64) -> (Machine, Host) {
     let (mut machine, mut host) = lathe(marks, rpm, |_| {});
     for line in [
@@ -515,7 +517,8 @@ fn retracting(marks: u32, rpm: f64) -> (Machine, Host) {
     (machine, host)
 }
 
-/// The spindle stops dead in the cut: ms from the stop until X is so far out, each. The position is known to the step, and leads back.
+/// Stops the spindle dead in the cut. Returns, for each depth, the ms from the stop until X is so far out. Checks
+/// that the position is known to the step and leads back.
 fn dies<const N: usize>(
     (machine, host): &mut (Machine, Host),
     later_ms: f64,
@@ -558,7 +561,7 @@ fn dies<const N: usize>(
 
 #[test]
 fn with_a_retract_a_spindle_that_stops_dead_has_x_leave_within_two_pulses_and_20_ms() {
-    // The cut of a pass is left. X is as light as cross slides are, or as slow as Z.
+    // X leaves the cut of a pass. X is as light as most cross slides, or as slow as Z.
     for (accel, depths) in [(1_000, [0.1, 0.2, 0.3]), (500, [0.05, 0.1, 0.3])] {
         for (marks, rpm) in [(1, 300.0), (4, 300.0), (4, 1_000.0), (100, 600.0), (100, 1_000.0)] {
             let mut lathe = retracting(marks, rpm);
@@ -566,12 +569,12 @@ fn with_a_retract_a_spindle_that_stops_dead_has_x_leave_within_two_pulses_and_20
             let two_pulses = 2.0 * 60_000.0 / rpm / f64::from(marks);
             let mut worst = [0.0f64; 3];
             for n in 0..4 {
-                // Anywhere between two pulses, and two looks of exec.
+                // The stop comes anywhere between two pulses, and between two checks of exec.
                 let later = f64::from(n) * (two_pulses / 8.0 + 0.6);
                 let out = dies(&mut lathe, later, depths);
                 for ((worst, out), depth) in worst.iter_mut().zip(out).zip(depths) {
                     *worst = worst.max(out);
-                    // Exec looks each 2 ms, and X begins with a segment, of 2 ms.
+                    // Exec checks every 2 ms, and X begins with a segment, of 2 ms.
                     let ramp = (2.0 * depth / f64::from(accel)).sqrt() * 1e3;
                     let most = 1.01 * two_pulses + 5.0 + ramp;
                     assert!(out <= most, "{marks}, {rpm}, {depth}: {out} ms of {most}");
@@ -618,7 +621,7 @@ fn with_a_retract_a_hold_leaves_the_cut_and_the_pass_is_made_once_more() {
         wait_for_rest(&mut machine, &mut host, 20_000);
         let motors = machine.recorder().motors();
         assert_eq!([motors[0].position, motors[Z].position], [0, (-16.0 * STEPS) as i64]);
-        // Where X is back at its place it cuts.
+        // Z cuts where X is back at its place.
         let indexed = &machine.mechanics().unwrap().indexed()[since..];
         let cuts = indexed.iter().filter(|(_, steps)| steps[0] == 0);
         let ways = cuts.map(|(_, steps)| -steps[Z] as f64 / STEPS);
@@ -635,17 +638,17 @@ fn with_a_retract_a_hold_leaves_the_cut_and_the_pass_is_made_once_more() {
 
 #[test]
 fn an_error_above_its_limit_ends_the_pass() {
-    // Told by the exception of its own.
+    // The error has an exception of its own.
     const ASTRAY: u64 = 46;
     let (mut machine, mut host) = retracting(4, 600.0);
     set(&mut machine, &mut host, "{spl:0.1}");
-    // Steady, and with a load that swings, nothing is amiss.
+    // With a steady spindle, or a load that swings, no error is reported.
     let swing = 12.0 * 3.0 * std::f64::consts::TAU;
     machine.tamper(|mechanics, now| mechanics.load_spindle(0.0, swing, 3.0, now));
     pass(&mut machine, &mut host, 12.0, 2.0);
     machine.tamper(|mechanics, now| mechanics.load_spindle(0.0, 0.0, 1.0, now));
     assert!(host.take_reports().iter().all(|report| report["er"]["st"].is_null()));
-    // Faster than the axis: 1,500 mm/min are 750 turns.
+    // The spindle turns faster than the axis can follow: 1,500 mm/min are 750 turns a minute.
     begin(&mut machine, &mut host, "g33 z-20 k2", 4.0);
     machine.tamper(|mechanics, now| mechanics.drive_spindle_to(1_000.0, now));
     host.run_for_ms(&mut machine, 800).unwrap();
@@ -654,7 +657,8 @@ fn an_error_above_its_limit_ends_the_pass() {
     assert_eq!(machine.recorder().motors()[0].position, (2.0 * STEPS) as i64);
 }
 
-/// A lathe whose outputs drive the spindle, one way or the other; it gains or loses at most so many turns a minute in a second.
+/// A lathe whose outputs drive the spindle in both directions. The spindle gains or loses at most `torque` turns a
+/// minute in a second.
 fn driven(marks: u32, rpm: f64, torque: f64) -> (Machine, Host) {
     let mut machine = firmware(&MEGA2560_LATHE);
     let mut build = Build::lathe(&MEGA2560_LATHE, marks).unwrap();
@@ -674,7 +678,8 @@ fn driven(marks: u32, rpm: f64, torque: f64) -> (Machine, Host) {
 
 #[test]
 fn a_tap_goes_in_and_out_in_step_with_the_spindle() {
-    // At most so far off: near the turn there are no pulses to go by. And how deep, so that the turn is anywhere between two pulses.
+    // The columns: marks, speed, torque, the largest error (near the reversal there are no pulses to go by), the
+    // depth (so that the reversal is anywhere between two pulses), and whether a second sensor tells the direction.
     for (marks, rpm, torque, most, deep, tells) in [
         (4, 300.0, 600.0, 0.45, 10.0, false),
         (4, 300.0, 600.0, 0.45, 10.074, false),
@@ -710,7 +715,7 @@ fn a_tap_goes_in_and_out_in_step_with_the_spindle() {
             let z = z as f64 / STEPS;
             deepest = deepest.min(z);
             let turns = machine.mechanics().unwrap().spindle_turns();
-            // From two turns in, where it is in step, to two turns before the end.
+            // From two turns after the beginning, where Z is in step, to two turns before the end.
             phases.push((z, z + turns));
             assert!(
                 phases.len() < 80_000,
@@ -729,14 +734,14 @@ fn a_tap_goes_in_and_out_in_step_with_the_spindle() {
             spread(&steady),
             spread(&inside)
         );
-        // Where the spindle is is known to a millisecond.
+        // The angle of the spindle is known to a millisecond.
         let known = rpm / 60.0 * 0.001;
         assert!(spread(&steady) < 2.0 * STEP + known, "{}", spread(&steady));
         assert!(spread(&inside) < most, "{}", spread(&inside));
-        // The way in which the spindle comes to rest, and no more.
+        // Z goes on for the distance in which the spindle comes to rest, and no further.
         let stops = rpm / 60.0 * rpm / torque / 2.0;
         assert!((-deep - stops - 0.3..=-deep).contains(&deepest), "{deepest}");
-        // It turns as before, and nothing is told.
+        // The spindle turns as before, and nothing is reported.
         let told = host.take_reports();
         assert!(told.iter().all(|report| report["er"]["st"].is_null()), "{told:?}");
         let turning = machine.mechanics().unwrap().spindle_rpm(machine.cycle());
@@ -762,7 +767,7 @@ fn a_tap_whose_spindle_does_not_turn_round_is_an_alarm() {
     host.run_for_ms(&mut machine, 10).unwrap();
     let told = host.take_reports().iter().any(|report| report["er"]["st"] == NOT_REVERSED);
     assert!(told, "nothing is told");
-    // The way of a second beyond the bottom, and no further.
+    // Z goes on for the distance of a second beyond the bottom, and no further.
     let z = machine.recorder().motors()[Z].position as f64 / STEPS;
     assert!((-10.05..=-9.9).contains(&z), "{z}");
     let position = asked(&mut machine, &mut host, "mpoz");
@@ -778,7 +783,7 @@ fn a_hold_in_a_tap_waits_for_its_end() {
     machine.send_now(b'!');
     host.run_for_ms(&mut machine, 6_000).unwrap();
     assert_eq!(host.stat(), Some(6), "it holds");
-    // It is out of the hole.
+    // The tap is out of the hole.
     assert!(machine.recorder().motors()[Z].position >= 0);
     machine.send_now(b'~');
     host.run_for_ms(&mut machine, 1_000).unwrap();
@@ -837,7 +842,7 @@ fn a_spindle_that_turns_the_wrong_way_cuts_nothing() {
         let (mut machine, mut host) = lathe(8, rpm, |_| {});
         set(&mut machine, &mut host, "{spdi:1}");
         host.run_for_ms(&mut machine, 1_000).unwrap();
-        // The simulated spindle is driven by hand.
+        // The simulated spindle is driven by the test.
         set(&mut machine, &mut host, word);
         host.run_for_ms(&mut machine, 200).unwrap();
         machine.tamper(|mechanics, now| mechanics.force_spindle(rpm, now));

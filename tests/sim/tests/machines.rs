@@ -1,4 +1,5 @@
-//! Machines chosen on the chip: how long it takes, that a job runs on each, and that it survives a power cut.
+//! Machines that are selected on the chip: how long that takes, that a job runs on each, and that it survives a power
+//! cut.
 
 use kerf::boards::MEGA2560_GRBL;
 use kerf::config::machines::ALL;
@@ -36,7 +37,7 @@ fn a_job_runs_on_every_machine() {
         }
         let heard = String::from_utf8(heard).unwrap();
         assert!(heard.contains("\"st\":8,"), "{}: {heard}", profile.name);
-        // Its last moves are still under way.
+        // The last moves of the job are still under way.
         let mut wait = 0;
         while value(&mut machine, &mut host, "stat") == 5.0 {
             host.run_for_ms(&mut machine, 100).unwrap();
@@ -44,7 +45,7 @@ fn a_job_runs_on_every_machine() {
             assert!(wait < 200, "{} does not stop", profile.name);
         }
     }
-    // It ends where it began, on every machine.
+    // The job ends where it began, on every machine.
     assert_eq!(value(&mut machine, &mut host, "posx"), 0.0);
 }
 

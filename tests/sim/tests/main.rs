@@ -1,7 +1,7 @@
-//! The image on the simulated chip, and what simulates it. All files are one program: each of its own would be optimised and linked apart,
-//! which took longer than the tests.
+//! The image on the simulated chip, and tests of the simulator itself. All files are one program. As separate
+//! programs each would be optimised and linked on its own, which took longer than the tests.
 //!
-//! A name in front of `::` is a file here: `cargo test -p kerf-sim-tests hold::` are the tests of `hold.rs`.
+//! A name before `::` is a file here: `cargo test -p kerf-sim-tests hold::` runs the tests of `hold.rs`.
 
 #[macro_use]
 mod common;

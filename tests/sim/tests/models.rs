@@ -1,4 +1,4 @@
-//! The peripheral models, asked by programs that run on them.
+//! The models of peripherals, tested by programs that run on them.
 
 use kerf_sim::Fault;
 

@@ -1,4 +1,5 @@
-//! How senders that cannot run here open a conversation, with the image on the simulated chip: those of `tests/openings.rs`.
+//! How senders that cannot run here open a conversation, with the image on the simulated chip: the openings of
+//! `tests/openings.rs`.
 
 #[path = "../../support/openings.rs"]
 mod by_sender;
@@ -14,7 +15,7 @@ fn every_sender_finds_its_own() {
     by_sender::all(boot);
 }
 
-/// A machine that begins with this value of `dia`: it has been started anew.
+/// A machine that begins with this value of `dia`: it has stored the value and restarted.
 fn boot(dia: u8) -> Machine {
     let mut machine = firmware(&MEGA2560_GRBL);
     machine.run_ms(1_500);
@@ -23,7 +24,7 @@ fn boot(dia: u8) -> Machine {
         machine.run_ms(500);
         Side::send(&mut machine, b"\x18");
         machine.run_ms(1_500);
-        // What it said before.
+        // Output from before the restart.
         let heard = String::from_utf8_lossy(&machine.heard()).into_owned();
         assert!(heard.contains("Grbl"), "{heard}");
     }

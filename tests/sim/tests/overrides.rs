@@ -1,18 +1,19 @@
-//! Overrides on the image: how soon after the byte that asks for one the steps follow.
+//! Overrides on the image: how soon the steps follow the byte that asks for an override.
 
 use kerf::boards::MEGA2560_GRBL;
 use kerf_sim::{Host, Machine, Stopwatch};
 
 use crate::common::{MS, booted, say_line, say_now, set};
 
-/// What every change keeps to.
+/// Longest time for every change, ms.
 const LIMIT_MS: f64 = 20.0;
-/// What it takes to see it in short moves: 8 steps, a ms, and the velocity has to change by 0.2 %, for which a low jerk
-/// takes 1.3 ms.
+/// Time that it takes to see the change in short moves, ms. 8 steps take 1 ms, and the velocity must change by 0.2 %,
+/// which takes 1.3 ms under a low jerk limit.
 const SEEN_MS: f64 = 2.3;
-/// Millions of mm/min^3: a jerk that no acceleration limit knows of, and one that takes 22 ms to build up.
+/// Two jerk limits, millions of mm/min^3: one so high that it does not limit any acceleration, and one with which an
+/// acceleration takes 22 ms to build up.
 const JERKS: [f64; 2] = [1e6, 5_000.0];
-/// Makes all keys anew.
+/// The function that computes all keys anew.
 const REPLAN: &str = "<kerf::motion::queue::BlockQueue>::replan";
 
 /// What asks for another override.
@@ -23,7 +24,7 @@ enum Say {
 }
 use Say::{Character, Line};
 
-/// Feeds go up and down, a little and a lot.
+/// Feeds go up and down, by a little and by a lot.
 const FEEDS: [Say; 10] = [
     Character(0x91),
     Character(0x91),
@@ -56,13 +57,13 @@ fn board(jerk: f64) -> (Machine, Host) {
     (machine, host)
 }
 
-/// Measures what it costs to plan anew.
+/// Adds a stopwatch for the cost of planning anew.
 fn add_replan_watch(machine: &mut Machine) {
     let entry = machine.image().function(REPLAN).unwrap();
     machine.add_stopwatch(Stopwatch::calls(entry));
 }
 
-/// Says it, and returns the cycle at which its last bit has come.
+/// Sends an override, and returns the cycle at which its last bit has come.
 fn say(machine: &mut Machine, host: &mut Host, what: Say) -> u64 {
     match what {
         Character(byte) => say_now(machine, byte),
@@ -70,8 +71,8 @@ fn say(machine: &mut Machine, host: &mut Host, what: Say) -> u64 {
     }
 }
 
-/// When X first steps otherwise than in all the time before `from`: so many steps take another time than they ever did, by
-/// more than a cycle each.
+/// Returns when the steps of X first differ from all steps before `from`: `steps` steps take a time that they have
+/// not taken before, by more than a cycle for each step.
 fn begins(machine: &Machine, from: u64, steps: usize) -> u64 {
     let x = machine.recorder().steps_of(0);
     let taken: Vec<(u64, u64)> =
@@ -83,11 +84,11 @@ fn begins(machine: &Machine, from: u64, steps: usize) -> u64 {
     after.iter().find(|(_, taken)| !usual.contains(taken)).expect("it follows").0
 }
 
-/// How much later in its tick a pulse comes that waits for all other interrupts, cycles: it does at one of two velocities if their ticks
-/// are on both sides of `Pace::settles`. The step between the two takes as much longer.
+/// How much later in its tick a pulse comes if it waits for all other interrupts, cycles. This happens at one of two
+/// velocities whose ticks are on both sides of `Pace::settles`. The step between the two takes longer by that time.
 const SETTLES: u64 = 44;
 
-/// No segment has come late: no step has taken longer than steps at the slower of the two velocities do.
+/// Checks that no segment has come late: no step has taken longer than the steps at the slower of the two velocities.
 fn check_no_stop(machine: &Machine) {
     let x = machine.recorder().steps_of(0);
     let taken: Vec<u64> = x.windows(2).map(|pair| pair[1] - pair[0]).collect();
@@ -96,11 +97,12 @@ fn check_no_stop(machine: &Machine) {
     assert!(*slowest <= usual + usual / 100 + SETTLES, "{slowest} cycles instead of {usual}");
 }
 
-/// The longest time from any of these to what comes of it, ms. What is compared is the time that so many steps take.
+/// Returns the longest time from any of these overrides to its effect, ms. The effect is seen in the time that
+/// `steps` steps take.
 fn slowest(machine: &mut Machine, host: &mut Host, says: &[Say], steps: usize) -> f64 {
     let mut worst = 0;
     for (n, what) in (0u64..).zip(says.iter().cycle().take(2 * says.len())) {
-        // At all phases of a stretch, when the change before is over.
+        // The overrides come at all phases of a stretch, each when the change before it is over.
         host.run_until(machine, machine.cycle() + 150 * MS).unwrap();
         machine.recorder_mut().keep_log();
         host.run_until(machine, machine.cycle() + 60 * MS + n * 5_737).unwrap();
@@ -163,7 +165,7 @@ fn to_plan_a_queue_of_corners_anew_makes_no_segment_late() {
     println!("corners: {replan:?}");
     // Measured: 163,000 cycles, 2,500 a key with its velocity.
     assert!(replan.count >= 10 && replan.max <= 175_000, "{replan:?}");
-    // At a corner it takes up to 20,800 cycles from step to step: more would be a stop.
+    // At a corner up to 20,800 cycles pass from step to step. A longer time would be a stop.
     let log = machine.recorder().log();
     let longest = log.windows(2).map(|pair| pair[1].cycle - pair[0].cycle).max().unwrap();
     println!("longest {longest}");

@@ -1,5 +1,5 @@
-//! The image of `pico-cnc` on the emulated RP2040. `cargo xtask test` runs these, and installs the emulator; else
-//! `cargo test -p kerf-sim-tests pico -- --ignored` does, behind a `cargo xtask sim --board pico-cnc`.
+//! The image of `pico-cnc` on the emulated RP2040. `cargo xtask test` runs these tests, and installs the emulator.
+//! They also run with `cargo test -p kerf-sim-tests pico -- --ignored`, after a `cargo xtask sim --board pico-cnc`.
 
 use std::path::Path;
 
@@ -20,7 +20,8 @@ fn board() -> Emulated {
 }
 
 impl Side for Emulated {
-    // As fast as on the line of other boards: USB would bring two lines at once, of which one may overtake the other.
+    // Bytes are sent at the rate of other boards' serial lines. USB would bring two lines at once, and one of them
+    // may overtake the other.
     fn send(&mut self, bytes: &[u8]) {
         self.send_to(USB, bytes);
         self.run_for_ms(1 + bytes.len() as u64 * 87 / 1_000).unwrap();
@@ -30,7 +31,7 @@ impl Side for Emulated {
         self.send_to(AUX, bytes);
     }
 
-    // The board has no pins for that.
+    // The board has no handshake pins.
     fn set_aux_cts(&mut self, _stop: bool) {}
 
     fn stops_aux(&self) -> bool {
@@ -134,7 +135,7 @@ fn booted() -> (Emulated, Host) {
     (board, host)
 }
 
-/// Sends a line that must be taken.
+/// Sends a line that must be accepted.
 fn set(board: &mut Emulated, host: &mut Host, line: &str) {
     let response = host.ask(board, line, 5_000).unwrap();
     assert_eq!(response.status, 0, "{line} is answered by {}", response.raw);
@@ -146,7 +147,7 @@ fn value(board: &mut Emulated, host: &mut Host, token: &str) -> f64 {
     response.body[token].as_f64().unwrap_or_else(|| panic!("{}", response.raw))
 }
 
-/// Whether the machine says that it is where the pins have put it, X and Y, of 1,280 steps a millimetre.
+/// Checks that the reported X and Y agree with the pins, at 1,280 steps a millimetre.
 fn assert_counted(board: &mut Emulated, host: &mut Host) {
     let steps = Emulated::steps(board);
     for (m, token) in ["mpox", "mpoy"].into_iter().enumerate() {
@@ -186,7 +187,7 @@ fn a_hold_loses_no_step_and_a_flush_counts_them() {
 #[test]
 #[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn a_million_steps_a_second_of_each_motor() {
-    // How far the motors go, and the rate of the leading one.
+    // Checks how far the motors go, and the rate of the leading one.
     let moves = ["g0 x100", "g0 x100 y100 z100 a100", "g0 x100 y87.3 z-61.8 a29", "g0 x71 y-100"];
     for line in moves {
         let (mut board, mut host) = booted();
@@ -209,7 +210,7 @@ fn a_million_steps_a_second_of_each_motor() {
     }
 }
 
-/// X, A, and two motors each of Y and Z.
+/// Six motors: X, A, and two motors each of Y and Z.
 #[test]
 #[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn half_a_million_steps_a_second_of_six_motors() {
@@ -276,7 +277,7 @@ fn a_panic_stops_everything_and_is_told_after_the_reset() {
     assert!(said.contains("SYSTEM READY") && !said.contains("panic"), "once: {said}");
 }
 
-/// What the converter reads at a thermistor's resistance with 4,700 ohms to the supply.
+/// Returns what the converter reads from a thermistor of this resistance with 4,700 ohms to the supply.
 fn reading(ohms: f64) -> u16 {
     (4_095.0 * ohms / (ohms + 4_700.0)) as u16
 }
@@ -290,7 +291,7 @@ fn an_skr_pico_heats() {
     board.sense(1, reading(100_000.0 * (4_267.0 * (1.0 / 423.15 - 1.0 / 298.15_f64)).exp()));
     let mut host = Host::new(LINES_IN_FLIGHT);
     host.boot(&mut board, 1_000).unwrap();
-    // It has no pins for the sensors of a spindle.
+    // The board has no pins for the sensors of a spindle.
     assert_eq!(host.ask(&mut board, "g33 z-1 k1", 1_000).unwrap().status, 45);
     for line in ["{he1k:1,he3k:1}", "m104 s200", "m106 s255"] {
         set(&mut board, &mut host, line);
@@ -300,14 +301,15 @@ fn an_skr_pico_heats() {
     assert!((is[0] - 150.0).abs() < 1.0 && (is[1] - 25.0).abs() < 1.0, "{is:?}");
     let on = [23, 21, 17].map(|pin| board.is_high(gp(pin)));
     assert_eq!(on, [true, false, true], "hot end, bed, fan");
-    // A wire of the sensor is off.
+    // A wire of the sensor is open.
     board.sense(1, 4_095);
     host.run_for_ms(&mut board, 500).unwrap();
     assert!(!board.is_high(gp(23)), "a fault switches it off");
     assert_eq!(value(&mut board, &mut host, "stat"), 2.0);
 }
 
-/// From the edge of a limit switch to the last step: two samples, the entry of the interrupt, which may find others, and the step under way.
+/// Longest time from the edge of a limit switch to the last step, us: two samples, the entry of the interrupt, which
+/// may find others, and the step under way.
 const STOP_US: f64 = 10.0;
 
 #[test]
@@ -375,9 +377,11 @@ fn settings_may_change_often() {
     assert_eq!(value(&mut board, &mut host, "xvm"), 519.0);
 }
 
-/// What is not so here, by the beginnings of names. More rates of the line can be made (`baud`), steps may come faster (`rates`, `settings-motor`,
-/// `grbl-settings`), no port has RTS and CTS (`ports-pins`), the sensors of a spindle have pins of their own
-/// (`encoder`), and no second one tells the direction (`thread-direction`, `lathe-tap-fails`, `grbl-lathe-cycles`), settings are kept sooner (`stored`), and the boot loader, which is in ROM, is not emulated (`boot-loader`).
+/// Transcripts that do not hold here, by the beginnings of their names. More rates of the line are possible (`baud`),
+/// steps may come faster (`rates`, `settings-motor`, `grbl-settings`), no port has RTS and CTS (`ports-pins`), the
+/// sensors of a spindle have pins of their own (`encoder`) and no second sensor tells the direction
+/// (`thread-direction`, `lathe-tap-fails`, `grbl-lathe-cycles`), settings are stored sooner (`stored`), and the boot
+/// loader, which is in ROM, is not emulated (`boot-loader`).
 const DIFFERS: [&str; 11] = [
     "baud",
     "boot-loader",
@@ -391,12 +395,13 @@ const DIFFERS: [&str; 11] = [
     "stored",
     "thread-direction",
 ];
-/// Those in which motors go far, which takes the emulator minutes: the simulated board plays them, and nothing in them is the chip's.
+/// Transcripts in which motors go far, which takes the emulator minutes. The simulated board plays them, and nothing
+/// in them depends on the chip.
 const LONG: [&str; 2] = ["axis-modes", "far"];
-/// Those of a printer, and of drivers that are told by UART.
+/// Transcripts of a printer, and of drivers that are set up by UART.
 const PRINTING: [&str; 4] = ["bed", "drivers", "heat", "reprap"];
 
-/// An answer of a machine with 61 blocks as this one gives it, with 1,024.
+/// Returns an answer of a machine with 61 blocks as this machine, with 1,024, gives it.
 fn with_more_room(line: &str) -> String {
     let text = [
         ("Bf:61,", "Bf:1024,"),
@@ -431,14 +436,15 @@ fn the_image_keeps_to_the_transcripts() {
     transcript::play_all(printing, 2, || greeted(&SKR_PICO));
 }
 
-/// A board that has greeted on both ports: a greeting takes 10 ms on the slower one.
+/// A board that has greeted on both ports: a greeting takes 10 ms on the slower port.
 fn greeted(board: &'static Board) -> Emulated {
     let mut board = Emulated::load(&image(board), board).unwrap();
     board.run_for_ms(300).unwrap();
     board
 }
 
-/// Moves of 0.03 mm at 100 mm/s: 3,333 blocks a second. With a jerk limit they are as many, and none comes late.
+/// Moves of 0.03 mm at 100 mm/s: 3,333 blocks a second. With a jerk limit the board makes as many, and none comes
+/// late.
 #[test]
 #[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn tiny_moves_are_as_fast_as_could_be() {
@@ -447,7 +453,7 @@ fn tiny_moves_are_as_fast_as_could_be() {
     assert!(free < 1.05 && limited < 1.15, "{free}, {limited}");
 }
 
-/// How long they take under a jerk limit, over the ideal without one.
+/// Returns the time of the moves under a jerk limit, over the ideal time without a limit.
 fn tiny_moves(jerk: f64) -> f64 {
     let (mut board, mut host) = booted();
     set(&mut board, &mut host, "{ja:1800000,sv:0,qv:0}");
@@ -475,7 +481,7 @@ fn tiny_moves(jerk: f64) -> f64 {
     over
 }
 
-/// Four motors, each at a rate of its own up to 700,000 steps a second, by blocks of a quarter of a millisecond.
+/// Four motors, each at its own rate of up to 700,000 steps a second, in blocks of a quarter of a millisecond.
 #[test]
 #[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn tiny_moves_of_fast_motors_come_in_time() {

@@ -1,4 +1,4 @@
-//! Every row of the bench of `pico-cnc` keeps to its floor. Run as `pico.rs` is.
+//! Every row of the bench of `pico-cnc` keeps to its floor. The tests run like those of `pico.rs`.
 
 use kerf::boards::{PICO_CNC, PICO_CNC6};
 use kerf_sim::bench::emulated::{PicoBed, ROWS, named};
@@ -7,7 +7,7 @@ use crate::common::image;
 
 fn keeps_to_its_floor(name: &str) {
     let row = named(name).unwrap();
-    // It is looked for beside the other one.
+    // The bench looks for this image beside the other one.
     image(&PICO_CNC6);
     row.keep_to_floor(&PicoBed::new(&image(&PICO_CNC))).unwrap();
 }

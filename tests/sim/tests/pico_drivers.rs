@@ -1,5 +1,5 @@
-//! The drivers of the SKR Pico, which are emulated with their motors and a stop that these are held up at: what drivers are told, and homing by a stall.
-//! They run as `pico.rs` says.
+//! The drivers of the SKR Pico, which are emulated with their motors and with a hard stop that blocks the motors:
+//! what drivers are sent, and homing by a stall. The tests run like those of `pico.rs`.
 
 use kerf::boards::{SKR_PICO, gp};
 use kerf_sim::emulated::{DRIVERS, Driver, Emulated};
@@ -9,12 +9,13 @@ use crate::common::image;
 
 /// Full steps in a millimetre of X and Y: 200 in a turn of 1.25 mm.
 const FULL_STEPS: f64 = 160.0;
-/// How far from the stop a motor may be that has slipped there, full steps.
+/// Most distance from the stop of a motor that has slipped there, full steps.
 const SLIPS: f64 = 2.0;
-/// Where X is held up, full steps; it homes downwards.
+/// Position of the stop of X, full steps; X homes downwards.
 const STOP: i64 = -6 * FULL_STEPS as i64;
 
-/// A board that has been powered up, and a sender; X and Y have a driver each whose DIAG is at the stop of its axis.
+/// A board that has been powered up, and a sender. X and Y have a driver each, whose DIAG is at the input of the
+/// axis's limit switch.
 fn booted(x: Driver) -> (Emulated, Host) {
     let mut board = Emulated::load(&image(&SKR_PICO), &SKR_PICO).unwrap();
     let y = Driver { address: 2, motor: 1, gpio: 3, ..x };
@@ -28,12 +29,12 @@ fn driver() -> Driver {
     Driver { address: 0, motor: 0, gpio: 4, stop: STOP, above: false, powered: true }
 }
 
-/// The status of a line.
+/// Returns the status of a line.
 fn status(board: &mut Emulated, host: &mut Host, line: &str) -> i64 {
     host.ask(board, line, 5_000).unwrap().status
 }
 
-/// Sends a line that must be taken.
+/// Sends a line that must be accepted.
 fn set(board: &mut Emulated, host: &mut Host, line: &str) {
     assert_eq!(status(board, host, line), 0, "{line}");
 }
@@ -44,7 +45,7 @@ fn value(board: &mut Emulated, host: &mut Host, token: &str) -> f64 {
     response.body[token].as_f64().unwrap_or_else(|| panic!("{}", response.raw))
 }
 
-/// Homes axes, and waits for the end. What is said of an exception.
+/// Homes axes, and waits for the end. Returns the exceptions that were reported.
 fn home(board: &mut Emulated, host: &mut Host, line: &str) -> String {
     let answer = host.ask(board, line, 5_000).unwrap();
     wait(board, host);
@@ -55,7 +56,7 @@ fn home(board: &mut Emulated, host: &mut Host, line: &str) -> String {
 fn wait(board: &mut Emulated, host: &mut Host) {
     for _ in 0..100 {
         host.run_for_ms(board, 100).unwrap();
-        // Ready, at the end of a program or of a motion, or in an alarm.
+        // Ready, at the end of a program or of motion, or in an alarm.
         if [1.0, 2.0, 3.0, 4.0].contains(&value(board, host, "stat")) {
             return;
         }
@@ -63,17 +64,18 @@ fn wait(board: &mut Emulated, host: &mut Host) {
     panic!("homing does not end");
 }
 
-/// What has been said besides answers.
+/// Returns all reports and unexpected lines.
 fn exceptions(host: &mut Host) -> String {
     format!("{:?}{:?}", host.take_reports(), host.strays())
 }
 
-/// How far X stands from its stop, mm.
+/// Returns the distance of X from its stop, mm.
 fn from_stop(board: &mut Emulated) -> f64 {
     (board.rotors()[0] - STOP as f64) / FULL_STEPS
 }
 
-/// What the drivers of the SKR Pico are told: address, register, value; each datagram with its checksum.
+/// Returns what the drivers of the SKR Pico were sent: address, register, value. Checks the checksum of each
+/// datagram.
 fn told(bytes: &[u8]) -> Vec<(u8, u8, u32)> {
     let crc = |bytes: &[u8]| {
         let bits = bytes.iter().flat_map(|byte| (0..8).map(move |bit| byte >> bit & 1));
@@ -87,7 +89,7 @@ fn told(bytes: &[u8]) -> Vec<(u8, u8, u32)> {
     datagrams.collect()
 }
 
-/// What drivers have been told since the last call; `rest` is what has begun.
+/// Returns what drivers were sent since the last call; `rest` is the datagram that has begun.
 fn take_told(board: &mut Emulated, rest: &mut Vec<u8>) -> Vec<(u8, u8, u32)> {
     rest.extend(board.receive_line(DRIVERS));
     let complete = rest.len() - rest.len() % 8;
@@ -109,8 +111,9 @@ fn drivers_are_told_their_settings() {
     for line in ["{drr2:1.4,drh2:0.05}", "{drc4:0}", "{3mi:64}", "{drs1:255}"] {
         set(&mut board, &mut host, line);
     }
-    // Address 2 is motor 2's, 1 is motor 3's. What is new does not wait for its turn: two datagrams follow the last answer, a millisecond each, and
-    // the flash is written before them, a part of a millisecond each piece.
+    // Address 2 belongs to motor 2, address 1 to motor 3. Changed values do not wait for their turn: two datagrams
+    // follow the last answer, each of a millisecond, and before them the flash is written, in pieces of a part of a
+    // millisecond.
     host.run_for_ms(&mut board, 5).unwrap();
     let told = take_told(&mut board, &mut rest);
     for wanted in [
@@ -127,7 +130,7 @@ fn drivers_are_told_their_settings() {
     }
     host.run_for_ms(&mut board, 500).unwrap();
     board.cut_power();
-    // The cut ends a datagram somewhere.
+    // The cut breaks a datagram off.
     rest.clear();
     board.receive_line(DRIVERS);
     host.boot(&mut board, 2_000).unwrap();
@@ -173,7 +176,8 @@ fn an_axis_homes_by_a_stall() {
             let off = (from_stop(&mut board) - zero) * FULL_STEPS;
             println!("{settings} from {start}: {off} full steps off");
             assert!(off.abs() <= SLIPS, "{settings}: {off} full steps off");
-            // In a job nothing is lost on the way, and a stall ends no move: the fast ones have one at each full step of a motor that is held up.
+            // In a job no step is lost on the way, and a stall ends no move. Fast moves have a stall at each full
+            // step of a motor that is blocked.
             let before = board.rotors()[0];
             set(&mut board, &mut host, "g0 x3");
             host.run_for_ms(&mut board, 1_000).unwrap();
@@ -185,7 +189,7 @@ fn an_axis_homes_by_a_stall() {
 /// Settings with which X and Y home by a stall, downwards.
 const HOMES: [&str; 2] = ["{drs1:60,drs2:60}", "{x:{sn:1,tm:9,zb:1},y:{sn:1,tm:9,zb:1}}"];
 
-/// A board like that.
+/// A board with these settings.
 fn homes(x: Driver) -> (Emulated, Host) {
     let (mut board, mut host) = booted(x);
     for line in HOMES {
@@ -202,7 +206,7 @@ fn an_axis_that_is_at_its_stop_homes() {
     for rotor in board.rotors() {
         assert!((rotor - FULL_STEPS).abs() <= SLIPS, "{:?}", board.rotors());
     }
-    // Once more, from its stop, with an upper end.
+    // A second homing, from the stop, at an upper end.
     let (mut board, mut host) = homes(Driver { stop: 0, above: true, ..driver() });
     set(&mut board, &mut host, "{x:{sn:0,sx:1}}");
     home(&mut board, &mut host, "g28.2 x0");
@@ -227,12 +231,12 @@ fn a_feed_override_slows_no_search_for_a_stall() {
 fn what_cannot_find_a_stall_says_so() {
     let far = Driver { stop: -1_000_000, ..driver() };
     for (x, lines, status, moves) in [
-        // No power, or not sensitive at all: it searches for all of its travel.
+        // Without power, or with no sensitivity at all, the axis searches over all of its travel.
         (Driver { powered: false, ..driver() }, vec![], 240, true),
         (driver(), vec!["{drs1:1}"], 240, true),
-        // There is no switch that opens at rest.
+        // With sensitivity 0 there is no switch that is open at rest.
         (driver(), vec!["{drs1:0}"], 247, true),
-        // No stealthChop, no load.
+        // Without stealthChop the driver measures no load.
         (driver(), vec!["{drc1:0}"], 246, false),
         (far, vec!["{1ma:0,2ma:0,sqsw:3}"], 246, false),
     ] {
@@ -245,7 +249,7 @@ fn what_cannot_find_a_stall_says_so() {
         assert_eq!(value(&mut board, &mut host, "homx"), 0.0, "{lines:?}");
         assert_eq!(board.positions()[0] != 0, moves, "{lines:?}");
     }
-    // The jumper is off, or the driver reports a fault: the pin is high at standstill.
+    // The jumper is missing, or the driver reports a fault: the pin is high at standstill.
     let (mut board, mut host) = homes(driver());
     board.drivers(&[]);
     board.drive(gp(4), true);

@@ -1,4 +1,5 @@
-//! USB of the emulated RP2040: the port, back-pressure, a program that does not listen, both ports at once. Run as `pico.rs` is.
+//! USB of the emulated RP2040: the port, back-pressure, a program that does not listen, both ports at once. The tests
+//! run like those of `pico.rs`.
 
 use kerf::boards::PICO_CNC;
 use kerf_sim::emulated::{Emulated, Talks};
@@ -11,7 +12,7 @@ fn board() -> Emulated {
     Emulated::load(&image(&PICO_CNC), &PICO_CNC).unwrap()
 }
 
-/// One that has greeted, and speaks TinyG's dialect on both ports.
+/// A board that has greeted, and speaks TinyG's dialect on both ports.
 fn booted() -> Emulated {
     let mut board = board();
     Host::new(1).boot(&mut board, 1_000).unwrap();
@@ -20,7 +21,7 @@ fn booted() -> Emulated {
     board
 }
 
-/// What a port says within so many milliseconds after this.
+/// Sends a text on a port, and returns what is heard there within so many milliseconds.
 fn ask(board: &mut Emulated, port: usize, text: &str, ms: u64) -> String {
     board.send_to(port, text.as_bytes());
     board.run_for_ms(ms).unwrap();
@@ -44,7 +45,7 @@ fn the_first_program_that_opens_the_port_is_greeted() {
     assert!(heard.contains("SYSTEM READY") && heard.ends_with('\n'), "{heard}");
 }
 
-/// The program closes the port, and another one opens it. What that one hears.
+/// Closes the port and opens it as another program. Returns what that program hears.
 fn reopen(board: &mut Emulated) -> String {
     board.session(CLOSED);
     board.run_for_ms(20).unwrap();
@@ -64,7 +65,7 @@ fn whoever_opens_the_port_is_greeted_unless_something_runs() {
         let answer = ask(&mut board, USB, "{xvm:n}\n", 20);
         assert!(answer.starts_with("{\"r\":{\"xvm\":"), "{answer}");
     }
-    // What it says first decides between dialects.
+    // The first bytes that the new program sends settle the dialect.
     reopen(&mut board);
     assert!(ask(&mut board, USB, "?", 20).starts_with("<Idle|"));
     assert_eq!(ask(&mut board, USB, "g1x5f600\n", 20), "ok\r\n");
@@ -89,14 +90,14 @@ fn half_a_line_is_forgotten_with_the_program_that_sent_it() {
 #[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn nothing_is_lost_though_nobody_waits_for_answers() {
     let mut board = booted();
-    // More than blocks, pool and ring have room for.
+    // More lines than blocks, pool and ring have room for.
     let lines = 1_400;
     let x = |n: usize| if n.is_multiple_of(2) { "0" } else { ".1" };
     let text: String = (1..=lines).map(|n| format!("n{n} g1 f600 x{}\n", x(n))).collect();
     let heard = ask(&mut board, USB, &text, 1_000);
     assert!(heard.matches("\"r\":").count() < lines && board.waiting() > 0, "held back");
     let mut heard = heard;
-    // Until X has been at rest for a while.
+    // Waits until X has been at rest for a while.
     let (mut seconds, mut rests) = (0, 0);
     while rests < 3 && seconds < 200 {
         let before = Emulated::steps(&board)[0];
@@ -110,8 +111,8 @@ fn nothing_is_lost_though_nobody_waits_for_answers() {
     assert_eq!(Emulated::steps(&board)[0], 0);
 }
 
-/// The moves fill blocks, pool and ring; what stops comes behind them, in a packet of its own or in their last one. Beyond that the computer is
-/// held back, with what it has to say.
+/// The moves fill blocks, pool and ring. The stop comes behind them, in a packet of its own or in their last packet.
+/// If there are more moves, the computer is held back, and the stop with it.
 #[test]
 #[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn a_stop_acts_at_once_however_much_waits_before_it() {

@@ -1,4 +1,4 @@
-//! The pictures of a job: made from the steps, and read back.
+//! The pictures of a job, made from the steps, and checked by reading them back.
 
 use std::fs::{self, File};
 use std::io::BufReader;
@@ -33,19 +33,19 @@ fn an_s_curve_is_seen_in_the_steps() {
     let low = Options { settings: vec!["{xjm:20,xac:0}".to_string()], ..Options::default() };
     let (machine, report) = run("g1 x20 f600", &low);
     let motion = Motion::of(&machine, &report.setup, WINDOW_MS);
-    // 10 mm/s, and ramps in which the jerk limit is in force.
+    // 10 mm/s, with ramps that the jerk limit shapes.
     let velocity = highest(&motion.velocity);
     assert!((velocity / 10.0 - 1.0).abs() < 0.02, "{velocity} mm/s");
     let ramp = 2.0 * (10.0f64 / JERK).sqrt();
     let way: f64 = motion.velocity.iter().sum::<f64>() * 1e-3;
     assert!((way - 20.0).abs() < 0.05, "{way} mm");
     let seconds = motion.velocity.len() as f64 * 1e-3;
-    // The first and the last half step, 29 ms each, are not seen.
+    // The first and the last half step, of 29 ms each, do not show.
     assert!((seconds - (2.0 + ramp - 0.058)).abs() < 0.01, "{seconds} s");
     let acceleration = highest(&motion.acceleration);
     let peak = (10.0 * JERK).sqrt();
     assert!((acceleration / peak - 1.0).abs() < 0.1, "{acceleration} instead of {peak} mm/s2");
-    // In the middle of the first half of the ramp up; then of the second.
+    // In the middle of the first half of the ramp up, then of the second half.
     let jerk = |share: f64| {
         let middle = (share * ramp * 1e3) as usize;
         let around = &motion.jerk[middle - 40..middle + 40];

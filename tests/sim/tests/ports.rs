@@ -8,23 +8,23 @@ use crate::common::{booted, set};
 
 /// Steps in a millimetre.
 const PER_MM: f64 = 1_280.0;
-/// A move of X at 20,000 steps a second, and how many steps that is.
+/// A move of X at 20,000 steps a second, and the number of its steps.
 const MOVE: &str = "g1 x40 f937.5";
 const MOVE_STEPS: u64 = 51_200;
-/// What a step may be late or early, cycles: 2 us.
+/// Most that a step may be late or early, cycles: 2 us.
 const JITTER: u64 = 32;
-/// Cycles in which no tick comes in, outside the step interrupt.
+/// Longest time in which no tick is served, outside the step interrupt, cycles.
 const OFF_CYCLES: u64 = 42;
-/// Status of a line that was lost in part.
+/// Status of a line of which a part was lost.
 const BUFFER_FULL: i64 = 13;
 
-/// A machine that can go so fast, with a log of its steps.
+/// A machine that can go this fast, with a log of its steps.
 fn fast() -> (Machine, Host) {
     let (mut machine, mut host) = booted(&MEGA2560_GRBL);
     for line in ["{xvm:2000}", "{xfr:2000}", "{sv:0}"] {
         set(&mut machine, &mut host, line);
     }
-    // Until they have been put away, which takes turns of its own.
+    // Waits until the settings have been stored, which takes turns of the tasks.
     host.run_for_ms(&mut machine, 1_000).unwrap();
     machine.receive_from(AUX);
     host.take_reports();
@@ -33,7 +33,7 @@ fn fast() -> (Machine, Host) {
     (machine, host)
 }
 
-/// Longest less shortest interval in the middle of the move.
+/// Returns the longest minus the shortest step interval in the middle of the move.
 fn jitter(machine: &Machine) -> u64 {
     let steps = machine.recorder().steps_of(0);
     let middle = &steps[steps.len() / 5..steps.len() * 4 / 5];
@@ -50,7 +50,7 @@ fn is_steady_and_whole(machine: &Machine) {
     assert_eq!(machine.recorder().motors()[0].position, MOVE_STEPS as i64);
 }
 
-/// The whole lines of what was heard; the rest stays.
+/// Takes the whole lines of what was heard; the rest stays.
 fn take_lines(heard: &mut Vec<u8>) -> Vec<String> {
     let end = heard.iter().rposition(|b| *b == b'\n').map_or(0, |at| at + 1);
     let text = String::from_utf8(heard.drain(..end).collect()).expect("no byte is garbled");
@@ -65,7 +65,7 @@ fn the_second_port_asks_while_a_job_streams() {
     let (mut heard, mut asked, mut answers, mut acks) = (Vec::new(), 0, 0, 0);
     while machine.recorder().steps() < MOVE_STEPS {
         if answers == asked && acks == asked {
-            // The real-time character stands in the middle of the line.
+            // A real-time character stands in the middle of the line.
             machine.send_to(AUX, b"{sr\x05:n}\n");
             asked += 1;
         }
@@ -118,7 +118,7 @@ fn all_settings_are_listed_while_a_job_runs() {
     is_steady_and_whole(&machine);
 }
 
-/// Sends a line. Returns the cycles from the end of its last byte to the end of the response's.
+/// Sends a line. Returns the cycles from the end of its last byte to the end of the response's last byte.
 fn response_time(machine: &mut Machine, line: &str) -> u64 {
     machine.send(line.as_bytes());
     while machine.wire().backlog() > 0 {
@@ -144,7 +144,7 @@ fn a_block_is_answered_within_five_ms() {
         at_rest = at_rest.max(response_time(&mut machine, &line(n)));
         machine.run_for_ms(500).unwrap();
     }
-    // Fewer than fill the queue: the next one would be answered when there is room.
+    // Fewer lines than fill the queue. A further line would be answered only when there is room.
     let mut moving: Vec<u64> = (11..=40).map(|n| response_time(&mut machine, &line(n))).collect();
     moving.sort_unstable();
     let (median, worst) = (moving[moving.len() / 2], moving[moving.len() - 1]);
@@ -152,7 +152,7 @@ fn a_block_is_answered_within_five_ms() {
     // A line is answered when it is accepted. Under a jerk limit exec takes half of the CPU in a ramp, and the planner
     // may have a block before this one; the response itself takes 1.8 ms.
     assert!(at_rest <= machine.cycles(5) && median <= machine.cycles(5));
-    // Measured: 10 to 16 ms, as turns happen to fall.
+    // Measured: 10 to 16 ms, depending on how turns fall.
     assert!(worst <= machine.cycles(18));
 }
 
@@ -233,12 +233,12 @@ fn only_one_port_feeds_at_a_time() {
     assert_eq!(moved, [40.0, 10.0, 0.0, 0.0].map(|mm| (mm * PER_MM) as i64));
 }
 
-/// A sender that says lines one behind the other, stops at XOFF as soon as it has said `lag` bytes more, and goes on at XON.
+/// A sender that sends lines one behind the other, stops `lag` bytes after an XOFF, and goes on at an XON.
 struct Heeds<'a> {
     port: usize,
     lag: usize,
     bytes: std::slice::Iter<'a, u8>,
-    /// How many bytes it says still.
+    /// Number of bytes that it still sends.
     left: usize,
     heard: Vec<u8>,
 }
@@ -248,7 +248,7 @@ impl<'a> Heeds<'a> {
         Heeds { port, lag, bytes: lines.as_bytes().iter(), left: usize::MAX, heard: Vec::new() }
     }
 
-    /// Says the next byte, if it may, and listens.
+    /// Sends the next byte, if allowed, and listens.
     fn turn(&mut self, machine: &mut Machine) {
         if self.left > 0
             && let Some(byte) = self.bytes.next()
@@ -285,7 +285,7 @@ fn who_heeds_xoff_loses_nothing_while_the_other_port_asks() {
                         .send_to(1 - port, if n % 900 == 0 { b"{sr:n}\n" } else { b"{posx:n}\n" });
                 }
                 let before = sender.heard.len();
-                // A little more than a byte takes.
+                // A little more than the time of a byte.
                 machine.run_until(machine.cycle() + 1_400).unwrap();
                 let rests = sender.bytes.len() == 0 && sender.heard.len() == before;
                 quiet = if rests { quiet + 1 } else { 0 };

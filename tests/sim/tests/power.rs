@@ -1,20 +1,19 @@
-//! Motors have power before they step, each by its own enable where the board has one.
+//! Motors have power before they step, each by its own enable pin where the board has one.
 
 use kerf::boards::{Board, MEGA2560_GRBL, Pin, RAMPS14};
 use kerf_sim::Machine;
 
 use crate::common::{booted, set};
 
-/// Without a hot end axis A is no extruder, whose filament would have to be hot.
+/// Without a hot end axis A is no extruder. The filament of an extruder would have to be hot.
 const NO_SENSOR: &str = "{he1k:0}";
 
-/// Whether an enable, which is active low, is on.
+/// Whether an enable pin, which is active low, is on.
 fn is_on(machine: &Machine, pin: Pin) -> bool {
     machine.peek(pin.port.address() as u16) & 1 << pin.bit == 0
 }
 
-/// Runs until the first step, instruction by instruction, and tells how many cycles before it the
-/// `enable` came on.
+/// Runs until the first step, instruction by instruction. Returns how many cycles before it `enable` came on.
 fn lead(board: &'static Board, line: &str, enable: Pin) -> u64 {
     let (mut machine, mut host) = booted(board);
     if board.heaters.is_some() {
@@ -34,7 +33,7 @@ fn lead(board: &'static Board, line: &str, enable: Pin) -> u64 {
 
 #[test]
 fn power_comes_before_the_first_step() {
-    // 25 us at the least.
+    // At least 25 us.
     assert!(lead(&MEGA2560_GRBL, "g0 x1", MEGA2560_GRBL.enable_all.unwrap()) > 400);
     for (motor, line) in ["g0 x1", "g0 y1", "g0 z1", "g0 a1"].iter().enumerate() {
         assert!(lead(&RAMPS14, line, RAMPS14.motors[motor].enable.unwrap()) > 400, "{line}");

@@ -1,4 +1,4 @@
-//! The example of a print, on the chip with heaters around it: hot first, exact to the step, cold at the end.
+//! The example print, on the chip with heaters around it: hot first, exact to the step, cold at the end.
 
 use std::fs;
 use std::path::Path;
@@ -26,7 +26,7 @@ fn the_example_is_printed_exact_to_the_step() {
     assert!(low > 198.0 && high < 202.0, "{low} to {high} degrees with the fan on");
     let (low, high) = bed.held.unwrap();
     assert!(low > 58.0 && high < 62.0, "{low} to {high} degrees of the bed");
-    // The extruder made steps: those of the filament, back and forth.
+    // The extruder made the steps of the filament, forward and back.
     assert!(report.motors[3].total > 5_000);
     assert!(report.free_stack.unwrap() >= 400);
     let file = scratch("print.svg");
@@ -43,7 +43,7 @@ fn a_line_that_is_refused_is_named() {
     assert!(!report.ok);
     assert_eq!(report.rejected.len(), 1, "{report}");
     assert_eq!(report.rejected[0].line, 4);
-    // It was not carried out, but the file asks for its filament.
+    // The line was not executed, but the file asks for its filament.
     let extruder = &report.motors[3];
     assert_ne!(Some(extruder.steps), extruder.expected);
 }

@@ -1,8 +1,9 @@
-//! Probing on the image: what is told against the step at which the contact closed, at 10,000 steps a second.
+//! Probing on the image: the reported position compared with the step at which the contact closed, at 10,000 steps a
+//! second.
 //!
-//! An edge is believed after two looks 10 us apart, and the generator is taken down at the first: 20 us behind the edge, a
-//! fifth of a step. Where a plate is reached by a step that is less than the way to the next,
-//! and nothing is off; where the contact closes between two steps it may be one.
+//! An edge counts after two samples 10 us apart. The reported position is that of the step generator at the first
+//! sample, 20 us after the edge, a fifth of a step. Where a step reaches a plate that is less than the time to the
+//! next step, and the report is exact. Where the contact closes between two steps the report may be off by one.
 
 use kerf::boards::{Board, MEGA2560_GRBL, RAMPS14, inputs};
 use kerf_sim::mechanics::{Bounce, Build};
@@ -11,21 +12,21 @@ use serde_json::Value;
 
 use crate::common::{booted, set};
 
-/// Steps in a mm: a step is ten times what is told of a position, so that nothing is rounded.
+/// Steps in a mm. A step is ten times the resolution of a reported position, so that nothing is rounded.
 const STEPS: f64 = 100.0;
-/// 10,000 of them a second, mm/min.
+/// Feed for 10,000 steps a second, mm/min.
 const FEED: f64 = 6_000.0;
 /// Cycles between two steps at that rate.
 const STEP: u64 = 1_600;
-/// Where Z stands at first.
+/// Position of Z at the beginning.
 const START: f64 = 50.0;
 const Z: usize = 2;
 
-/// A machine with a probe, whose plate and contact are moved by hand.
+/// A machine with a probe, whose plate and contact the test moves.
 struct Bench {
     machine: Machine,
     host: Host,
-    /// Where the motors are as the log of steps begins.
+    /// Positions of the motors when the log of steps begins.
     begun: [i64; 3],
 }
 
@@ -50,7 +51,7 @@ impl Bench {
         [0, 1, 2].map(|m| self.machine.recorder().motors()[m].position)
     }
 
-    /// Goes back to where all began, with the contact open, and begins to probe.
+    /// Goes back to the beginning with the contact open, and begins to probe.
     fn begin(&mut self, probing: &str) {
         self.machine.tamper(|mechanics, now| {
             mechanics.place_plate(None, now);
@@ -64,13 +65,13 @@ impl Bench {
         set(&mut self.machine, &mut self.host, probing);
     }
 
-    /// The contact closes now.
+    /// Closes the contact now. Returns the cycle.
     fn close(&mut self) -> u64 {
         self.machine.tamper(|mechanics, now| mechanics.work(inputs::PROBE, true, now));
         self.machine.cycle()
     }
 
-    /// Where the motors were at a cycle, a step being made when its pulse begins.
+    /// Returns the positions of the motors at a cycle. A step counts from the beginning of its pulse.
     fn at(&self, cycle: u64) -> [i64; 3] {
         let mut at = self.begun;
         for step in self.machine.recorder().log().iter().filter(|step| step.cycle <= cycle) {
@@ -79,13 +80,13 @@ impl Bench {
         at
     }
 
-    /// When Z came to this step.
+    /// Returns the cycle at which Z came to this step.
     fn reached(&self, steps: i64) -> u64 {
         let z = self.machine.recorder().steps_of(Z as u8);
         z[steps.unsigned_abs() as usize - 1]
     }
 
-    /// What is told, in steps.
+    /// Returns the reported positions, in steps.
     fn told(&mut self) -> [i64; 3] {
         self.host.run_for_ms(&mut self.machine, 300).unwrap();
         let told = self.host.strays().iter().rev().find(|line| line.contains("\"prb\"")).unwrap();
@@ -99,14 +100,14 @@ impl Bench {
         })
     }
 
-    /// The greatest error of an axis, in steps, if the contact closed at this cycle.
+    /// Returns the largest error of an axis, in steps, if the contact closed at this cycle.
     fn error(&mut self, closed: u64) -> u64 {
         let (told, is) = (self.told(), self.at(closed));
         println!("  {told:?} {is:?}");
         told.iter().zip(is).map(|(told, is)| told.abs_diff(is)).max().unwrap_or(0)
     }
 
-    /// How fast Z steps at a cycle, steps a second.
+    /// Returns the step rate of Z at a cycle, steps a second.
     fn rate(&self, cycle: u64) -> f64 {
         let z = self.machine.recorder().steps_of(Z as u8);
         let next = z.partition_point(|step| *step <= cycle);
@@ -143,7 +144,7 @@ fn a_contact_at_any_phase_of_a_step_is_found_to_the_step() {
         bench.begin(&format!("g38.2 z-40 f{FEED}"));
         let wait = bench.machine.cycle() + 200 * 16_000;
         bench.host.run_until(&mut bench.machine, wait).unwrap();
-        // From one step on, a sixteenth of the way to the next each time.
+        // The contact closes two step intervals after a step, and a sixteenth of an interval later each time.
         let from = *bench.machine.recorder().steps_of(Z as u8).last().unwrap();
         let to = from + 2 * STEP + n * STEP / 16;
         bench.machine.run_until(to).unwrap();
@@ -193,14 +194,16 @@ fn a_contact_that_bounces_is_found_while_it_bounces() {
         let mut settled = 0;
         bench.machine.tamper(|mechanics, _| settled = mechanics.settles(inputs::PROBE));
         let error = bench.error(closed);
-        // Looks that find it open are followed by others. At the latest it is found when it stays closed: within 300 us.
+        // Samples that find the contact open are followed by others. At the latest it is found when it stays closed,
+        // within 300 us.
         let latest = bench.at(settled + 300 * 16)[Z].abs_diff(bench.at(closed)[Z]);
         assert!(error <= latest + 1, "{error} steps, {latest} at the latest");
         worst = worst.max(error);
         near += usize::from(error <= 2);
     }
     println!("bouncing: {worst} steps, {near} of 24 within 2");
-    // Measured: 19 of 24, whatever the image. It is missed if it closes for too short a time to be told from noise.
+    // Measured: 19 of 24, whatever the image. A contact is missed if it closes for so short a time that it looks like
+    // noise.
     assert!(near >= 14, "{near} of 24 within 2 steps");
 }
 

@@ -8,10 +8,10 @@ use crate::common::{booted, firmware, set};
 
 /// Cycles in a second.
 const SECOND: u64 = 16_000_000;
-/// The longest that anything here may take, ms.
+/// Longest time of anything here, ms.
 const PATIENCE_MS: u64 = 120_000;
 
-/// A machine with these settings that keeps every step.
+/// A machine with these settings that logs every step.
 fn machine(board: &'static Board, settings: &[&str]) -> (Machine, Host) {
     let (mut machine, mut host) = booted(board);
     for line in settings {
@@ -21,7 +21,7 @@ fn machine(board: &'static Board, settings: &[&str]) -> (Machine, Host) {
     (machine, host)
 }
 
-/// Sends a move and waits until its steps are made and the machine says that it rests.
+/// Sends a move and waits until its steps are made and the machine reports that it rests.
 fn carry_out(machine: &mut Machine, host: &mut Host, line: &str, steps: u64) {
     set(machine, host, line);
     let end = machine.cycle() + machine.cycles(PATIENCE_MS);
@@ -33,18 +33,18 @@ fn carry_out(machine: &mut Machine, host: &mut Host, line: &str, steps: u64) {
     assert_eq!(machine.uart(0).overruns(), 0);
 }
 
-/// When a motor stepped.
+/// Returns the cycles of a motor's steps.
 fn steps_of(machine: &Machine, motor: u8) -> Vec<u64> {
     machine.recorder().log().iter().filter(|s| s.motor == motor).map(|s| s.cycle).collect()
 }
 
-/// The steps between two moments.
+/// Returns the steps between two cycles.
 fn between(steps: &[u64], from: u64, to: u64) -> &[u64] {
     let (from, to) = (steps.partition_point(|s| *s < from), steps.partition_point(|s| *s < to));
     &steps[from..to]
 }
 
-/// The mean interval is `cycles` to a part in a thousand, and none is longer than two of it.
+/// Checks that the mean interval is `cycles` to a part in a thousand, and that no interval is longer than twice that.
 fn held(steps: &[u64], cycles: f64, motor: u8) {
     held_within(1e-3, steps, cycles, motor);
 }
@@ -73,7 +73,7 @@ fn three_motors_are_held_on(board: &'static Board) {
     let settings = ["{x:{vm:937.5}}", "{y:{vm:937.5}}", "{z:{vm:937.5}}"];
     let (mut machine, mut host) = machine(board, &settings);
     carry_out(&mut machine, &mut host, "g0 x55 y55 z55", 3 * 55 * 1280);
-    // 3.52 s and the ramps: two seconds in the middle are all cruise.
+    // The move takes 3.52 s plus the ramps, so two seconds in the middle are all cruise.
     for motor in 0..3 {
         let steps = steps_of(&machine, motor);
         let middle = steps[0].midpoint(steps[steps.len() - 1]);
@@ -87,11 +87,11 @@ fn three_motors_are_held_on(board: &'static Board) {
 fn mixed_rates_are_held_together() {
     let settings = ["{x:{vm:937.5,fr:937.5}}"];
     let (mut machine, mut host) = machine(&MEGA2560_GRBL, &settings);
-    // 70 : 10 : 0.1, that is 20,000, 2857.1 and 28.57 steps a second.
+    // The ratio 70 : 10 : 0.1 gives 20,000, 2857.1 and 28.57 steps a second.
     carry_out(&mut machine, &mut host, "g0 x70 y10 z0.1", 70 * 1280 + 10 * 1280 + 128);
     let first = steps_of(&machine, 0);
     let middle = first[0].midpoint(first[first.len() - 1]);
-    // So long a move is three blocks, each of which ends on whole steps: Z makes 43, 42 and 43.
+    // A move this long is three blocks, each of which ends on whole steps: Z makes 43, 42 and 43.
     for (motor, cycles, part) in [(0, 800.0, 1e-3), (1, 5_600.0, 1e-3), (2, 560_000.0, 0.02)] {
         let steps = steps_of(&machine, motor);
         held_within(part, between(&steps, middle - SECOND, middle + SECOND), cycles, motor);
@@ -121,18 +121,18 @@ fn one_step_every_ten_seconds_with_fine_steps() {
     ten_seconds_each(&machine);
 }
 
-/// Loading a segment takes longest when every motor turns round. The new, shorter tick period must still
-/// be in force before the timer gets there, or it counts through to 65,535: 4 ms without a step.
+/// Loading a segment takes longest when every motor reverses. The new, shorter tick period must still take effect
+/// before the timer gets there. Otherwise the timer counts on to 65,535: 4 ms without a step.
 #[test]
 fn reversals_of_all_motors_never_miss_a_tick() {
-    // Without a hot end A is no extruder, whose filament would have to be hot.
+    // Without a hot end A is no extruder. The filament of an extruder would have to be hot.
     let axis_a = "{aam:1,avm:3600,afr:3600}";
     let settings = ["{he1k:0}", "{4ma:3}", axis_a, "{4tr:1.25}", "{xjm:2000}"];
     let (mut machine, mut host) = machine(&RAMPS14, &settings);
     let mut heard = 0;
     for n in 1..=120 {
         let to = n % 2;
-        // Uneven lengths, so that bytes come at all phases of a tick.
+        // The lines have different lengths, so that bytes come at all phases of a tick.
         let line = format!("g1 f700 x{to} y{to}.1 z{to}.01 a{to}.001{}", " ".repeat(n % 7));
         host.queue(n, &line);
         host.run_for_ms(&mut machine, 5).unwrap();
@@ -149,17 +149,17 @@ fn reversals_of_all_motors_never_miss_a_tick() {
     assert_eq!(steps, [0, 128, 13, 1]);
 }
 
-/// Limits of an axis that goes fast: mm/s^2, and millions of mm/min^3.
+/// Limits of a fast axis: mm/s^2, and millions of mm/min^3.
 fn limit(axis: &str, accel: f64, jerk: f64) -> String {
     format!("{{{axis}:{{vm:30000,fr:30000,ac:{accel},jm:{jerk}}}}}")
 }
 
-/// X and Y with such limits, and corners that are none.
+/// X and Y with these limits, and a junction acceleration so high that corners do not slow motion down.
 fn limits(accel: f64, jerk: f64) -> Vec<String> {
     vec![limit("x", accel, jerk), limit("y", accel, jerk), "{ja:3600000}".into()]
 }
 
-/// The step interrupt takes most of the CPU here, and a ramp has to be laid out, or chord after chord to be begun, in what is left.
+/// The step interrupt takes most of the CPU here. In the rest a ramp must be laid out, or chord after chord be begun.
 #[test]
 fn nothing_is_late_at_high_step_rates() {
     let wide = || [limits(500.0, 2_000.0), vec!["{spw:10}".into()]].concat();
@@ -183,7 +183,8 @@ fn nothing_is_late_at_high_step_rates() {
     }
 }
 
-/// With a motor above the second the step interrupt goes through all of them, so that two take as much of the CPU as three.
+/// With a motor above the second the step interrupt goes through all motors, so two of them take as much of the CPU
+/// as three.
 #[test]
 fn any_two_motors_make_no_pause_at_their_highest_rate() {
     let axes = ["x:{", "y:{", "z:{", "a:{am:1,"];

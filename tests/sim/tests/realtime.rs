@@ -1,10 +1,10 @@
 //! Random conversations with the image on the simulated chip: lines and real-time characters on both ports, switches
-//! that change, resets. They are those of `tests/realtime.rs`, and shorter; what is judged is in
-//! `tests/support/session.rs`.
+//! that change, resets. They are shorter ones of the kind in `tests/realtime.rs`; `tests/support/session.rs` judges
+//! them.
 //!
-//! Each of two machines has half of them, one after the other. The seed of one that fails is told:
-//! `KERF_SEED=47 KERF_CASES=1 cargo test -p kerf-sim-tests realtime::` has it alone, and from the first
-//! seed of its machine on with all that came before it.
+//! Each of two machines plays half of them in sequence. The seed of one that fails is printed: `KERF_SEED=47
+//! KERF_CASES=1 cargo test -p kerf-sim-tests realtime::` plays it alone. With the first seed of its machine and
+//! enough cases it is played after all that came before it.
 
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -20,7 +20,7 @@ use crate::ops::{self, Op, Scale};
 use crate::seeds;
 use crate::session::Session;
 
-/// About two seconds of the machine's time.
+/// A conversation takes about two seconds of the machine's time.
 const SCALE: Scale = Scale { ops: 24, way: 1_500, radius: 1.0, wait: 300 };
 /// Machines that run at the same time.
 const MACHINES: u64 = 2;
@@ -48,7 +48,7 @@ fn begun() -> Session<Machine> {
     session
 }
 
-/// The conversations of some seeds, with one machine.
+/// Plays the conversations of some seeds with one machine.
 fn play_all(seeds: Range<u64>) {
     let (first, began) = (seeds.start, Instant::now());
     let mut session = begun();
@@ -63,7 +63,7 @@ fn play_all(seeds: Range<u64>) {
     seeds::tell(&format!("conversations from seed {first} on: {seconds:.0} s"));
 }
 
-/// The conversation of a seed with a machine of its own; one that fails is made smaller.
+/// Plays the conversation of a seed with a machine of its own. One that fails is shrunk.
 fn alone(seed: u64) -> Result<(), String> {
     let play = |ops: Vec<Op>| try_to_play(&mut begun(), &ops);
     seeds::smallest(seed, &ops::conversation(SCALE), play)
@@ -81,7 +81,7 @@ fn any_conversation_ends_where_it_is_to() {
     });
 }
 
-/// An arc so fast that exec has no pause for as long as there are blocks: each time it comes again at once.
+/// An arc so fast that exec runs without a break as long as there are blocks: when it ends it is due again at once.
 #[test]
 fn exec_that_has_no_pause_does_not_pile_up() {
     let line = |line: &str| Op::Line(0, line.to_string());
@@ -93,8 +93,8 @@ fn exec_that_has_no_pause_does_not_pile_up() {
     try_to_play(&mut begun(), &ops).unwrap_or_else(|why| panic!("{why}"));
 }
 
-/// The reader, woken together with a task that works long before it, may come to its place before the control task has
-/// heard of it.
+/// The reader is woken together with a task that works for long before it. The reader may then reach the place of the
+/// kill before the control task has noticed the kill.
 #[test]
 fn a_kill_in_a_comment_is_one_whatever_is_under_way() {
     const COMMENT: &str = "(of which so much has come when something else is under way for a while";
@@ -107,7 +107,7 @@ fn a_kill_in_a_comment_is_one_whatever_is_under_way() {
         let job =
             format!("{{posx:n,posy:n}}\ng91 g2 f3000 x0 i1 p2\ng91 g0 x0.1 y0.2\n{comment}\x04)\n");
         machine.send(job.as_bytes());
-        // It comes to rest within 55 ms.
+        // The machine comes to rest within 55 ms.
         machine.run_for_ms(80).unwrap();
         machine.receive();
         machine.send(b"{stat:n}\n");

@@ -1,4 +1,4 @@
-//! A job from boot to rest, on a stand-in for the firmware.
+//! A job from boot to rest, with a stand-in for the firmware.
 
 use kerf_sim::Host;
 use kerf_sim::job::{self, Options};
@@ -26,7 +26,7 @@ fn a_good_job() {
     let x = &report.motors[0];
     assert_eq!((x.steps, x.expected, x.total), (-160, Some(-160), 800 + 960));
     assert_eq!(report.axes[0].position, -2.0);
-    // 1760 steps at 20 kHz, and what lies between the two moves.
+    // 1760 steps at 20 kHz, and the time between the two moves.
     assert!((0.0875..0.092).contains(&report.seconds_moving), "{report}");
     assert!(report.cpu_load.is_some_and(|l| l > 0.05 && l < 0.9), "{report}");
     assert!(report.free_stack.is_some_and(|n| n > 7000), "{report}");

@@ -1,4 +1,4 @@
-//! The serial line at full speed, at too much speed, and while the planner is full.
+//! The serial line at full speed, at too high a speed, and while the planner is full.
 
 use kerf::boards::MEGA2560_GRBL;
 use kerf::motion::queue::CAPACITY;
@@ -7,7 +7,7 @@ use kerf_sim::protocol::{Incoming, classify};
 
 use crate::common::{booted, set};
 
-/// Status of a line that was lost in part.
+/// Status of a line of which a part was lost.
 const BUFFER_FULL: i64 = 13;
 /// Steps in a millimetre.
 const PER_MM: u64 = 1_280;
@@ -32,16 +32,16 @@ fn two_thousand_lines_at_full_speed_are_answered_once_each_and_in_order() {
     }
     assert!(host.strays().is_empty(), "{:?}", host.strays());
     assert_eq!(machine.uart(0).overruns(), 0);
-    // The answers are longer than the lines: their way back is all that takes time.
+    // The answers are longer than the lines, so only their time on the wire counts.
     let bytes: usize = answered.iter().map(|a| a.response.raw.len() + 1).sum();
     let least = bytes as f64 * 10.0 / 115_200.0;
     assert!(seconds < 1.1 * least, "{seconds} s for {LINES} lines instead of {least} s");
 }
 
-/// What came back of a flood.
+/// The answers to a flood of lines.
 #[derive(Default)]
 struct Heard {
-    /// The N words of the lines that were taken, in order.
+    /// The N words of the accepted lines, in order.
     taken: Vec<u64>,
     refused: usize,
     losses: usize,
@@ -64,7 +64,7 @@ impl Heard {
     }
 }
 
-/// Waits until no motor has moved and nothing was heard for a second; returns all that was heard.
+/// Waits until no motor has moved and nothing was heard for a second. Returns all that was heard.
 fn hear_out(machine: &mut Machine) -> Heard {
     let (mut text, mut quiet_ms) = (Vec::new(), 0);
     while quiet_ms < 1_000 {
@@ -92,7 +92,7 @@ fn flood(end: &str) {
     for line in ["{ex:0}", "{jv:4}", "g91 f800"] {
         set(&mut machine, &mut host, line);
     }
-    // Of different lengths, so that a line torn or joined would move elsewhere.
+    // The moves have different lengths, so that a line that is torn or joined would move differently.
     let tenths = |n: u64| n * 7 % 23 + 1;
     let back = |n: u64| n.is_multiple_of(2);
     for n in 1..=600 {
@@ -133,7 +133,7 @@ fn lines_with_frame_errors_are_refused_and_no_other() {
     let (mut damaged, mut before) = (Vec::new(), 0);
     for n in 1..=LINES {
         machine.send(format!("N{n} G1 X{:.1}\n", tenths(n) as f64 / 10.0).as_bytes());
-        // Slower than the moves, so that nothing else is lost.
+        // The lines come more slowly than the moves, so that nothing else is lost.
         machine.run_for_ms(60).unwrap();
         let broken = machine.uart(0).misframed();
         if core::mem::replace(&mut before, broken) != broken {
@@ -160,7 +160,7 @@ fn a_line_that_the_receiver_overruns_at_a_megabaud_is_never_carried_out() {
         set(&mut machine, &mut host, line);
     }
     host.change_speed(&mut machine, 1_000_000).unwrap();
-    // Each is one that none of the others becomes when a byte of it is lost.
+    // No line becomes another one when a byte of it is lost.
     let line = |n: usize| format!("X.{:03}Y{}1.5", n * 7 % 899 + 101, ["", "-"][n / 40 % 2]);
     let mut heard = String::new();
     for n in 0..LINES {
@@ -184,7 +184,7 @@ fn a_line_that_the_receiver_overruns_at_a_megabaud_is_never_carried_out() {
     }
     println!("{overruns} overruns: {taken} lines carried out, {refused} refused");
     assert!(overruns > 20 && taken > 20, "{overruns} overruns, {taken} lines carried out");
-    // Where the end of a line is lost two of them are refused as one.
+    // Where the end of a line is lost, two lines are refused as one.
     assert!((taken + refused) * 4 > LINES * 3, "{refused} refused, {taken} carried out");
 }
 
@@ -193,7 +193,7 @@ fn answers_stop_while_the_planner_is_full_and_come_again() {
     const LINES: usize = 100;
     let (mut machine, mut host) = booted(&MEGA2560_GRBL);
     set(&mut machine, &mut host, "g1 g91 f800");
-    // 0.75 s a move.
+    // Each move takes 0.75 s.
     (1..=LINES).for_each(|n| host.queue(n, "x10"));
     host.run_for_ms(&mut machine, 700).unwrap();
     let at_once = host.take_answered().len();
@@ -204,7 +204,7 @@ fn answers_stop_while_the_planner_is_full_and_come_again() {
     assert!((3..=6).contains(&later), "{later} answers in the time of four moves");
     // A question overtakes them.
     let queue = host.ask(&mut machine, "{qr:n}", 100).unwrap();
-    // Which is not told of less.
+    // Fewer free blocks are not reported.
     assert_eq!(queue.body["qr"], 6, "{}", queue.raw);
     let end = machine.cycle() + machine.cycles(90_000);
     while !host.is_done() && host.run_until_line(&mut machine, end).unwrap() {}
@@ -270,7 +270,8 @@ fn a_reset_in_the_middle_of_a_response_leaves_the_greeting_whole() {
     }
 }
 
-/// What a sender hears that says these lines a byte at a time, goes on for `lag` bytes behind XOFF, and again at XON.
+/// Sends lines a byte at a time as a sender that goes on for `lag` bytes behind an XOFF, and continues at an XON.
+/// Returns what it hears.
 fn heard_by_one_who_heeds_xoff(lines: &str, lag: usize) -> Vec<u8> {
     let (mut machine, mut host) = booted(&MEGA2560_GRBL);
     set(&mut machine, &mut host, "{sv:0}");
@@ -284,7 +285,7 @@ fn heard_by_one_who_heeds_xoff(lines: &str, lag: usize) -> Vec<u8> {
             machine.send(&[*byte]);
             left = if left == usize::MAX { left } else { left - 1 };
         }
-        // A little more than a byte takes.
+        // A little more than the time of a byte.
         machine.run_until(machine.cycle() + 1_400).unwrap();
         let said = machine.receive();
         quiet = if bytes.len() == 0 && said.is_empty() { quiet + 1 } else { 0 };
@@ -300,7 +301,7 @@ fn heard_by_one_who_heeds_xoff(lines: &str, lag: usize) -> Vec<u8> {
     heard
 }
 
-/// How many XOFF and XON there are in all, and inside lines; nothing is lost.
+/// Returns the number of XOFF and XON in all, and of those inside lines. Checks that nothing is lost.
 fn flows(lines: &str, lag: usize) -> (usize, usize) {
     let heard = heard_by_one_who_heeds_xoff(lines, lag);
     let is_flow = |byte: &u8| matches!(byte, 0x11 | 0x13);
@@ -328,7 +329,7 @@ fn xoff_and_xon_of_a_job_stand_between_lines() {
 
 #[test]
 fn xoff_comes_in_time_among_requests() {
-    // Requests take the CPU's time, so that some are late and do not wait for the end of a line.
+    // Requests take CPU time, so that some XOFF are late and do not wait for the end of a line.
     let line = |i| format!("N{i} g1 f1200 x{}.25\n{{xvm:n,yvm:n}}\n{{xvm:n}}\n", i % 2);
     let lines: String = (0..100).map(line).collect();
     for lag in [0, 32] {

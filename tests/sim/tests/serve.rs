@@ -8,7 +8,7 @@ use kerf::boards::MEGA2560_GRBL;
 
 use crate::common::{image, kerf_sim};
 
-/// Ends the server however the test ends.
+/// A server, which ends when the test ends, however that happens.
 struct Server(Child);
 
 impl Drop for Server {
@@ -18,9 +18,9 @@ impl Drop for Server {
     }
 }
 
-/// The first line that is no automatic report.
+/// Returns the first line that is no automatic report.
 fn next(lines: &mut Lines<BufReader<File>>) -> String {
-    // Reports, and what the greeting says to senders of the other dialect.
+    // Reports, and the part of the greeting for senders of the other dialect.
     let others = ["{\"sr\":", "{\"qr\":", "Grbl 1.1h"];
     let is_other = |line: &String| {
         line.trim_end().is_empty() || others.iter().any(|other| line.starts_with(other))
@@ -28,7 +28,7 @@ fn next(lines: &mut Lines<BufReader<File>>) -> String {
     lines.map(Result::unwrap).find(|line| !is_other(line)).unwrap()
 }
 
-/// Starts a server; its first line is the port.
+/// Starts a server. Its first line names the port.
 fn serve(more: &[&str]) -> (Server, File) {
     let mut command = kerf_sim();
     command.arg("serve").arg("--elf").arg(image(&MEGA2560_GRBL)).args(more);
@@ -54,7 +54,7 @@ fn who_opens_the_port_is_told_that_the_board_resets() {
     assert!(said.contains("the board resets, as a real one does"), "{said}");
 }
 
-/// Also of a server that somebody has started by `cargo xtask serve`, which it takes the place of.
+/// Also applies to a server that somebody has started by `cargo xtask serve`, whose process it replaces.
 #[cfg(unix)]
 #[test]
 fn who_ends_the_process_ends_the_board_and_its_link() {
@@ -68,7 +68,7 @@ fn who_ends_the_process_ends_the_board_and_its_link() {
     assert!(!link.is_symlink());
 }
 
-/// Ends a server's standard input; what it says then, and whether it is content.
+/// Ends a server's standard input. Returns what the server then prints, and whether it reports success.
 fn end(server: &mut Server) -> (String, bool) {
     drop(server.0.stdin.take());
     let mut text = String::new();
@@ -118,7 +118,7 @@ fn a_sender_opens_the_port_and_moves_the_machine() {
     assert_eq!(lines.next().unwrap().unwrap(), "tinyg [mm] ok> ");
 }
 
-/// A debugger, as far as it is needed here.
+/// A debugger, with the functions that are needed here.
 struct Debugger(std::net::TcpStream);
 
 impl Debugger {
@@ -128,7 +128,7 @@ impl Debugger {
         self.hear()
     }
 
-    /// What stands between `$` and `#`.
+    /// Returns the text between `$` and `#`.
     fn hear(&mut self) -> String {
         let mut text = Vec::new();
         let mut byte = [0];
@@ -157,7 +157,8 @@ fn a_debugger_halts_the_board_and_looks_into_it() {
     let mut debugger = Debugger(std::net::TcpStream::connect(("127.0.0.1", port)).unwrap());
     assert!(debugger.ask("qSupported:swbreak+").starts_with("PacketSize="));
     assert_eq!(debugger.ask("?"), "S05");
-    // It stands: 32 registers, SREG, two bytes of the stack pointer and four of the program counter.
+    // The machine is halted. There are 32 registers, SREG, two bytes of the stack pointer and four of the program
+    // counter.
     let registers = debugger.ask("g");
     assert_eq!((registers.len(), debugger.ask("g")), (2 * 39, registers));
     // The tick of the millisecond, vector 21, comes again and again.

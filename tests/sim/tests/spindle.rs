@@ -1,4 +1,4 @@
-//! The spindle's outputs on the chip: the width of its pulses, levels, and what a reset does to them.
+//! The spindle's outputs on the chip: the width of its pulses, its levels, and the effect of a reset.
 
 use kerf::boards::{Board, MEGA2560_GRBL, Pin, RAMPS14};
 use kerf_sim::mechanics::Build;
@@ -6,12 +6,12 @@ use kerf_sim::{Host, LINES_IN_FLIGHT, Machine};
 
 use crate::common::{booted, firmware, set};
 
-/// The count at which the spindle's timer turns round.
+/// Returns the top of the spindle's timer, at which it changes its direction of counting.
 fn top(machine: &Machine) -> f64 {
     machine.peek_word(machine.board().pwm.unwrap().address() as u16 + 6).into()
 }
 
-/// Whether the firmware drives a pin, and so high.
+/// Returns the level to which the firmware drives a pin; `None` if the pin is no output.
 fn drives(machine: &Machine, pin: Pin) -> Option<bool> {
     let direction = machine.peek(pin.port.address() as u16 - 1);
     (direction & 1 << pin.bit != 0).then(|| machine.is_high(pin))
@@ -57,13 +57,13 @@ fn direction_stands_before_the_spindle_is_on() {
     }
     assert!(machine.is_high(direction) && machine.pulses().share > 0.1);
     host.run_for_ms(&mut machine, 100).unwrap();
-    // Off, it does not turn round.
+    // With the spindle off, the direction does not change.
     set(&mut machine, &mut host, "m5");
     host.run_for_ms(&mut machine, 20).unwrap();
     assert!(!machine.is_high(enable) && machine.is_high(direction));
 }
 
-/// The levels at which the enable is driven from reset on, until the machine is ready.
+/// Returns whether the enable pin is driven low and whether high, from reset until the machine is ready.
 fn levels_at_start(board: &'static Board, eeprom: &[u8; 4096]) -> (bool, bool) {
     let mut machine = firmware(board);
     machine.set_eeprom(eeprom);
@@ -137,7 +137,7 @@ fn a_spindle_is_up_to_speed_when_the_cut_begins() {
     set(&mut machine, &mut host, "{p1:{csl:0,csh:12000,cpl:0,cph:1,wsl:0,wsh:12000}}");
     set(&mut machine, &mut host, "{p1:{wpl:0,wph:1,pof:0},sp:{ph:1,de:2.5}}");
     for (line, speed) in [("m3 s1000\n", 1_000.0), ("m4 s6000\n", -6_000.0)] {
-        // What moves comes to its end.
+        // Motion under way ends first.
         run_spindle(&mut machine, 2_000);
         machine.send(line.as_bytes());
         machine.send(format!("g91 g1 f600 x{}\n", speed / 1_000.0).as_bytes());
@@ -149,10 +149,10 @@ fn a_spindle_is_up_to_speed_when_the_cut_begins() {
             assert!(waited < 4_000, "no step");
         }
         assert!((2_500..2_650).contains(&waited), "{waited} ms");
-        // From the other way round it has 14,000 to go, of which a hundredth is left after 2.5 s.
+        // From the other direction the speed has 14,000 to go, of which a hundredth is left after 2.5 s.
         assert!((rpm(&machine) - speed).abs() < 100.0, "{}", rpm(&machine));
     }
-    // A hold stops it, and lets it start before motion goes on.
+    // A hold stops the spindle. After it the spindle starts before motion goes on.
     machine.send_now(b'!');
     run_spindle(&mut machine, 3_500);
     let steps = machine.recorder().steps();

@@ -1,4 +1,5 @@
-//! What the firmware and the meter say when exec is held up in mid-motion, and when motion ends otherwise.
+//! What the firmware and the meter report when exec is held up in mid-motion, and when motion ends for another
+//! reason.
 
 use kerf::boards::MEGA2560_GRBL;
 use kerf_sim::job;
@@ -6,9 +7,9 @@ use kerf_sim::{Host, Machine};
 
 use crate::common::{booted, set};
 
-/// USART2_UDRE, the software interrupt that exec runs in.
+/// USART2_UDRE: the vector of the software interrupt that exec runs in.
 const EXEC_VECTOR: u8 = 52;
-/// Longer than the queued segments last, ms.
+/// A time longer than the queued segments last, ms.
 const HELD_UP_MS: u64 = 14;
 /// The status of the exception report.
 const TOLD: i64 = 37;
@@ -33,7 +34,7 @@ fn count(machine: &mut Machine, host: &mut Host) -> i64 {
     host.ask(machine, "{stv:n}", 1_000).unwrap().body["stv"].as_i64().unwrap()
 }
 
-/// How many exceptions tell of it, of what has been reported since this was last asked.
+/// Returns how many of the reports since the last call are this exception.
 fn told(host: &mut Host) -> usize {
     host.take_reports().iter().filter(|report| report["er"]["st"] == TOLD).count()
 }
@@ -64,7 +65,7 @@ fn steps_that_wait_for_exec_are_counted_and_told_once() {
 #[test]
 fn motion_that_is_ended_on_purpose_is_not_counted() {
     let (mut machine, mut host) = board();
-    // A hold, one that drops the queue, and two stops at speed.
+    // A hold, a hold that drops the queue, and two stops at speed.
     for (end, clear) in
         [("!", "~"), ("!%", ""), ("{shutd:n}\n", "{clear:n}"), ("{alarm:n}\n", "{clear:n}")]
     {

@@ -1,7 +1,8 @@
-//! The step interrupt in assembly makes the pulses that `Dda::tick` makes, tick for tick.
+//! The step interrupt in assembly makes exactly the pulses of `Dda::tick`, tick for tick.
 //!
-//! The chip dwells, so that exec queues segments without steps; each is replaced in the ring by a random one before the
-//! interrupt takes it. A twin on the host, `Dda::tick`, gets the segments that each run of the timer had.
+//! The chip dwells, so that exec queues segments without steps. In the ring each of them is replaced by a random
+//! segment before the interrupt takes it. A twin on the host, `Dda::tick`, gets the segments of each run of the
+//! timer.
 
 use kerf::boards::{Board, MEGA2560_GRBL, MOTORS, RAMPS14};
 use kerf::dda::{Dda, Pins, SEGMENTS, STEP, Segment};
@@ -13,10 +14,11 @@ use crate::common::booted;
 
 /// Cycles from the start of the timer to the first tick.
 const FIRST_TICK: u64 = 400;
-/// The latest that a pulse comes behind its tick, cycles: `settle`, and what else holds the interrupt up.
+/// Latest time of a pulse behind its tick, cycles: `settle`, and whatever else holds the interrupt up.
 const LATEST: u64 = 320;
 
-/// The ring of the chip: the slots filled and read last, which ends have been taken, then slots of 16 bytes.
+/// The address of the chip's ring. It has the indices of the slots filled and read last, then a byte that says which
+/// ends have been taken, then slots of 16 bytes.
 struct ChipRing(u16);
 
 impl ChipRing {
@@ -27,7 +29,7 @@ impl ChipRing {
         ring
     }
 
-    /// The address of a byte before the slots.
+    /// Returns the address of a byte before the slots.
     fn byte(&self, which: u16) -> u16 {
         self.0 + which
     }
@@ -40,7 +42,7 @@ impl ChipRing {
         self.0 + 3 + u16::from(index) * 16
     }
 
-    /// How long the segment in a slot lasts, cycles.
+    /// Returns how long the segment in a slot lasts, cycles.
     fn length(&self, machine: &Machine, index: u8) -> u64 {
         let word = |at| u64::from(machine.peek_word(self.slot(index) + at));
         word(8) * word(10)
@@ -56,7 +58,7 @@ impl ChipRing {
     }
 }
 
-/// A random segment; some last about as long as `length`, others are so short that the ring runs dry.
+/// Makes a random segment. Some last about as long as `length`; others are so short that the ring runs dry.
 fn segment(random: &mut Random, length: u64) -> Segment {
     let mut segment = Segment::default();
     let wide = random.below(2) == 0;
@@ -86,14 +88,14 @@ fn segment(random: &mut Random, length: u64) -> Segment {
     segment
 }
 
-/// Pulses of one tick.
+/// The pulses of one tick.
 #[derive(Debug, PartialEq)]
 struct Pulses {
-    /// The cycle of the tick, or that of the first pulse.
+    /// The cycle of the tick, or of its first pulse.
     at: u64,
     /// The motors that step, as bits.
     motors: u8,
-    /// Which of them run backwards.
+    /// The motors that run backwards, as bits.
     backwards: u8,
 }
 
@@ -144,7 +146,7 @@ impl Twin {
         Self { dda: Dda::new(), pins: Out::default(), producer, consumer }
     }
 
-    /// A run of the timer from cycle to cycle with the segments that fit into it.
+    /// Runs the twin from cycle to cycle, with the segments that fit into that time.
     fn run(
         &mut self,
         (from, to): (u64, u64),
@@ -172,7 +174,7 @@ impl Twin {
     }
 }
 
-/// Pulses of the chip by tick.
+/// Groups the pulses of the chip by tick.
 fn by_tick(log: &[Step]) -> Vec<Pulses> {
     let mut all: Vec<Pulses> = Vec::new();
     for step in log {
@@ -190,7 +192,8 @@ fn by_tick(log: &[Step]) -> Vec<Pulses> {
     all
 }
 
-/// Dwells, with random segments in the place of those without steps, and compares. Returns the ticks with pulses, and the runs.
+/// Dwells with random segments in place of those without steps, and compares. Returns the number of ticks with
+/// pulses, and of runs.
 fn compare(board: &'static Board, seed: u64) -> (usize, usize) {
     let mut random = Random::new(seed);
     let (mut machine, mut host) = booted(board);

@@ -1,4 +1,4 @@
-//! Step pulses as the drivers want them: width, polarity, and time for directions to settle.
+//! Step pulses as drivers need them: width, polarity, and time for directions to settle.
 
 use kerf::boards::{Board, MEGA2560_GRBL, RAMPS14};
 use kerf_sim::Machine;
@@ -8,15 +8,15 @@ use crate::common::firmware;
 
 /// Cycles in a microsecond.
 const US: u64 = 16;
-/// How much wider a pulse may be, cycles.
+/// Most by which a pulse may be wider, cycles.
 const LOADING: u64 = 240;
 
-/// Runs a job that must end on its steps, with these settings besides those of a fast machine.
+/// Runs a job with a setting on a fast machine. The job must end on its exact steps.
 fn ran(board: &'static Board, setting: &str, job: &str) -> Machine {
     let mut machine = firmware(board);
     let fast = ["x", "y", "z", "a"]
         .map(|axis| format!("{{{axis}:{{am:1,vm:1e6,fr:1e6,jm:1e6,ac:2000,jd:1}}}}"));
-    // Without a hot end A is no extruder, whose filament would have to be hot.
+    // Without a hot end A is no extruder. The filament of an extruder would have to be hot.
     let no_sensor = board.heaters.map(|_| "{he1k:0}".to_string());
     let settings = fast.into_iter().chain(no_sensor).chain([setting.to_string()]).collect();
     let options = Options { settings, ..Options::default() };
@@ -26,7 +26,7 @@ fn ran(board: &'static Board, setting: &str, job: &str) -> Machine {
     machine
 }
 
-/// Everything from slow to as fast as can be, with one motor to four, in and out of lockstep.
+/// Speeds from slow to the highest, with one motor to four, in and out of lockstep.
 const JOB: &str =
     "g1 f100000 x8\nx0\nf300 y0.5\nf100000 x8 y8\nx0 y3\nx5 y7 z4 a2\ng0 x0 y0 z0 a0\n";
 
@@ -37,7 +37,7 @@ fn pulses(machine: &Machine) -> Vec<(u64, u64)> {
 #[test]
 fn pulses_are_as_wide_as_is_asked_for() {
     for us in [1, 2, 3, 5, 10] {
-        // In lockstep, with two motors out of it, with four.
+        // In lockstep, with two motors out of lockstep, with four.
         for job in [JOB, "g1 f100000 x8 y5\nx0 y0\n", "g1 f1000 x8 y5 z3 a2\n"] {
             let machine = ran(&MEGA2560_GRBL, &format!("{{spw:{us}}}"), job);
             for (least, most) in pulses(&machine) {

@@ -1,11 +1,11 @@
-//! Settings and offsets in EEPROM: they survive, whenever power fails, and writing them delays no step.
+//! Settings and offsets in EEPROM: they survive a power failure at any moment, and writing them delays no step.
 
 use kerf::boards::MEGA2560_GRBL;
 use kerf_sim::{Host, LINES_IN_FLIGHT, Machine};
 
 use crate::common::{booted, firmware, set};
 
-/// A machine that finds this in its EEPROM.
+/// A machine with these EEPROM contents.
 fn booted_with(eeprom: &[u8; 4096]) -> (Machine, Host) {
     let (mut machine, mut host) = (firmware(&MEGA2560_GRBL), Host::new(LINES_IN_FLIGHT));
     machine.set_eeprom(eeprom);
@@ -42,7 +42,7 @@ fn what_was_set_is_there_after_a_reset() {
     is("ofsy", -2.0);
     set(&mut machine, &mut host, "g43 h10");
     assert_eq!(value(&mut machine, &mut host, "tofz"), 4.0);
-    // Nothing is written again that is there.
+    // A value that is stored already is not written again.
     set(&mut machine, &mut host, "{xvm:1234}");
     host.run_for_ms(&mut machine, 500).unwrap();
     assert_eq!(machine.eeprom_writes(), 0);
@@ -112,7 +112,7 @@ fn no_step_is_late_while_settings_are_written() {
     assert!(most - least <= 2, "{least} to {most}");
 }
 
-/// How long a line's settings are on their way to EEPROM, ms from their response on.
+/// Returns how long a line's settings take to get into EEPROM, ms from their response on.
 fn kept_after(machine: &mut Machine, host: &mut Host, line: &str) -> f64 {
     set(machine, host, line);
     let from = machine.cycle();
@@ -120,7 +120,7 @@ fn kept_after(machine: &mut Machine, host: &mut Host, line: &str) -> f64 {
     machine.seconds(machine.cycle() - from) * 1e3
 }
 
-/// A log in which every slot has been used, and half of them count.
+/// Returns a log in which every slot has been used, and half of the records count.
 fn worn() -> [u8; 4096] {
     let (mut machine, mut host) = booted(&MEGA2560_GRBL);
     for round in 0..3 {

@@ -1,9 +1,9 @@
-//! Random streams on both ports of the image on the simulated chip: those of `tests/streams.rs`, and shorter. The model of a
-//! port's stream is in `tests/support/stream`.
+//! Random streams on both ports of the image on the simulated chip: shorter ones of the kind in `tests/streams.rs`.
+//! The model of a port's stream is in `tests/support/stream`.
 //!
-//! Each of two machines has half of them, one after the other. The seed of one that fails is told:
-//! `KERF_SEED=47 KERF_CASES=1 cargo test -p kerf-sim-tests streams::` has it alone, and from the first seed
-//! of its machine on with all that came before it.
+//! Each of two machines plays half of them in sequence. The seed of one that fails is printed: `KERF_SEED=47
+//! KERF_CASES=1 cargo test -p kerf-sim-tests streams::` plays it alone. With the first seed of its machine and enough
+//! cases it is played after all that came before it.
 
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -19,11 +19,11 @@ use crate::seeds;
 use crate::stream::dialogue::Dialogue;
 use crate::stream::ops::{Op, Scale, Setup, conversation};
 
-/// About two seconds of the machine's time.
+/// A conversation takes about two seconds of the machine's time.
 const SCALE: Scale = Scale { ops: 20, lines: 8, wait: 200, wrap: 0 };
-/// Within which questions are answered, ms; a ms of it is that of the test.
+/// Time within which questions must be answered, ms; one ms of it is the resolution of the test.
 const PROMPT_MS: f64 = 21.0;
-/// How many are usual: what CI has time for.
+/// Default number of conversations: as many as CI has time for.
 const USUAL: u64 = 40;
 /// Machines that run at the same time.
 const MACHINES: u64 = 2;
@@ -39,14 +39,14 @@ fn begun() -> Dialogue<Machine> {
     dialogue
 }
 
-/// Has a conversation, also if the simulator gives up.
+/// Plays a conversation. An error even if the simulator panics.
 fn play(dialogue: &mut Dialogue<Machine>, setup: &Setup, ops: &[Op]) -> Result<(), String> {
     let played = catch_unwind(AssertUnwindSafe(|| dialogue.play(setup, ops)));
     let played = played.unwrap_or_else(|_| Err("the chip crashes".to_string()));
     played.map_err(|why| format!("{why}\n{}", dialogue.story()))
 }
 
-/// The conversations of some seeds, with one machine.
+/// Plays the conversations of some seeds with one machine.
 fn play_all(seeds: Range<u64>) {
     let (first, began) = (seeds.start, Instant::now());
     let mut dialogue = begun();

@@ -1,4 +1,4 @@
-//! Switches on the image: how fast a limit stops it, and what it takes for one.
+//! Switches on the image: how fast a limit switch stops motion, and which signals count as a limit.
 
 use kerf::boards::{Board, MEGA2560_GRBL, MEGA2560_LATHE, RAMPS14, inputs};
 use kerf_sim::mechanics::{Bounce, Build, Sensors, Wiring};
@@ -8,14 +8,15 @@ use crate::common::{booted, set};
 
 /// Cycles in a microsecond.
 const US: u64 = 16;
-/// From the edge to the last step, at 50,000 steps a second.
+/// Longest time from the edge to the last step, at 50,000 steps a second, us.
 const STOP_US: u64 = 50;
-/// From the edge to the last step, at 85,000 steps a second, where the step interrupt leaves a fifth of the CPU.
+/// Longest time from the edge to the last step, at 85,000 steps a second, where the step interrupt leaves a fifth of
+/// the CPU, us.
 const STOP_FAST_US: u64 = 125;
-/// The longest time in which no tick comes in outside the step interrupt.
+/// Longest time in which no tick is served outside the step interrupt, cycles.
 const WINDOW: u64 = 42;
 
-/// A machine with switches that moves X and Y, and these settings.
+/// A machine with switches and these settings, which moves X and Y.
 fn running(board: &'static Board, build: &Build, settings: &[&str]) -> (Machine, Host) {
     let (mut machine, mut host) = booted(board);
     machine.build(build);
@@ -30,7 +31,7 @@ fn running(board: &'static Board, build: &Build, settings: &[&str]) -> (Machine,
     (machine, host)
 }
 
-/// What is said within some milliseconds of the exceptions' kind.
+/// Returns the exceptions that are reported within some milliseconds.
 fn exceptions(machine: &mut Machine, host: &mut Host, ms: u64) -> Vec<String> {
     host.take_reports();
     host.run_for_ms(machine, ms).unwrap();
@@ -98,7 +99,7 @@ fn a_carriage_that_runs_into_its_switch_stops_before_the_hard_end() {
     let told = exceptions(&mut machine, &mut host, 3_000);
     assert!(told.len() == 1 && told[0].contains("xmax"), "{told:?}");
     let mechanics = machine.mechanics().unwrap();
-    // At 4,000 mm/min for some looks, while it bounces for 3 ms.
+    // At 4,000 mm/min for some samples, while the switch bounces for 3 ms.
     assert!((198.0..198.06).contains(&mechanics.position(0)), "{}", mechanics.position(0));
     assert_eq!(mechanics.lost(0), 0);
     check_windows(&machine);
@@ -127,18 +128,18 @@ fn a_storm_of_noise_leaves_time_for_the_rest() {
         (0..20_000).for_each(|n| mechanics.disturb(inputs::X_MIN, now + n * 50 * US, 2 * US));
     });
     let mut told = exceptions(&mut machine, &mut host, 2_000);
-    // The storm may take a segment its time, which is told; nothing else happens.
+    // The storm may cost a segment its time, which is reported. Nothing else happens.
     told.retain(|exception| !exception.contains("\"st\":37"));
     assert_eq!(told, Vec::<String>::new());
     assert_eq!(machine.recorder().motors()[0].position, 60 * 1_280);
 }
 
-/// Not 0 while exec runs, or may not run.
+/// A variable that is not 0 while exec runs, or must not run.
 const CLOSED: &str = "avr_embassy::assembly::CLOSED";
-/// What the software interrupt runs.
+/// The function that the software interrupt calls.
 const POLL: &str = "avr_embassy::interrupt::avr::poll";
 
-/// Exec in the midst of exec would lose segments, or send them twice.
+/// Exec must not run within exec: it would lose segments, or send them twice.
 #[test]
 fn edges_of_the_spindles_sensors_start_no_samples() {
     let board = &MEGA2560_LATHE;
@@ -155,7 +156,8 @@ fn edges_of_the_spindles_sensors_start_no_samples() {
     let spent = |name: &str| -> u64 {
         profile.iter().filter(|(function, _)| function.contains(name)).map(|(_, n)| n).sum()
     };
-    // 500 pulses have come, each of two edges. Those of the index are on a pin of a switch in this build, which starts some.
+    // 500 pulses have come, each with two edges. The index is on a pin of a switch in this build, so its edges start
+    // some samples.
     assert!(spent("__vector_11") > 1_000 * 40, "{}", spent("__vector_11"));
     let samples = spent("inputs::sample");
     assert!(samples < 20 * 1_000, "{samples} cycles of samples");
@@ -172,7 +174,7 @@ fn a_look_within_the_tick_does_not_let_exec_interrupt_itself() {
         machine.tamper(|mechanics, now| {
             (0..20_000).for_each(|n| mechanics.disturb(inputs::X_MIN, now + n * 50 * US, 2 * US));
         });
-        // The tick lets others in each 256 ms.
+        // Every 256 ms the tick allows other interrupts.
         let end = machine.cycle() + machine.cycles(800);
         let mut began = None;
         while machine.cycle() < end {
@@ -214,7 +216,7 @@ fn after_a_limit_the_position_is_known_to_the_step() {
             assert_eq!(exceptions(&mut machine, &mut host, 100).len(), 1);
             set(&mut machine, &mut host, "{clear:n}");
             machine.tamper(|mechanics, now| mechanics.work(inputs::X_MIN, false, now));
-            // Off the switch, and to where steps began to be counted.
+            // The axes move off the switch, and to where steps began to be counted.
             set(&mut machine, &mut host, "g0 x0 y0");
             host.run_for_ms(&mut machine, 2_500).unwrap();
             let motors = machine.recorder().motors();

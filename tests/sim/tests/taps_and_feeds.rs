@@ -1,4 +1,5 @@
-//! G33.1, G95 and G96 at the pins of the chip, in both dialects: what goes well, and each fault of `docs/safety.md` from F8 to F13.
+//! G33.1, G95 and G96 at the pins of the chip, in both dialects: the normal case, and each fault of `docs/safety.md`
+//! from F8 to F13.
 
 use kerf::boards::{Board, MEGA2560_GRBL_LATHE, MEGA2560_LATHE};
 use kerf_sim::mechanics::Build;
@@ -8,15 +9,15 @@ use crate::common::turning::{Lathe, STEPS};
 const Z: usize = 1;
 const BOARDS: [&Board; 2] = [&MEGA2560_LATHE, &MEGA2560_GRBL_LATHE];
 const RPM: f64 = 300.0;
-/// mm/s of a thread of 1 mm.
+/// Velocity in a thread of 1 mm, mm/s.
 const SPEED: f64 = RPM / 60.0;
 /// Marks of the encoder in a turn.
 const MARKS: u32 = 20;
-/// How deep a tap goes, mm.
+/// Depth of a tap, mm.
 const DEEP: f64 = 5.0;
 const TAP: &str = "g33.1 z-5 k1";
 
-/// A lathe whose outputs drive the spindle, which gains or loses 600 turns a minute in a second. It turns.
+/// A lathe whose outputs drive the spindle, which gains or loses 600 turns a minute in a second. The spindle turns.
 fn driven(board: &'static Board) -> Lathe {
     let mut build = Build::lathe(board, MARKS).unwrap();
     (build.spindle.rpm, build.spindle.pwm, build.spindle.torque) = (RPM, None, 600.0);
@@ -28,7 +29,8 @@ fn driven(board: &'static Board) -> Lathe {
     lathe
 }
 
-/// One exception was told, by its number or its message, and no other; the position is known to the step.
+/// Checks that one exception was reported, by its number or its message, and no other, and that the position is known
+/// to the step.
 fn failed(lathe: &mut Lathe, exception: u16, message: &str) {
     let status = lathe.rest();
     assert_eq!(status.state, "Alarm", "{message}");
@@ -86,7 +88,7 @@ fn a_spindle_that_does_not_turn_round_ends_a_tap_within_the_way_of_a_second() {
     }
 }
 
-/// The spindle stops dead when the tap is so deep. How far Z goes on, mm.
+/// Stops the spindle dead when the tap is `deep`. Returns how far Z goes on, mm.
 fn jams(lathe: &mut Lathe, deep: f64) -> f64 {
     lathe.begin(TAP, Z, deep);
     lathe.machine.tamper(|mechanics, now| mechanics.force_spindle(0.0, now));
@@ -97,7 +99,7 @@ fn jams(lathe: &mut Lathe, deep: f64) -> f64 {
 
 #[test]
 fn a_spindle_that_stops_dead_on_the_way_in_stops_a_tap() {
-    // Two pulses, the 1 ms by which sensors are late, what is queued, and the ramp.
+    // Two pulses, the delay of 1 ms of the sensors, the queued segments, and the ramp.
     let most = 2.1 / f64::from(MARKS) + SPEED * 0.015 + SPEED * SPEED / 1_000.0;
     for board in BOARDS {
         let mut lathe = driven(board);
@@ -111,7 +113,8 @@ fn a_spindle_that_stops_dead_on_the_way_in_stops_a_tap() {
 
 #[test]
 fn a_spindle_that_stops_dead_while_it_turns_round_stops_a_tap() {
-    // A pulse, what is queued, and the ramp, at a speed to which it has not slowed down; and a creep of 0.01 mm/s.
+    // A pulse, the queued segments and the ramp, all at full speed although the spindle is slower by then; plus a creep
+    // of 0.01 mm/s.
     let most = 1.1 / f64::from(MARKS) + SPEED * 0.02 + SPEED * SPEED / 1_000.0 + 0.01;
     let slowed = |lathe: &mut Lathe| {
         let mut rpm = RPM;
@@ -119,7 +122,7 @@ fn a_spindle_that_stops_dead_while_it_turns_round_stops_a_tap() {
         rpm < 0.9 * RPM
     };
     for board in BOARDS {
-        // It stands 440 ms later, and turns back then.
+        // The spindle stands 440 ms later, and then turns back.
         for later in [0, 20, 200, 350, 480, 520, 600] {
             let mut lathe = driven(board);
             lathe.begin(TAP, Z, 4.0);
@@ -145,7 +148,7 @@ fn a_feed_a_turn_ends_with_the_spindle_and_waits_six_seconds() {
         let mut lathe = Lathe::new(board, MARKS, |_| {});
         lathe.take("m3 s300");
         lathe.run_for_ms(100);
-        // It stops in the cut; it never turns.
+        // The spindle stops in the cut, or never turns.
         for turns in [true, false] {
             lathe.forget();
             if turns {
@@ -156,7 +159,7 @@ fn a_feed_a_turn_ends_with_the_spindle_and_waits_six_seconds() {
             lathe.run_for_ms(2_000);
             assert_eq!(lathe.motors()[Z] != 0, turns);
             lathe.machine.tamper(|mechanics, now| mechanics.force_spindle(0.0, now));
-            // Two pulses are 20 ms, exec looks each 20, and 1 mm/s stops in 2.
+            // Two pulses are 20 ms, exec checks every 20 ms, and 1 mm/s stops in 2 ms.
             lathe.run_for_ms(80);
             let stands = lathe.motors();
             lathe.run_for_ms(3_000);
@@ -174,7 +177,7 @@ fn a_feed_a_turn_ends_with_the_spindle_and_waits_six_seconds() {
 fn at_the_axis_of_the_spindle_surface_speed_is_limited_by_d() {
     for board in BOARDS {
         let mut lathe = Lathe::new(board, MARKS, |_| {});
-        // S 24,000 is the whole width of the pulses.
+        // S 24,000 is the full width of the pulses.
         for (line, share) in
             [("g96 s100 d2400 m3", 0.1), ("g96 s100", 1.0), ("g96 s100 d1200", 0.05)]
         {

@@ -1,7 +1,9 @@
-//! The words of a thread at the pins of the chip, in both dialects: where it ends, and where the axes are at each index pulse.
+//! The words of a thread at the pins of the chip, in both dialects: where the thread ends, and where the axes are at
+//! each index pulse.
 //!
-//! Many passes are cut in one run of the simulator. Each begins where X and Z are 0. At an index pulse the thread has to be a whole number
-//! of leads from where it began, but for the angle between the index and the pulse of sync behind it.
+//! Many passes are cut in one run of the simulator. Each begins with X and Z at 0. At an index pulse the distance
+//! from the beginning must be a whole number of leads, except for the angle between the index and the next sync
+//! pulse.
 
 use kerf::boards::{Board, MEGA2560_GRBL_LATHE, MEGA2560_LATHE};
 use kerf_sim::mechanics::{Bounce, Sensors};
@@ -11,15 +13,16 @@ use crate::common::turning::{Cut, Lathe, STEP, STEPS, apart};
 const X: usize = 0;
 const Z: usize = 1;
 const BOARDS: [&Board; 2] = [&MEGA2560_LATHE, &MEGA2560_GRBL_LATHE];
-/// Pulses of sync in a turn. The first is half of their distance behind the index.
+/// Sync pulses in a turn. The first is half of their distance behind the index.
 const PULSES: u32 = 4;
 
-/// What of a lead the axes are behind a whole number of leads at an index pulse.
+/// Returns the share of a lead by which the axes are behind a whole number of leads at an index pulse.
 fn behind(pulses: u32) -> f64 {
     if pulses == 1 { 0.0 } else { 0.5 / f64::from(pulses) }
 }
 
-/// Lines before a thread, the thread, how far X and Z go by it, mm, and the way of the longer one in a turn.
+/// The lines before a thread, the line of the thread, how far it moves X and Z, mm, and the distance of the longer
+/// axis in a turn.
 struct Words {
     before: &'static [&'static str],
     line: &'static str,
@@ -36,17 +39,17 @@ const fn words(
     Words { before, line, way, lead }
 }
 
-/// Each begins at 0, 0 with the modes of the beginning.
+/// Each thread begins at 0, 0 with the modes of the beginning.
 const WORDS: [Words; 22] = [
     words(&["g91"], "g33 z-6 k1", [0.0, -6.0], 1.0),
     words(&["g91"], "g33 z6 k1.25", [0.0, 6.0], 1.25),
     words(&["g91"], "g32 z-6 k1", [0.0, -6.0], 1.0),
     words(&["g90"], "g33 z-7.525 k1.5", [0.0, -7.525], 1.5),
-    // A face thread, and with diameters: K stays what it is.
+    // A face thread, also in diameter mode, where K keeps its meaning.
     words(&["g91"], "g33 x-6 k1", [-6.0, 0.0], 1.0),
     words(&["g91 g7"], "g33 x12 k1", [6.0, 0.0], 1.0),
     words(&["g90 g7"], "g32 x-12 k0.8", [-6.0, 0.0], 0.8),
-    // Tapers: the lead is that of the axis that moves farther.
+    // Tapers: the lead applies to the axis that moves farther.
     words(&["g91"], "g33 x-1 z-7 k1", [-1.0, -7.0], 1.0),
     words(&["g91"], "g33 x7 z-2 k1", [7.0, -2.0], 1.0),
     words(&["g91 g7"], "g33 x2 z-7 k1", [1.0, -7.0], 1.0),
@@ -64,7 +67,7 @@ const WORDS: [Words; 22] = [
     words(&["g20 g91 g43.1 z0.1"], "g21 g90 g33 z-8.54 k1", [0.0, -6.0], 1.0),
 ];
 
-/// Ends what a line before may have begun, and goes back to 0, 0.
+/// Ends whatever a line before may have begun, and goes back to 0, 0.
 const AFTER: [&str; 7] = [
     "g21 g90 g8 g94",
     "g92.1 g49",
@@ -75,7 +78,7 @@ const AFTER: [&str; 7] = [
     "g4 p0.01",
 ];
 
-/// The thread is where the spindle says at each index.
+/// Checks that the thread is where the spindle requires it at each index pulse.
 fn holds(lathe: &mut Lathe, words: &Words, pulses: u32) {
     words.before.iter().for_each(|line| lathe.take(line));
     let cut = lathe.cut(words.line);
@@ -99,11 +102,11 @@ fn holds(lathe: &mut Lathe, words: &Words, pulses: u32) {
     assert_eq!(lathe.motors(), [0, 0]);
 }
 
-/// Nothing was told, and each pulse has fitted.
+/// Checks that nothing was reported, and that every pulse was as expected.
 fn all_fit(lathe: &mut Lathe, why: &str) {
     let exceptions = lathe.exceptions();
     assert!(exceptions.is_empty(), "{why}: {exceptions:?}");
-    // In grbl's dialect a misfit is a message alone.
+    // In grbl's dialect a misfit is only a message.
     if !lathe.grbl {
         assert_eq!(lathe.value("spx"), 0.0, "{why}");
     }
@@ -129,13 +132,13 @@ fn the_starts_of_a_thread_lie_a_part_of_its_lead_apart() {
         lathe.turn(rpm);
         let part = lead / f64::from(starts);
         let mut first = None;
-        // Twice, so that each lies in its own, too.
+        // Each start is cut twice, so that it must also agree with itself.
         for n in (0..starts).chain(0..starts) {
             let shift = part * f64::from(n);
             lathe.take(&format!("g90 g0 z{shift}"));
             lathe.rest();
             let cut = lathe.cut(&format!("g33 z{} k{lead}", shift - 5.0 * lead));
-            // Of where Z is, not of where it began.
+            // The phase of the position of Z, not of the beginning.
             for way in cut.phases(Z, lead) {
                 let phase = way - shift;
                 let of = *first.get_or_insert(phase);
@@ -147,7 +150,7 @@ fn the_starts_of_a_thread_lie_a_part_of_its_lead_apart() {
     }
 }
 
-/// Sends within a pass what must not do anything to it.
+/// Sends lines and characters within a pass that must have no effect on it.
 fn disturb(lathe: &mut Lathe) {
     if lathe.grbl {
         // Feed and rapid overrides, down and up, and a cycle start.
@@ -200,10 +203,10 @@ fn overrides_and_a_hold_within_a_pass_leave_the_thread_whole() {
     }
 }
 
-/// A spindle: pulses a turn, turns a minute, how its sensors are, how long their contacts bounce, us.
+/// A spindle: pulses a turn, turns a minute, changes of its sensors, and the debounce setting, us.
 type Sensed = (u32, f64, fn(&mut Sensors), u32);
 
-/// Cycles of 100 us, by which edges come late at random.
+/// 100 us in cycles, by which edges come late at random.
 const JITTER: u64 = 1_600;
 
 #[test]
@@ -214,15 +217,15 @@ fn sensors_that_jitter_bounce_or_are_wide_cut_as_well() {
         (100, 1_000.0, |of| of.jitter = JITTER, 0),
         (4, 300.0, |of| of.bounce = Some(Bounce { times: 3, cycles: 3_000 }), 500),
         (8, 600.0, |of| of.bounce = Some(Bounce { times: 5, cycles: 1_500 }), 200),
-        // Some of 10,000 edges come while the handler's work is read.
+        // Some of 10,000 edges come while the results of the handler are being read.
         (100, 300.0, |of| of.bounce = Some(Bounce { times: 3, cycles: 3_000 }), 250),
         (100, 300.0, |of| of.bounce = Some(Bounce { times: 3, cycles: 3_000 }), 250),
-        // 50 us of a turn of 100 ms, and all but 50 us of one.
+        // The pulse is 50 us of a turn of 100 ms, and all but 50 us of the distance between two pulses.
         (4, 600.0, |of| (of.index_width, of.width) = (0.0006, 0.0024), 0),
         (100, 600.0, |of| (of.index_width, of.width) = (0.0006, 0.06), 0),
         (4, 600.0, |of| (of.index_width, of.width) = (0.98, 0.95), 0),
         (100, 300.0, |of| (of.index_width, of.width) = (0.98, 0.9), 0),
-        // The index next to a pulse of sync.
+        // The index is next to a sync pulse.
         (4, 600.0, |of| of.phase = 0.01, 0),
     ];
     for (n, (pulses, rpm, change, bounces)) in sensors.into_iter().enumerate() {
@@ -233,7 +236,7 @@ fn sensors_that_jitter_bounce_or_are_wide_cut_as_well() {
         let phases = lathe.cut("g33 z-9 k1").phases(Z, 1.0);
         let mut of = Sensors::of(BOARDS[n % 2], pulses).unwrap();
         change(&mut of);
-        // Edges of the index that come late are late by so much of the way.
+        // If edges of the index come late, the axes have moved on by this much.
         let late = of.jitter as f64 / 16e6 * rpm / 60.0;
         let behind = if pulses == 1 { 0.0 } else { of.phase };
         let most = phases.iter().map(|phase| apart(*phase, -behind, 1.0)).fold(0.0, f64::max);

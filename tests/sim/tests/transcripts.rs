@@ -7,17 +7,18 @@ use kerf::boards::{MEGA2560_GRBL, MEGA2560_GRBL_LATHE, MEGA2560_LATHE, RAMPS14};
 use crate::common::firmware;
 use crate::{pages, transcript};
 
-/// What only the image of a lathe can do.
+/// Transcripts that only the image of a lathe can play.
 const TURNING: [&str; 3] = ["encoder.", "thread", "lathe-"];
-/// What only the image of a printer can do.
+/// Transcripts that only the image of a printer can play.
 const PRINTING: [&str; 4] = ["bed", "corexy", "heat", "reprap"];
-/// What needs grbl's dialect besides.
+/// Transcripts that also need grbl's dialect.
 const BOTH: [&str; 2] = ["grbl-thread", "grbl-lathe"];
 
 #[test]
 fn the_image_keeps_to_the_transcripts() {
     let mut all = transcript::read_all(Path::new("../../transcripts"));
-    // No image for this chip tells drivers anything, or has printing hosts and a second port: the emulated `skr-pico` has.
+    // No image for this chip has drivers with UART, or both printing hosts and a second port. The emulated `skr-pico`
+    // has them.
     let elsewhere = ["drivers", "reprap-ports"];
     all.retain(|one| !elsewhere.iter().any(|name| one.name.starts_with(name)));
     let begins = |names: &[&str], one: &transcript::Transcript| {

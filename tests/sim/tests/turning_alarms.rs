@@ -1,7 +1,8 @@
-//! Each fault of a spindle, and each stop, within a pass or before it, on the images of both dialects: the exception, alarm or error that has to
-//! follow, X out of the cut where that is set, the position to the step, answers meanwhile, and the way back.
+//! Each fault of a spindle, and each stop, within a pass or before it, on the images of both dialects. The tests
+//! check the exception, alarm or error, that X is out of the cut where that is set, the position to the step, answers
+//! meanwhile, and the recovery.
 //!
-//! Faults that leave the machine as it was come one behind the other in one run of the simulator.
+//! Faults that leave the machine unchanged are tested in sequence in one run of the simulator.
 
 use kerf::boards::inputs::{DOOR, STOP};
 use kerf::boards::{Board, MEGA2560_GRBL_LATHE, MEGA2560_LATHE};
@@ -14,18 +15,18 @@ const Z: usize = 1;
 const BOARDS: [&Board; 2] = [&MEGA2560_LATHE, &MEGA2560_GRBL_LATHE];
 /// The input of the lower switch of X.
 const XMIN: usize = 0;
-/// The longest way from a question to its answer, ms.
+/// Longest time from a question to its answer, ms.
 const ANSWERED_MS: f64 = 20.0;
-/// The length of a thread, mm, and how far X leaves it.
+/// Length of a thread, mm, and the distance by which X leaves the cut.
 const LENGTH: f64 = 12.0;
 const RETRACT: f64 = 2.0;
-/// Where it ends, in steps.
+/// End of the thread, in steps.
 const END: [i64; 2] = [0, -(LENGTH * STEPS) as i64];
 
 /// Marks in a turn, and turns a minute.
 type Spindle = (u32, f64);
 
-/// What happens in a pass.
+/// What happens during a pass.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Fault {
     Stops,
@@ -42,7 +43,7 @@ enum Fault {
     Reset,
 }
 
-/// What is told: the number of TinyG's dialect, and what grbl's says.
+/// Returns what is reported: the number in TinyG's dialect, and the text in grbl's.
 fn exception(fault: Fault) -> Option<(u16, &'static str)> {
     Some(match fault {
         Fault::Stops | Fault::Reverses | Fault::FourMissing => {
@@ -52,18 +53,18 @@ fn exception(fault: Fault) -> Option<(u16, &'static str)> {
         Fault::OneMissing | Fault::Extra => (40, "[MSG:Spindle pulses do not fit]"),
         Fault::Limit => (204, "ALARM:1"),
         Fault::Stop => (205, "ALARM:3"),
-        // Of TinyG's dialect alone, and of grbl's.
+        // The first exists in TinyG's dialect alone, the second in grbl's.
         Fault::Alarm => (203, ""),
         Fault::Reset => (0, "ALARM:3"),
         Fault::Hold | Fault::Door => return None,
     })
 }
 
-/// A lathe with a door and an emergency stop, which are in use, as is the limit of X.
+/// A lathe with a door, an emergency stop and a limit of X, all in use.
 fn lathe(board: &'static Board, (marks, rpm): Spindle) -> Lathe {
     let mut build = Build::lathe(board, marks).unwrap();
     build.spindle.pwm = None;
-    // Its switch is far off, and closes by hand.
+    // The switch of X is far off, and the test closes it by hand.
     let far = Switch { at: -1e6, hysteresis: 0.0, wiring: Wiring::NormallyOpen };
     build.axes[X].min = Some(far);
     let mut lathe = Lathe::of(board, &build, marks);
@@ -72,7 +73,7 @@ fn lathe(board: &'static Board, (marks, rpm): Spindle) -> Lathe {
     lathe
 }
 
-/// Begins a thread, has a fault come behind so many mm of it, and judges what becomes of it.
+/// Begins a thread, makes a fault happen after `far` mm of it, and checks the result.
 fn cut(lathe: &mut Lathe, (marks, rpm): Spindle, retract: f64, far: f64, fault: Fault) {
     let dialect = if lathe.grbl { "grbl" } else { "tinyg" };
     let why = format!("{dialect}: {fault:?} at {far} mm, N {marks}, {rpm} rpm, spr {retract}");
@@ -102,7 +103,7 @@ fn cut(lathe: &mut Lathe, (marks, rpm): Spindle, retract: f64, far: f64, fault: 
     println!("{why}: {}, {:?}, {longest:.1} ms", status.state, lathe.motors());
     assert!(longest <= ANSWERED_MS, "an answer took {longest:.1} ms: {why}");
     assert_eq!(lathe.machine.missed_tops(), 0, "{why}");
-    // It is a machine as before.
+    // The machine works as before.
     lathe.turn(rpm);
     if status.state == "Alarm" {
         lathe.recover();
@@ -147,7 +148,7 @@ fn happen(lathe: &mut Lathe, (marks, rpm): Spindle, fault: Fault) {
     }
 }
 
-/// What a fault asks for, with the machine at rest.
+/// Checks that the machine, at rest, has reacted to a fault as required.
 fn judge(
     lathe: &mut Lathe,
     (marks, rpm): Spindle,
@@ -159,7 +160,7 @@ fn judge(
 ) {
     let (steps, state) = (lathe.motors(), status.state.as_str());
     let out = (retract * STEPS).round() as i64;
-    // The way that joins what is queued may end a step before its length.
+    // The move that joins what is queued may end a step before its length.
     let is_out = (steps[X] - out).abs() <= 1;
     let went = (begun - steps[Z]) as f64 / STEPS;
     let speed = rpm / 60.0;
@@ -167,7 +168,7 @@ fn judge(
         Fault::Stops | Fault::Reverses | Fault::FourMissing => {
             assert_eq!(state, "Alarm", "{why}");
             assert!(is_out, "{steps:?}: {why}");
-            // Two pulses, those that have been missing alone, what is queued, and the ramp.
+            // Two pulses (or those that are missing), the queued segments, and the ramp.
             let pulses = if fault == Fault::FourMissing { 4.0 } else { 3.1 };
             let most = pulses / f64::from(marks) + speed * 0.015 + speed * speed / 1_000.0;
             assert!(went <= most, "{went} mm of {most}: {why}");
@@ -198,7 +199,7 @@ fn judge(
         }
         Fault::Limit | Fault::Stop => {
             assert_eq!(state, "Alarm", "{why}");
-            // At once: what has been stepped by 1 ms behind the edge.
+            // At once: Z has moved for 1 ms after the edge at most.
             assert!(steps[X] == 0 && went <= speed * 0.001 + 0.01, "{steps:?}: {why}");
             let input = if fault == Fault::Stop { STOP } else { XMIN };
             lathe.machine.tamper(|mechanics, now| mechanics.close(input, false, now));
@@ -206,14 +207,14 @@ fn judge(
         }
         Fault::Alarm | Fault::Reset => {
             assert_eq!(state, "Alarm", "{why}");
-            // The line has been on its way for 1 ms; 9 are queued.
+            // The line takes 1 ms on the wire, and 9 ms are queued.
             let most = speed * 0.025 + speed * speed / 1_000.0;
             assert!(went <= most && is_out, "{steps:?}, {went} mm of {most}: {why}");
         }
     }
 }
 
-/// What comes in turn to a spindle, each a bit further into the thread.
+/// Makes faults happen in turn to a spindle, each a bit further into the thread.
 fn all(spindle: Spindle, retract: f64, faults: &[Fault]) {
     for board in BOARDS {
         let mut lathe = lathe(board, spindle);
@@ -233,7 +234,7 @@ fn with_few_pulses_each_fault_ends_a_thread_as_it_has_to() {
 
 #[test]
 fn an_alarm_and_a_reset_leave_the_cut() {
-    // A reset keeps the position in grbl's dialect alone.
+    // Only in grbl's dialect does a reset keep the position.
     for (board, fault) in [(BOARDS[0], Fault::Alarm), (BOARDS[1], Fault::Reset)] {
         for (spindle, retract) in [((4, 300.0), RETRACT), ((100, 600.0), 0.0)] {
             cut(&mut lathe(board, spindle), spindle, retract, 3.0, fault);
@@ -261,7 +262,7 @@ fn with_the_index_alone_each_fault_ends_a_thread_as_it_has_to() {
     all((1, 1_000.0), RETRACT, &[Stops, Hold, Limit]);
 }
 
-/// Spindles that no thread can follow: turns a minute, whether there are pulses of sync, what is told or answered.
+/// Spindles that no thread can follow: turns a minute, whether there are sync pulses, and the exception or the error.
 const REFUSED: [(f64, bool, u16, &str); 3] =
     [(0.0, true, 42, "error:18"), (300.0, false, 43, "error:19"), (2_000.0, true, 146, "error:12")];
 
@@ -277,7 +278,7 @@ fn a_spindle_that_cannot_be_followed_moves_nothing() {
                 refused(&mut lathe, line, exception, error);
             }
         }
-        // The other way than M3 has asked for.
+        // The spindle turns in the opposite direction to that of M3.
         let mut lathe = Lathe::new(board, 8, |_| {});
         lathe.set("spdi:1");
         for line in ["g33 z-5 k1", "g76 p1 z-5 i-1 j0.2 k0.6"] {
@@ -288,14 +289,15 @@ fn a_spindle_that_cannot_be_followed_moves_nothing() {
             refused(&mut lathe, line, 55, "error:19");
             lathe.take("g91");
         }
-        // Nobody knows of an encoder.
+        // No encoder is configured.
         lathe.set("spn:0");
         let answer = lathe.ask("g33 z-5 k1");
         assert!(answer == "error:39" || answer.contains("[1,41,"), "{answer}");
     }
 }
 
-/// A line is refused, and the machine answers meanwhile on both ports; so does a machine that is held while it waits, or reset.
+/// Checks that a line is refused, and that the machine answers meanwhile on both ports. The same must hold for a
+/// machine that is held while it waits, or reset.
 fn refused(lathe: &mut Lathe, line: &str, exception: u16, error: &str) {
     let steps = lathe.machine.recorder().steps();
     lathe.machine.send(format!("{line}\n").as_bytes());

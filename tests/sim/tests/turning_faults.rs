@@ -1,6 +1,7 @@
-//! Faults at random moments of a thread, on the image: the spindle stops, turns round, slows down, or races, pulses are missing or too many, the pass
-//! is held, ended, or reset, and both ports ask meanwhile. Each is in the pass: it comes a random part of it behind the first step. The machine tells what
-//! the fault asks for and no other alarm, comes to rest where it says that it is, and goes on from there.
+//! Faults at random moments of a thread, on the image. The spindle stops, reverses, slows down, or races; pulses are
+//! missing or too many; the pass is held, ended, or reset; and both ports ask meanwhile. Each fault comes at a random
+//! moment of the pass, after the first step. The machine reports the exception of the fault and no other alarm, comes
+//! to rest where it says that it is, and goes on from there.
 //!
 //! `KERF_SEED` and `KERF_CASES` choose the cases.
 
@@ -11,7 +12,7 @@ use kerf_sim::{AUX, Host, LINES_IN_FLIGHT, Machine};
 use crate::common::{firmware, set};
 use crate::seeds;
 
-/// Exceptions: pulses that do not fit, the spindle is lost, the error is above its limit.
+/// Exceptions: pulses that do not fit, a lost spindle, an error above its limit.
 const MISFIT: u64 = 40;
 const LOST: u64 = 44;
 const ASTRAY: u64 = 46;
@@ -20,14 +21,14 @@ const ASTRAY: u64 = 46;
 const STEPS: f64 = 200.0;
 const X: usize = 0;
 const Z: usize = 2;
-/// The longest way from a question's last byte to its answer, ms, while both ports ask.
+/// Longest time from the last byte of a question to its answer, ms, while both ports ask.
 const ANSWERED_MS: f64 = 20.0;
-/// The state while the machine runs, and the one of an alarm.
+/// The state of a running machine, and the state of an alarm.
 const RUNS: Option<i64> = Some(5);
 const ALARM: Option<i64> = Some(2);
 const HOLDS: Option<i64> = Some(6);
 
-/// What happens in the pass.
+/// What happens during the pass.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Fault {
     Nothing,
@@ -51,7 +52,7 @@ struct Case {
     taper: bool,
     /// Whether a second sensor of sync tells the direction.
     tells: bool,
-    /// Which part of the pass is over when the first comes.
+    /// The share of the pass that is over when the first fault comes.
     share: f64,
     faults: [Fault; 2],
 }
@@ -93,7 +94,7 @@ impl Case {
             taper: random.below(4) == 0,
             tells: random.below(2) == 0,
             share: random.below(700) as f64 * 1e-3 + 0.05,
-            // Every other case has one alone.
+            // Every other case has a single fault.
             faults: [
                 fault(random),
                 if seed.is_multiple_of(2) { Fault::Nothing } else { fault(random) },
@@ -101,7 +102,7 @@ impl Case {
         }
     }
 
-    /// How long the thread is, mm: at least three seconds.
+    /// Returns the length of the thread, mm: it takes at least three seconds.
     fn length(&self) -> f64 {
         (self.rpm / 60.0 * 3.0).max(8.0).ceil()
     }
@@ -115,7 +116,7 @@ impl Case {
         self.retract != 0.0 && self.retract.abs() > 0.01 && !self.taper
     }
 
-    /// Whether an error of this size can be above the limit.
+    /// Whether an error of this case can exceed the limit.
     fn is_strict(&self) -> bool {
         self.limit != 0.0 && self.limit < 1.0
     }
@@ -161,14 +162,14 @@ fn lathe(case: &Case) -> (Machine, Host) {
     (machine, host)
 }
 
-/// A number that the machine tells.
+/// Asks the machine for a number.
 fn asked(machine: &mut Machine, host: &mut Host, name: &str) -> f64 {
     let raw = host.ask(machine, &format!("{{{name}:n}}"), 1_000).unwrap().raw;
     let (_, rest) = raw.split_once(&format!("\"{name}\":")).unwrap_or_else(|| panic!("{raw}"));
     rest.split(['}', ',']).next().unwrap().parse().unwrap()
 }
 
-/// Asks on both ports for so long. Returns the longest that an answer took on the first, ms.
+/// Asks on both ports for `ms` ms. Returns the longest time of an answer on the first port, ms.
 fn ask_for_ms(machine: &mut Machine, host: &mut Host, ms: u64) -> f64 {
     let end = machine.cycle() + machine.cycles(ms);
     let mut longest = 0.0f64;
@@ -185,18 +186,18 @@ fn ask_for_ms(machine: &mut Machine, host: &mut Host, ms: u64) -> f64 {
     longest
 }
 
-/// The exceptions that have been told since this was asked last.
+/// Returns the exceptions that were reported since the last call.
 fn told(host: &mut Host) -> Vec<u64> {
     host.take_reports().iter().filter_map(|report| report["er"]["st"].as_u64()).collect()
 }
 
-/// What the one fault of a case asks for, with the machine at rest.
+/// Checks that the machine, at rest, has reacted to the single fault of a case as required.
 fn judge(case: &Case, told: &[u64], stat: Option<i64>, way: [i64; 2]) {
     let fault = case.faults[0];
     let lost = told.contains(&LOST);
     let astray = told.contains(&ASTRAY);
     let whole = -(case.length() * STEPS) as i64;
-    // The limit of a hundredth of a step is above no error.
+    // Any error exceeds a limit of a hundredth of a step.
     let may_stray = case.is_strict();
     let ended = |why: &str| {
         assert_eq!(way[1], whole, "{why}: {case:?} {told:?}");
@@ -207,14 +208,14 @@ fn judge(case: &Case, told: &[u64], stat: Option<i64>, way: [i64; 2]) {
         Fault::Reverses if case.tells && case.marks > 1 => {
             assert!(lost || may_stray && astray, "{case:?} {told:?}");
         }
-        // Two that are missing, one behind the other, may be a spindle that stops.
+        // Two pulses missing in a row may also mean a spindle that stops.
         Fault::Misses(2..) if lost => assert_eq!(stat, ALARM, "{case:?} {told:?}"),
         Fault::Misses(_) if case.marks > 1 && !astray => {
             assert_eq!(told, [MISFIT], "{case:?}");
             ended("a pulse is missing");
         }
         Fault::Extra if case.marks > 1 && case.marks <= 8 && !astray => {
-            // With a second sensor it is no pulse.
+            // With a second sensor the spike is not taken for a pulse.
             let expected: &[u64] = if case.tells { &[] } else { &[MISFIT] };
             assert_eq!(told, expected, "{case:?}");
             ended("a pulse too many");
@@ -241,13 +242,13 @@ fn judge(case: &Case, told: &[u64], stat: Option<i64>, way: [i64; 2]) {
         return;
     }
     if alarmed && case.leaves() && way[1] != 0 {
-        // The way that joins what is queued may end a step before its length.
+        // The move that joins what is queued may end a step before its length.
         let left = (case.retract.abs() * STEPS) as i64 - way[0].abs();
         assert!((0..=1).contains(&left), "X is not out of the cut by {left}: {case:?} {told:?}");
     }
 }
 
-/// Returns whether it has come to anything: a pulse within a mark is none.
+/// Makes a fault happen. Returns whether it has had an effect: a pulse within a mark has none.
 #[must_use]
 fn happen(machine: &mut Machine, host: &mut Host, fault: Fault) -> bool {
     match fault {
@@ -283,15 +284,15 @@ fn happen(machine: &mut Machine, host: &mut Host, fault: Fault) -> bool {
     true
 }
 
-/// The motors of X and Z, in steps.
+/// Returns the positions of the motors of X and Z, in steps.
 fn motors(machine: &Machine) -> [i64; 2] {
     [X, Z].map(|motor| machine.recorder().motors()[motor].position)
 }
 
-/// Runs until no step has come for half a second, and nothing runs.
+/// Runs until no step has come for half a second, and the machine does not run.
 fn rest(machine: &mut Machine, host: &mut Host, why: &Case) {
     let mut quiet = 0;
-    // A spindle that has slowed down to 30 a minute takes two minutes.
+    // A thread at a spindle speed of 30 turns a minute takes two minutes.
     for _ in 0..600 {
         let before = machine.recorder().steps();
         host.run_for_ms(machine, 250).unwrap();
@@ -311,7 +312,7 @@ fn agrees(machine: &mut Machine, host: &mut Host, zero: [i64; 2], why: &Case) {
     }
 }
 
-/// Leads the machine out of whatever state it is in, and the axes back to where the board counts from.
+/// Recovers the machine from any state, and moves the axes back to where the board counts from.
 fn recover(machine: &mut Machine, host: &mut Host, zero: [i64; 2], why: &Case) {
     machine.tamper(|mechanics, now| mechanics.force_spindle(300.0, now));
     machine.send_now(b'%');
@@ -368,7 +369,7 @@ fn a_thread_ends_where_the_machine_says_whatever_happens_in_it() {
     seeds::try_all(12, play);
 }
 
-/// Two of two pulses are missing: the spindle is lost, and pulses that do not fit are news of the same moment.
+/// Two of two pulses are missing, so the spindle is lost. Pulses that do not fit are reported at the same moment.
 #[test]
 fn the_reason_of_an_alarm_is_told_whatever_else_happens_at_once() {
     play(262).unwrap();

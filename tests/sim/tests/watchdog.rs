@@ -1,4 +1,4 @@
-//! The watchdog: it resets a firmware in which something has got stuck, and no other; and what is known afterwards.
+//! The watchdog resets a firmware that hangs, and no other. The tests also check what is known after the reset.
 
 use kerf::boards::MEGA2560_GRBL;
 use kerf_sim::{Host, LINES_IN_FLIGHT, Machine};
@@ -8,7 +8,7 @@ use crate::common::{booted, firmware, set};
 const TIMSK0: u16 = 0x6E;
 const TIMSK1: u16 = 0x6F;
 
-/// A machine in the midst of a move, its spindle on.
+/// A machine in the middle of a move, with its spindle on.
 fn moving() -> (Machine, Host) {
     let (mut machine, mut host) = booted(&MEGA2560_GRBL);
     set(&mut machine, &mut host, "m3 s2000");
@@ -20,7 +20,7 @@ fn moving() -> (Machine, Host) {
     (machine, host)
 }
 
-/// Runs until the reset; how long it takes, ms, and what is said after it.
+/// Runs until the reset. Returns how long that takes, ms, and what is heard after it.
 fn until_reset(machine: &mut Machine) -> (u64, String) {
     let from = machine.cycle();
     let resets = machine.resets();
@@ -53,7 +53,7 @@ const TOLD: &str = "{\"er\":{\"fb\":440.20,\"st\":6,\"msg\":\"Hard reset\"}}";
 fn a_firmware_that_is_well_is_left_alone() {
     let (mut machine, mut host) = booted(&MEGA2560_GRBL);
     host.run_for_ms(&mut machine, 2_000).unwrap();
-    // A move of two steps a second, a dwell, a hold, settings, all of the settings.
+    // A move of two steps a second, a dwell, a hold, settings, all settings at once.
     for line in ["g1 f0.1 x0.01", "g4 p1.5", "{xvm:700,yvm:700,p1csl:5}", "{sys:n}", "g1 f300 x3"] {
         set(&mut machine, &mut host, line);
     }
@@ -68,7 +68,7 @@ fn without_ticks_of_the_clock_it_resets() {
     let (mut machine, _) = moving();
     machine.poke(TIMSK0, 0);
     let (ms, said) = until_reset(&mut machine);
-    // Not before the move is at its end: steps go on without thread mode.
+    // The reset does not come before the end of the move, because steps go on without thread mode.
     assert!((2_500..5_000).contains(&ms), "{ms} ms");
     assert!(said.contains(READY) && said.contains(TOLD), "{said}");
     let is = cause(&mut machine);
@@ -100,7 +100,7 @@ fn a_reset_that_was_asked_for_is_told_apart() {
     assert!(said.contains(READY) && !said.contains("\"er\""), "{said}");
     let is = cause(&mut machine);
     assert!(is.contains("{\"rst\":4}"), "{is}");
-    // And then it goes by what happens next.
+    // After that the reported cause is that of the next reset.
     machine.poke(TIMSK0, 0);
     let (_, said) = until_reset(&mut machine);
     assert!(said.contains(TOLD), "{said}");

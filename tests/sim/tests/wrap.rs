@@ -1,11 +1,11 @@
-//! The millisecond count of the image wraps after 2^32 ms, 49.7 days. Each machine here is 3 s before it when it starts.
+//! The millisecond count of the image wraps after 2^32 ms, 49.7 days. Each machine here starts 3 s before the wrap.
 
 use kerf::boards::RAMPS14;
 use kerf_sim::{Host, LINES_IN_FLIGHT, Machine};
 
 use crate::common::{age, firmware, set};
 
-/// A machine that has run for 49.7 days but 3 s.
+/// A machine that has run for 49.7 days minus 3 s.
 fn old() -> (Machine, Host) {
     let mut machine = firmware(&RAMPS14);
     age(&mut machine, 3_000);
@@ -14,7 +14,7 @@ fn old() -> (Machine, Host) {
     (machine, host)
 }
 
-/// Runs until the count has wrapped, and longer than the watchdog has patience.
+/// Runs until the count has wrapped, and for longer than the watchdog waits.
 fn pass(machine: &mut Machine, host: &mut Host) {
     host.run_for_ms(machine, 12_000).unwrap();
     assert_eq!(machine.resets(), 0, "the watchdog has bitten");

@@ -1,16 +1,16 @@
-//! What the machine says on a port, a line at a time.
+//! Parses what the machine sends on a port, a line at a time.
 
 use super::json::{Value, parse};
 
-/// What is told without having been asked for begins with one of these.
+/// The name of an unsolicited line is one of these.
 const UNASKED: [&str; 6] = ["sr", "qr", "er", "rx", "jog", "ack"];
 
-/// A line of the machine's.
+/// A line from the machine.
 #[derive(Debug)]
 pub enum Heard {
-    /// It answers a line.
+    /// The answer to a line.
     Answer(Answer),
-    /// Somebody is there.
+    /// The answer to an enquiry whether anybody is there.
     Ack,
     /// An exception, with this status.
     Exception(u16),
@@ -20,25 +20,25 @@ pub enum Heard {
     Report,
 }
 
-/// A response.
+/// The answer to a line.
 #[derive(Debug)]
 pub struct Answer {
     pub body: Value,
     pub status: u16,
-    /// What the footer says behind it, but for the checksum.
+    /// The length in the footer.
     pub told: f64,
-    /// The number of the line that it answers, if it says so.
+    /// The number of the line that it answers, if it has one.
     pub id: Option<u32>,
 }
 
 impl Answer {
-    /// What the body tells by this name.
+    /// Returns the value of this name in the body.
     pub fn told(&self, name: &str) -> Option<&Value> {
         self.body.get(name)
     }
 }
 
-/// Reads a line; `sums` if footers have a checksum. The error is what is wrong with it.
+/// Parses a line; `sums` says whether footers have a checksum. The error says what is wrong with the line.
 pub fn read(line: &str, sums: bool) -> Result<Heard, String> {
     let wrong = |why: &str| format!("heard {line:?}: {why}");
     let value = parse(line).ok_or_else(|| wrong("no JSON"))?;
@@ -73,13 +73,13 @@ pub fn read(line: &str, sums: bool) -> Result<Heard, String> {
     Ok(Heard::Answer(answer))
 }
 
-/// That of all up to the comma before it.
+/// Returns the checksum of the text up to the comma before the checksum.
 fn checksum(line: &str) -> u32 {
     let summed = line.rfind(',').map_or("", |comma| &line[..comma]);
     summed.bytes().fold(0u32, |sum, b| sum.wrapping_mul(31).wrapping_add(b.into())) % 9_999
 }
 
-/// The number of the line: its `tid`, its N word, or one of both in what is given back of it.
+/// Returns the number of the line: its `tid`, its N word, or one of both in the repeated text.
 fn id(body: &Value) -> Option<u32> {
     let named = |name| body.get(name).and_then(Value::number).map(|id| id as u32);
     let digits = |text: &str| {

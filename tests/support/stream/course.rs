@@ -1,49 +1,50 @@
-//! Where the motors are to be.
+//! A model of where the motors must be.
 //!
-//! All lines move one axis, by so many steps. Whenever lines may have been dropped the next ones move another axis: those that
-//! have been dropped are not carried out if their axis stands still, and those behind are if theirs goes as far as
-//! their answers say.
+//! All lines move one axis, by a known number of steps. Whenever lines may have been dropped, the next lines move
+//! another axis. The dropped lines were not executed if their axis stands still. The lines behind them were executed
+//! if their axis goes as far as their answers say.
 
 use super::ledger::Cut;
 use super::lines::AXES;
 
-/// Longest that the machine takes to come to rest when it is stopped, ms; with the time in which it notices.
+/// Longest time until the machine comes to rest when it is stopped, ms, including the time in which it notices.
 const STOP_MS: u64 = 450;
 
 /// See the module.
 pub struct Course {
     /// How often lines may have been dropped.
     pub epoch: u32,
-    /// The axis that lines move now, where it was, and how far it is to go.
+    /// The axis that lines move now, its position at the beginning, and the distance that it is to go.
     pub axis: usize,
     base: i64,
     way: i64,
-    /// Whether that is known.
+    /// Whether the distance is known.
     exact: bool,
-    /// Axes that may move still, although no line is to move them now.
+    /// Axes that may still move, although no line is to move them now.
     stirs: [bool; AXES.len()],
     watch: Option<Watch>,
-    /// Where the motors are.
+    /// Positions of the motors.
     steps: [i64; 4],
 }
 
-/// What a kill has stopped.
+/// What a kill has stopped, and must not move.
 struct Watch {
     from: u64,
     axes: [bool; AXES.len()],
     steps: Option<[i64; 4]>,
-    /// The spindle stands too.
+    /// Whether the spindle must stand too.
     spindle: bool,
 }
 
 impl Course {
-    /// Of a machine at rest.
+    /// A course for a machine at rest.
     pub fn new(steps: [i64; 4]) -> Self {
         let stirs = [false; AXES.len()];
         Self { epoch: 0, axis: 0, base: steps[0], way: 0, exact: true, stirs, watch: None, steps }
     }
 
-    /// Lines may have been dropped, or have been for sure. Those of some axes may be carried out still, and the spindle be started.
+    /// Takes note that lines may have been dropped, or surely have been. `goes_on` are the axes whose lines may still
+    /// be executed, and `turns` says whether the spindle may still be started.
     pub fn cut(&mut self, now: u64, cut: Cut, goes_on: [bool; AXES.len()], turns: bool) {
         self.stirs[self.axis] = true;
         self.epoch += 1;
@@ -59,19 +60,19 @@ impl Course {
         }
     }
 
-    /// Nobody knows how far the lines of now will be carried out.
+    /// Takes note that it is unknown how far the present lines will be executed.
     pub fn doubt(&mut self) {
         self.exact = false;
     }
 
-    /// The spindle may turn.
+    /// Takes note that the spindle may turn.
     pub fn turns(&mut self) {
         if let Some(watch) = &mut self.watch {
             watch.spindle = false;
         }
     }
 
-    /// A line has moved an axis, or will; `doubtful` if it may have been dropped.
+    /// Takes note that a line has moved an axis, or will. `doubtful` says that the line may have been dropped.
     pub fn moved(&mut self, axis: usize, steps: i64, epoch: u32, doubtful: bool) {
         if epoch == self.epoch {
             self.way += steps;
@@ -81,7 +82,7 @@ impl Course {
         }
     }
 
-    /// Time has passed.
+    /// Checks, at time `now`, that nothing moves that was killed.
     pub fn see(&mut self, now: u64, steps: [i64; 4], spindle: bool) -> Result<(), String> {
         self.steps = steps;
         let Some(watch) = self.watch.as_mut().filter(|watch| now >= watch.from) else {
@@ -97,7 +98,7 @@ impl Course {
         }
     }
 
-    /// The machine is at rest, and every line has been answered.
+    /// Checks the distance of the present axis. The machine is at rest, and every line has been answered.
     pub fn rest(&mut self) -> Result<(), String> {
         let went = self.steps[self.axis] - self.base;
         if self.exact && went != self.way {
@@ -108,7 +109,7 @@ impl Course {
         Ok(())
     }
 
-    /// What follows counts from here, where all axes rest.
+    /// Begins anew from here, where all axes rest.
     pub fn start(&mut self) {
         (self.base, self.way, self.exact) = (self.steps[self.axis], 0, true);
         self.stirs = [false; AXES.len()];

@@ -1,8 +1,8 @@
-//! A conversation of two streams, had and judged.
+//! Plays and judges a conversation of two streams.
 //!
-//! Every line is answered once, in its port's order; questions are answered within 20 ms unless their sender holds the machine back; what
-//! has been answered by 0 has been done, and what has been dropped has not; the machine comes to rest, and stands where
-//! it says.
+//! What must hold: every line is answered once, in its port's order. Questions are answered within 20 ms unless their
+//! sender holds the machine back. What was answered by 0 was done, and what was dropped was not. The machine comes to
+//! rest, and stands where it says.
 
 use kerf::boards::outputs;
 
@@ -13,10 +13,11 @@ use super::ops::{Op, Setup};
 use super::port::{BYTES_MS, Port, Put};
 use crate::side::Side;
 
-/// Longest that the machine may take to come to rest.
+/// Longest time until the machine comes to rest, ms.
 const REST_MS: u64 = 60_000;
 
-/// How the machine moves: fast, for there is much to do. M0 waits for a tilde, and answers have the numbers of their lines.
+/// Settings of the machine: it moves fast, because there is much to do; M0 waits for a tilde; answers have the
+/// numbers of their lines.
 const MODES: [&str; 5] = [
     "x:{vm:3000,fr:3000,jm:2000,ac:0}",
     "y:{vm:3000,fr:3000,jm:2000,ac:0}",
@@ -35,33 +36,33 @@ pub struct Dialogue<S> {
     pub(super) now: u64,
     /// The number of the next line.
     pub(super) id: u32,
-    /// Footers have a checksum.
+    /// Whether footers have a checksum.
     pub(super) sums: bool,
-    /// What has come of the line that is being heard, and all bytes and lines so far.
+    /// For each port, the part of the next line that has come, and the number of bytes heard so far.
     pub(super) partial: [Vec<u8>; 2],
     pub(super) heard: [usize; 2],
     pub(super) story: Vec<String>,
     pub(super) banners: usize,
     pub(super) acks: [usize; 2],
-    /// What each port has set its value to.
+    /// The value that each port has set for itself.
     pub(super) values: [u16; 2],
-    /// Until when lines may be dropped although none was sent behind what drops them.
+    /// Time until which lines may be dropped, even lines that were sent after whatever drops them.
     pub(super) doubt: u64,
-    /// When an exclamation mark was sent last, since the machine was at rest; and a percent sign.
+    /// Time of the last exclamation mark since the machine was at rest, and of the last percent sign.
     pub(super) held: Option<u64>,
     pub(super) percent: Option<u64>,
     pub(super) alarmed: bool,
-    /// The answer to the last line of the dialogue's own.
+    /// The answer to the last line of the dialogue itself.
     pub(super) told: Option<Answer>,
-    /// Longest that an answer to a question may take, ms; and has taken.
+    /// Longest time that an answer to a question may take, and has taken, ms.
     pub(super) prompt: f64,
     pub slowest: f64,
-    /// Position that is told less the steps made, of each axis.
+    /// For each axis, the reported position minus the steps made.
     pub(super) offsets: Option<[f64; 3]>,
 }
 
 impl<S: Side> Dialogue<S> {
-    /// With a machine that is to answer questions within so many ms.
+    /// A dialogue with a machine that must answer questions within `prompt` ms.
     pub fn new(side: S, prompt: f64) -> Self {
         let course = Course::new(side.steps());
         Self {
@@ -88,7 +89,7 @@ impl<S: Side> Dialogue<S> {
         }
     }
 
-    /// A machine that has never been used boots, and is set up to move.
+    /// Boots a machine with empty EEPROM, and sets it up to move.
     pub fn begin(&mut self) -> Outcome<()> {
         self.side.wire(&[], 0);
         self.side.set_aux_cts(false);
@@ -104,7 +105,7 @@ impl<S: Side> Dialogue<S> {
         self.rest()
     }
 
-    /// Has a conversation.
+    /// Plays a conversation.
     pub fn play(&mut self, setup: &Setup, ops: &[Op]) -> Outcome<()> {
         self.story.push(format!("{setup:?}"));
         self.set_up(setup)?;
@@ -116,7 +117,7 @@ impl<S: Side> Dialogue<S> {
                     self.ports[port].queue.extend(lines.iter().cloned());
                 }
                 Op::Characters(port, characters, after) => {
-                    // The pin may stop the sender between two of them.
+                    // The pin may stop the sender between two characters.
                     let one = self.ports[*port].by_pin;
                     let characters = if one { &characters[..1] } else { characters };
                     self.ports[*port].inserts.push_back(((*after).into(), characters));
@@ -134,7 +135,7 @@ impl<S: Side> Dialogue<S> {
         Ok(())
     }
 
-    /// All that was done, and heard, of a conversation that failed.
+    /// Returns all that was done and heard in a conversation that failed.
     pub fn story(&self) -> String {
         self.story.join("\n")
     }
@@ -142,10 +143,10 @@ impl<S: Side> Dialogue<S> {
     fn set_up(&mut self, setup: &Setup) -> Outcome<()> {
         let Setup { ex, rxm, sv, ec, jv, .. } = setup;
         self.ask(&format!("sv:{sv},ec:{ec},jv:{jv},ex:{ex}"))?;
-        // Its answer counts already so.
+        // The answer to this setting already follows it.
         self.sums = *rxm == 0;
         self.ask(&format!("rxm:{rxm}"))?;
-        // The planner takes up settings with the first move behind them, which keeps the chip busy for some ms.
+        // The planner applies settings with the next move, which keeps the chip busy for some ms.
         self.ask("gc:\"g91 g0 z0.025\"")?;
         self.run(100)?;
         self.course.start();
@@ -175,7 +176,7 @@ impl<S: Side> Dialogue<S> {
         (0..ms).try_for_each(|_| self.tick())
     }
 
-    /// A ms.
+    /// Lets a ms pass.
     fn tick(&mut self) -> Outcome<()> {
         let stopped = self.side.stops_aux();
         self.ports[1].stop_by_pin(stopped);
@@ -199,7 +200,7 @@ impl<S: Side> Dialogue<S> {
         self.course.see(self.now, self.side.steps(), turns)
     }
 
-    /// A port's sender puts on the line what it may.
+    /// Puts on a port's line what its sender may send.
     fn emit(&mut self, number: usize) {
         let mut left = BYTES_MS;
         while left > 0 {
@@ -229,7 +230,7 @@ impl<S: Side> Dialogue<S> {
         }
     }
 
-    /// A line has been heard.
+    /// Takes a line that was heard.
     fn line(&mut self, port: usize) -> Outcome<()> {
         let line = String::from_utf8_lossy(&std::mem::take(&mut self.partial[port])).to_string();
         self.story.push(format!("{} ms:     {port} heard {line}", self.now));
@@ -252,7 +253,7 @@ impl<S: Side> Dialogue<S> {
         }
     }
 
-    /// Asks something of its own, and waits for the answer.
+    /// Asks something for the dialogue itself, and waits for the answer.
     pub(super) fn ask(&mut self, pairs: &str) -> Outcome<Answer> {
         self.told = None;
         let id = self.id;
@@ -271,11 +272,12 @@ impl<S: Side> Dialogue<S> {
         }
     }
 
-    /// Waits until all is answered and nothing moves, and looks whether it is as it is to be.
+    /// Waits until all lines are answered and nothing moves, and checks that all is as it must be.
     fn rest(&mut self) -> Outcome<()> {
         let from = self.now;
         let (mut last, mut quiet, mut rested) = (self.side.steps(), 0, 0);
-        // A machine that waits at M0 says that it rests as well: it is to say so again, behind another tilde.
+        // A machine that waits at M0 reports that it rests as well. So it must report that twice, the second time
+        // behind another tilde.
         while rested < 2 {
             if self.now - from > REST_MS {
                 return Err("the machine does not come to rest".to_string());
@@ -283,7 +285,7 @@ impl<S: Side> Dialogue<S> {
             self.relieve()?;
             self.run(50)?;
             let (steps, idle) = (self.side.steps(), self.ports.iter().all(Port::is_idle));
-            // What waits for a tilde gets one.
+            // A line that waits for a tilde gets one.
             quiet = if steps == last && idle { quiet + 1 } else { 0 };
             last = steps;
             if quiet < 2 {
@@ -304,14 +306,14 @@ impl<S: Side> Dialogue<S> {
         self.check_position()
     }
 
-    /// Lets go of all that holds the machine back.
+    /// Releases whatever holds the machine back.
     fn relieve(&mut self) -> Outcome<()> {
         (0..2)
             .filter(|port| self.ports[*port].holds)
             .collect::<Vec<_>>()
             .into_iter()
             .for_each(|port| self.hold(port, false));
-        // A character of two that make a flush is not to come now.
+        // No `!` or `%` may come now that would make a flush with another one.
         self.send(0, b"~\x90\x95");
         self.ports[0].break_line();
         Ok(())

@@ -1,4 +1,4 @@
-//! JSON as its standard has it (RFC 8259), and nothing more.
+//! JSON exactly as its standard defines it (RFC 8259).
 
 use std::iter::Peekable;
 use std::str::Chars;
@@ -15,7 +15,7 @@ pub enum Value {
 }
 
 impl Value {
-    /// What an object holds by this name.
+    /// Returns the value of this name in an object; `None` if there is none.
     pub fn get(&self, name: &str) -> Option<&Value> {
         match self {
             Value::Object(pairs) => pairs.iter().find(|(n, _)| n == name).map(|(_, value)| value),
@@ -32,7 +32,7 @@ impl Value {
     }
 }
 
-/// The value that a text is; `None` if it is none.
+/// Parses a text as a value; `None` if it is none.
 pub fn parse(text: &str) -> Option<Value> {
     let mut rest = text.chars().peekable();
     let value = value(&mut rest)?;
@@ -46,7 +46,7 @@ fn blanks(rest: &mut Rest) {
     while rest.next_if(|c| matches!(c, ' ' | '\t' | '\r' | '\n')).is_some() {}
 }
 
-/// The next character that is no blank is this one.
+/// Takes the next character that is not blank; `None` unless it is `c`.
 fn token(rest: &mut Rest, c: char) -> Option<()> {
     blanks(rest);
     rest.next_if_eq(&c).map(|_| ())

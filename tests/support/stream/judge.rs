@@ -1,4 +1,4 @@
-//! What is judged in a conversation: answers, and what real-time characters do to lines.
+//! Judges a conversation: its answers, and the effects of real-time characters on lines.
 
 use super::answer::Answer;
 use super::dialogue::{Dialogue, Outcome};
@@ -7,21 +7,21 @@ use super::ledger::{Cut, Sent};
 use super::lines::{AXES, Effect};
 use crate::side::Side;
 
-/// Bytes of answers that may have been on their way when their lines were killed: the ring, the response that is half sent, and what is
-/// said until the kill is seen.
+/// Bytes of answers that may have been on their way when their lines were killed: the ring, the response that is half
+/// sent, and what is sent until the kill is noticed.
 const UNDER_WAY: usize = 800;
-/// Lines that come within so many ms of a kill on the other port may be dropped, or not.
+/// Time around a kill on the other port within which lines may or may not be dropped, ms.
 const ABOUT_MS: u64 = 10;
-/// Characters of two writes make a flush within so many ms.
+/// Time within which two characters of separate writes make a flush, ms.
 const TOGETHER_MS: u64 = 30;
-/// How long a byte takes, ms.
+/// Time that a byte takes on the line, ms.
 const BYTE_MS: f64 = 0.0869;
-/// Steps in a mm, and how far off a position may be that is told to 0.001 mm.
+/// Steps in a mm, and the tolerance, in steps, of a position that is reported to 0.001 mm.
 const STEPS_MM: f64 = 1_280.0;
 const CLOSE: f64 = 1.2;
 
 impl<S: Side> Dialogue<S> {
-    /// Lines have been begun, from this number on.
+    /// Takes note that lines have been begun, from this number on.
     pub(super) fn begun(&mut self, port: usize, from: u32) {
         let (doubted, heard) = (self.now <= self.doubt, self.heard[port]);
         let ledger = &mut self.ports[port].ledger;
@@ -46,7 +46,7 @@ impl<S: Side> Dialogue<S> {
         }
     }
 
-    /// A real-time character has been sent.
+    /// Takes note that a real-time character has been sent.
     pub(super) fn acts(&mut self, port: usize, character: u8) {
         if b"~%\x04".contains(&character) {
             self.ports[port].break_line();
@@ -74,7 +74,7 @@ impl<S: Side> Dialogue<S> {
         }
     }
 
-    /// What has come on both ports may be dropped, or is.
+    /// Takes note that the lines on both ports may be dropped, or are dropped.
     pub(super) fn cut(&mut self, by: usize, cut: Cut) {
         let now = self.now;
         let mut goes_on = [false; AXES.len()];
@@ -83,7 +83,8 @@ impl<S: Side> Dialogue<S> {
             let (begun, led) = (port.has_begun(), port.has_only_led());
             let last = port.ledger.waiting.last().map(|sent| sent.id);
             port.ledger.cut(cut, self.heard[number], |sent| {
-                // One that has come in part, of JSON, may not be known as G-code yet; of the other port none may have come.
+                // A line of JSON of which a part has come may not be recognized as G-code yet. On the other port
+                // perhaps none of the line has come.
                 let partly = begun && Some(sent.id) == last;
                 let wrapped = led || sent.line.text.starts_with('{');
                 let late = number != by && (now - sent.begun < 2 || port.by_pin);
@@ -103,7 +104,7 @@ impl<S: Side> Dialogue<S> {
         self.doubt = self.doubt.max(now + ABOUT_MS);
     }
 
-    /// A line is answered.
+    /// Takes the answer to a line.
     pub(super) fn answer(&mut self, port: usize, answer: Answer) -> Outcome<()> {
         let sent = self.ports[port].ledger.answer(&answer)?;
         self.judge_status(port, &sent, &answer)?;
@@ -121,7 +122,7 @@ impl<S: Side> Dialogue<S> {
                 let drops = |sent: &Sent| sent.line.effect == Effect::Flush;
                 let more = self.ports.iter().any(|port| port.ledger.waiting.iter().any(drops));
                 self.doubt = if more { u64::MAX } else { self.now + ABOUT_MS };
-                // Lines that came behind it may have been dropped with it.
+                // Lines that came behind the flush may have been dropped with it.
                 self.course.doubt();
             }
             _ => {}
@@ -162,7 +163,7 @@ impl<S: Side> Dialogue<S> {
         if told == Some(&is) { Ok(()) } else { Err(format!("{name} is {is}, and {answer:?}")) }
     }
 
-    /// A question that is due has been answered in time.
+    /// Checks that a question that is due is answered in time.
     pub(super) fn check_due(&mut self, port: usize) -> Outcome<()> {
         let (heard, now) = (self.heard[port], self.now);
         let Some(sent) = self.ports[port].ledger.waiting.iter_mut().find(|sent| sent.due) else {
@@ -181,7 +182,8 @@ impl<S: Side> Dialogue<S> {
         Err(format!("{:?} on port {port} is not answered", sent.line.text))
     }
 
-    /// The lengths told are those of what was sent, and everybody who asked was told that somebody is there.
+    /// Checks that the reported lengths are those of what was sent, and that every port with an enquiry has got an
+    /// answer to it.
     pub(super) fn check_counts(&self) -> Outcome<()> {
         for (number, port) in self.ports.iter().enumerate() {
             if self.sums && !port.counts_right() {
@@ -194,7 +196,7 @@ impl<S: Side> Dialogue<S> {
         Ok(())
     }
 
-    /// Where the machine says that it is its motors are.
+    /// Checks that the motors are where the machine says.
     pub(super) fn check_position(&mut self) -> Outcome<()> {
         let answer = self.ask("mpo:n")?;
         let steps = self.side.steps();

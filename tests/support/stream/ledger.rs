@@ -16,18 +16,18 @@ pub enum Cut {
 pub struct Sent {
     pub id: u32,
     pub line: Line,
-    /// When its first byte was put on the line, ms.
+    /// Time at which its first byte was put on the line, ms.
     pub begun: u64,
-    /// Its last byte has been put on the line; and when that was.
+    /// Time at which its last byte was put on the line; `None` before that.
     pub ended: Option<u64>,
-    /// What its sender counts for it.
+    /// Number of bytes that its sender counts for it.
     pub bytes: usize,
     pub cut: Cut,
-    /// It moves as others of this stretch do.
+    /// The epoch of [`Course`](super::course::Course) in which it moves.
     pub epoch: u32,
-    /// How many bytes the port had heard when it was dropped, and when it ended.
+    /// Number of bytes that the port had heard when the line was dropped or when it ended.
     pub heard: usize,
-    /// Its answer is due at once, unless the sender has held it back.
+    /// Whether its answer is due at once. It is not if the sender has held the answer back.
     pub due: bool,
 }
 
@@ -37,29 +37,29 @@ impl Sent {
     }
 }
 
-/// All of them, in the order in which they were sent.
+/// All lines that wait, in the order in which they were sent.
 #[derive(Default)]
 pub struct Ledger {
     pub waiting: Vec<Sent>,
 }
 
 impl Ledger {
-    /// Bytes without answers.
+    /// Number of bytes in lines without answers.
     pub fn bytes(&self) -> usize {
         self.waiting.iter().map(|sent| sent.bytes).sum()
     }
 
-    /// Lines without answers.
+    /// Number of lines without answers.
     pub fn lines(&self) -> usize {
         self.waiting.len()
     }
 
-    /// Whether a question would be the only one of its port.
+    /// Whether only lines of G-code wait, so that a question may be asked.
     pub fn may_ask(&self) -> bool {
         self.waiting.iter().all(Sent::is_data)
     }
 
-    /// Lines of G-code so far may be dropped.
+    /// Takes note that the lines of G-code so far may be dropped; `is_gone` limits that for each line.
     pub fn cut(&mut self, cut: Cut, heard: usize, is_gone: impl Fn(&Sent) -> Cut) {
         for sent in self.waiting.iter_mut().filter(|sent| sent.is_data()) {
             let cut = if is_gone(sent) < cut { is_gone(sent) } else { cut };
@@ -69,11 +69,12 @@ impl Ledger {
         }
     }
 
-    /// The line that an answer is for. The error is why there can be none, or not now.
+    /// Removes and returns the line that an answer is for. The error says why there can be no such answer, or not
+    /// now.
     pub fn answer(&mut self, answer: &Answer) -> Result<Sent, String> {
         let at = match answer.id {
             Some(id) => self.waiting.iter().position(|sent| sent.id == id),
-            // What has been dropped, or was too long, does not say.
+            // The answer to a line that was dropped or too long has no number.
             None => self.waiting.iter().position(Sent::is_data).filter(|at| {
                 let sent = &self.waiting[*at];
                 sent.line.too_long || sent.cut != Cut::No

@@ -1,38 +1,39 @@
-//! The lines of a stream. Each is made when its first byte is put on the line, and has a number that comes back.
+//! The lines of a stream. A line is made when its first byte is put on the line. It has a number that comes back in
+//! its answer.
 
 /// What a line does.
 #[derive(Clone, Debug)]
 pub enum What {
-    /// Moves by so many [`CELL`]s at a feed, mm/min; 0 is a traverse.
+    /// Moves by so many [`CELL`]s at a feed, mm/min; 0 means a traverse.
     Move(i8, u16),
     /// A move in JSON (`gc`), with its number (`tid`) before the block or behind it.
     Wrapped(i8, u16, bool),
     /// Waits, ms.
     Dwell(u16),
-    /// Another block.
+    /// Another block of G-code.
     Block(&'static str),
-    /// Reads something: pairs of JSON.
+    /// Reads values: pairs of JSON.
     Read(&'static str),
-    /// Asks what the machine does, and is to be answered at once.
+    /// Asks for the state of the machine, and must be answered at once.
     Ask,
     /// Sets a value of the port's own, or reads it.
     Set(u16),
     Get,
-    /// Drops what is queued; begins an alarm; ends one.
+    /// Drops what is queued; begins an alarm; ends an alarm.
     Flush,
     Alarm,
     Clear,
-    /// Is longer than a line may be.
+    /// A line that is longer than allowed.
     TooLong(u8),
 }
 
-/// A line to be.
+/// A line that is yet to be made.
 #[derive(Clone, Debug)]
 pub struct Template {
     pub what: What,
-    /// Its length, if there is room for comments or blanks.
+    /// Its length, which comments or blanks fill up.
     pub len: u8,
-    /// Blanks before it, and how it ends.
+    /// Number of blanks before it.
     pub lead: u8,
     pub end: End,
 }
@@ -43,7 +44,7 @@ pub enum End {
     Feed,
     Return,
     Both,
-    /// With an empty line behind it.
+    /// A line feed, and an empty line behind it.
     Empty,
 }
 
@@ -58,22 +59,22 @@ impl End {
     }
 }
 
-/// How a line goes through the machine.
+/// The order in which the machine handles a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kind {
-    /// In order.
+    /// In the order in which lines come.
     Data,
-    /// It overtakes data wherever it is.
+    /// The line overtakes data wherever it waits.
     Short,
-    /// It overtakes data in the pool.
+    /// The line overtakes data in the pool only.
     Long,
 }
 
-/// What an answer of 0 says that the line has done.
+/// What a line has done if its answer is 0.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Effect {
     None,
-    /// An axis has moved, or will, by so many steps.
+    /// An axis has moved, or will move, by so many steps.
     Move(usize, i64),
     /// A spindle turns.
     Spindle,
@@ -91,24 +92,24 @@ pub struct Line {
     pub text: String,
     pub kind: Kind,
     pub effect: Effect,
-    /// It may be refused as too long.
+    /// Whether it may be refused as too long.
     pub too_long: bool,
 }
 
-/// What moves are multiples of, steps and mm.
+/// The unit of moves, in steps and in mm.
 pub const CELL: (i64, f64) = (32, 0.025);
 pub const AXES: [&str; 3] = ["x", "y", "z"];
-/// Longest line of each port, on the second as its ring has room for, and longest that overtakes wherever it is.
+/// Longest line of each port (on the second, its ring limits it), and longest line that overtakes wherever it waits.
 pub const LONGEST: [usize; 2] = [254, 60];
 pub const SHORT: [usize; 2] = [40, 16];
 
 impl Template {
-    /// A line of natural length.
+    /// A template of natural length.
     pub fn plain(what: What) -> Self {
         Self { what, len: 0, lead: 0, end: End::Feed }
     }
 
-    /// The line of a port, with its number; what moves is an axis.
+    /// Returns the line for a port, with its number; moves move `axis`.
     pub fn line(&self, port: usize, id: u32, axis: usize) -> Line {
         let block = |way: i8, feed: u16| {
             let way = f64::from(way) * CELL.1;
@@ -142,7 +143,7 @@ impl Template {
             What::Flush => (format!("{{qf:1,tid:{id}}}"), Effect::Flush),
             What::Alarm => (format!("{{alarm:1,tid:{id}}}"), Effect::Alarm),
             What::Clear => (format!("{{clear:n,tid:{id}}}"), Effect::Clear),
-            // The second port's ring has no room for one.
+            // The second port's ring has no room for a line that is too long.
             What::TooLong(_) if port == 1 => (format!("N{id} (too long)"), Effect::None),
             What::TooLong(more) => {
                 let pad = "x".repeat(LONGEST[port] + 1 + usize::from(*more % 40));
@@ -162,7 +163,7 @@ impl Template {
     }
 }
 
-/// The line made longer, by a comment or by blanks.
+/// Returns the line, made longer by a comment or by blanks.
 fn pad(text: String, len: usize) -> String {
     let more = len.saturating_sub(text.len());
     match text.split_at(1) {

@@ -1,4 +1,4 @@
-//! What a conversation of two streams is made of.
+//! The random actions of a conversation of two streams.
 
 use proptest::prelude::*;
 use proptest::sample::select;
@@ -8,11 +8,11 @@ use super::lines::{End, Template, What};
 /// How a sender knows how much it may send.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Count {
-    /// Up to four lines without answers.
+    /// It has up to four lines without answers.
     Lines,
-    /// So many characters without answers.
+    /// It has up to a number of characters without answers.
     Characters,
-    /// As long as the machine does not stop it, by characters or pins.
+    /// It sends as long as the machine does not stop it, by characters or pins.
     Flow,
 }
 
@@ -22,46 +22,46 @@ pub struct Setup {
     /// The port that most of the G-code comes from.
     pub main: usize,
     pub counts: [Count; 2],
-    /// Bytes that are left free for questions and real-time characters.
+    /// Bytes that are kept free for questions and real-time characters.
     pub margin: usize,
-    /// Bytes that a sender still sends when it has been stopped.
+    /// Bytes that a sender still sends after it has been stopped.
     pub late: usize,
     pub ex: u8,
     pub rxm: u8,
     pub sv: u8,
     pub ec: u8,
     pub jv: u8,
-    /// How long before its wrap the count of milliseconds begins, where each conversation has a machine of its own.
+    /// How long before its wrap the count of milliseconds begins, if each conversation has a machine of its own.
     #[allow(dead_code)]
     pub wrap: u16,
 }
 
-/// One thing that is done.
+/// One action of a conversation.
 #[derive(Clone, Debug)]
 pub enum Op {
-    /// Lines for the stream of the main port, or the other.
+    /// Lines for the stream of the main port (true) or of the other.
     Feed(bool, Vec<Template>),
-    /// Characters in the stream of a port, after so many of its bytes.
+    /// Characters in the stream of a port, after so many more bytes of the stream.
     Characters(usize, &'static [u8], u8),
-    /// The sender of a port stops the machine's answers, or lets them come.
+    /// The sender of a port stops the machine's answers (true) or lets them come.
     Hold(usize, bool),
     /// A question, between two lines.
     Ask(usize),
     /// Time passes, ms.
     Wait(u16),
-    /// All is answered, and the machine at rest.
+    /// Waits until all lines are answered and the machine is at rest.
     Rest,
 }
 
-/// How long a conversation takes.
+/// The size of a conversation.
 #[derive(Clone, Copy, Debug)]
 pub struct Scale {
-    /// Most ops, and most lines of one.
+    /// Most actions, and most lines of an action.
     pub ops: usize,
     pub lines: usize,
     /// Longest wait, ms.
     pub wait: u16,
-    /// Longest before the wrap, ms; 0 if there is none.
+    /// Longest time before the wrap, ms; 0 for no wrap.
     pub wrap: u16,
 }
 
@@ -124,7 +124,7 @@ fn template() -> impl Strategy<Value = Template> {
     (what(), len, lead, end).prop_map(|(what, len, lead, end)| Template { what, len, lead, end })
 }
 
-/// Pairs to read, of short answers and long ones.
+/// Pairs to read, with short answers and long ones.
 const READ: &[&str] = &[
     "xvm:n",
     "posx:n",

@@ -1,4 +1,4 @@
-//! A sender: lines that it is to send, and what it may put on the line now.
+//! A sender: the lines that it has to send, and what it may put on the line now.
 
 use std::collections::VecDeque;
 
@@ -6,10 +6,11 @@ use super::ledger::{Cut, Ledger, Sent};
 use super::lines::{Effect, End, Kind, Line, Template, What};
 use super::ops::{Count, Setup};
 
-/// Bytes that arrive in a ms, at most.
+/// Most bytes that arrive in a ms.
 pub const BYTES_MS: usize = 11;
-/// What may wait for answers: lines, and bytes of them on each port. A line counter's, and those of who counts characters. The reader
-/// may not have a turn for 6 ms, in which more come on the second port than its ring has room for.
+/// What may wait for answers: the lines of a sender that counts lines, and the bytes on each port of such a sender
+/// and of one that counts characters. The reader may have no turn for 6 ms, in which more bytes come on the second
+/// port than its ring has room for.
 const LINES: usize = 4;
 const BYTES: [usize; 2] = [587, 62];
 const CHARACTERS: [usize; 2] = [254, 62];
@@ -25,47 +26,48 @@ pub struct Port {
     pub count: Count,
     margin: usize,
     late: usize,
-    /// How it may hold the machine back.
+    /// Whether it may hold the machine back by XOFF, and whether by the pin.
     by_characters: bool,
     pub by_pin: bool,
     pub queue: VecDeque<Template>,
-    /// Characters that go after so many bytes.
+    /// Characters to be inserted, each after so many further bytes.
     pub inserts: VecDeque<(usize, &'static [u8])>,
-    /// A question is to be asked.
+    /// Whether a question is to be asked.
     pub asks: bool,
-    /// What is left of the line that is being sent.
+    /// The rest of the line that is being sent.
     rest: VecDeque<u8>,
     pub ledger: Ledger,
-    /// It has stopped the machine.
+    /// Whether it holds the machine's answers back.
     pub holds: bool,
-    /// The machine has stopped it, by characters or by the pin; and how many bytes it has yet to send before it heeds that.
+    /// Whether the machine has stopped it by XOFF, and whether by the pin. `grace` is the number of bytes that it
+    /// still sends before it obeys XOFF.
     stopped: bool,
     stopped_by_pin: bool,
-    /// Ms since then: what it had sent before has arrived.
+    /// Number of ms since the pin let it go on. After some ms all that it had sent before has arrived.
     since_pin: usize,
     grace: usize,
-    /// Characters of which the place counts, since all was answered.
+    /// Number of characters, since all lines were answered, that keep their place among the lines.
     placed: usize,
-    /// Its last line has an end of two bytes, of which the second counts with the next.
+    /// 1 if its last line has an end of two bytes, whose second byte counts with the next line.
     carry: usize,
-    /// Bytes that it has counted, and that the machine has; and how many of them may count with a line that is yet to come,
-    /// for they were before one that overtakes.
+    /// Bytes that the sender and the machine have counted. `slack` of them may count with a line that is yet to come,
+    /// because they stood before a line that overtakes.
     pub counted: [usize; 2],
     slack: usize,
     before: usize,
-    /// Lines of G-code that have been sent.
+    /// Whether lines of G-code have been sent.
     pub fed: bool,
-    /// How many times it has asked whether anybody is there.
+    /// How many times it has sent the enquiry whether anybody is there.
     pub enquiries: usize,
 }
 
-/// What has been put on the line.
+/// What a sender puts on the line.
 pub enum Put {
-    /// Nothing more goes now.
+    /// Nothing more can be sent now.
     Nothing,
-    /// Bytes.
+    /// Bytes of lines.
     Bytes(Vec<u8>),
-    /// Characters.
+    /// Real-time characters.
     Characters(&'static [u8]),
 }
 
@@ -98,10 +100,10 @@ impl Port {
         }
     }
 
-    /// Goes on so.
+    /// Applies the setup of a conversation.
     pub fn set_up(&mut self, setup: &Setup) {
         self.count = setup.counts[self.number];
-        // XOFF comes too late for the second port's ring.
+        // Flow control needs the matching `ex`. On the second port XOFF comes too late for the ring.
         let has_flow = setup.ex == 1 + self.number as u8;
         if self.count == Count::Flow && !has_flow {
             self.count = Count::Lines;
@@ -112,12 +114,13 @@ impl Port {
         self.by_pin = setup.ex == 2 && self.number == 1;
     }
 
-    /// Nothing is left to be sent.
+    /// Whether nothing is left to be sent.
     pub fn is_done(&self) -> bool {
         self.queue.is_empty() && self.inserts.is_empty() && self.rest.is_empty() && !self.asks
     }
 
-    /// Stops the machine's answers, or lets them come: what to put on the line for it, or the level of the pin.
+    /// Stops the machine's answers, or lets them come. Returns what must be put on the line for that, or the level of
+    /// the pin.
     pub fn hold(&mut self, holds: bool) -> (&'static [u8], Option<bool>) {
         if !self.by_characters && !self.by_pin {
             return (b"", None);
@@ -133,7 +136,7 @@ impl Port {
         }
     }
 
-    /// Takes what stops it, or lets it go on, out of what has come.
+    /// Removes XOFF and XON from the bytes that have come, and obeys them.
     pub fn heed(&mut self, bytes: &mut Vec<u8>) {
         for byte in bytes.iter().filter(|byte| matches!(**byte, XOFF | XON)) {
             if *byte == XOFF && !self.stopped {
@@ -144,7 +147,7 @@ impl Port {
         bytes.retain(|byte| !matches!(*byte, XOFF | XON));
     }
 
-    /// The machine stops it by the pin, or not. A question may be on its way then.
+    /// Takes note whether the machine stops it by the pin. A question that is on its way is then no longer due.
     pub fn stop_by_pin(&mut self, stopped: bool) {
         self.stopped_by_pin = stopped;
         self.since_pin = if stopped { 0 } else { self.since_pin + 1 };
@@ -153,7 +156,7 @@ impl Port {
         }
     }
 
-    /// Whether flow control lets it send a byte.
+    /// Whether flow control allows it to send a byte.
     fn flows(&self) -> bool {
         let stopped =
             self.count == Count::Flow && (self.stopped_by_pin || self.stopped && self.grace == 0);
@@ -176,12 +179,13 @@ impl Port {
         fits && self.flows() && (self.count != Count::Lines || self.ledger.lines() < LINES)
     }
 
-    /// Whether so many bytes more are in order that are no line of the stream.
+    /// Whether there is room for so many bytes that are no line of the stream.
     fn has_margin(&self, bytes: usize) -> bool {
         self.count == Count::Flow || self.ledger.bytes() + self.placed + bytes <= self.limit()
     }
 
-    /// Puts something on the line, so many bytes at most. `id` is the number of the next line, which moves an axis.
+    /// Puts something on the line, at most `most` bytes. `id` is the number of the next line, and `axis` the axis
+    /// that it moves.
     pub fn put(&mut self, most: usize, now: u64, id: &mut u32, axis: usize, epoch: u32) -> Put {
         if self.ledger.waiting.is_empty() {
             self.placed = 0;
@@ -195,7 +199,8 @@ impl Port {
             if due || !self.has_more(now, id, axis, epoch) {
                 let blocked = bytes.is_empty();
                 match self.inserts.front() {
-                    // Those behind the pin do not go; nor may they be stopped half-way.
+                    // Characters are not sent while the pin has stopped the sender or released it only just, nor
+                    // where the pin could stop them half-way.
                     Some(_) if self.by_pin && (self.since_pin < 4 || most < BYTES_MS) => break,
                     Some((_, characters)) if blocked => {
                         let characters = *characters;
@@ -223,10 +228,10 @@ impl Port {
         if bytes.is_empty() { Put::Nothing } else { Put::Bytes(bytes) }
     }
 
-    /// Whether characters may go: those of which the place counts take room.
+    /// Whether characters may be sent. Characters that keep their place among the lines need room.
     fn may_place(&mut self, characters: &[u8]) -> bool {
         let placed = characters.iter().filter(|byte| b"~%\x04".contains(byte)).count();
-        // Behind the pin they may come much later than they were sent.
+        // With the pin they may arrive much later than they were sent.
         let may = placed == 0 || !self.by_pin && self.has_margin(placed);
         if may {
             self.placed += placed;
@@ -235,10 +240,10 @@ impl Port {
         may
     }
 
-    /// Whether a byte of a line may go now; begins with the next line if so.
+    /// Whether a byte of a line may be sent now. Begins the next line if the present one is finished.
     fn has_more(&mut self, now: u64, id: &mut u32, axis: usize, epoch: u32) -> bool {
         if !self.rest.is_empty() {
-            // A question goes on to its end: the ring of USB has room for it.
+            // A question is sent to its end: the ring of USB has room for it.
             let asks = || self.ledger.waiting.last().is_some_and(|sent| sent.due);
             return self.flows() || self.number == 0 && asks();
         }
@@ -250,7 +255,7 @@ impl Port {
                 self.begin(&Template::plain(What::Ask), now, id, axis, epoch);
                 return true;
             }
-            // There is no room for it, or another one is on its way.
+            // The question is given up if there is no room for it or another question is on its way.
             self.asks &= may && waits;
         }
         let Some(next) = self.queue.front() else { return false };
@@ -285,7 +290,8 @@ impl Port {
         self.ledger.waiting.push(sent);
     }
 
-    /// A character of which the place counts stands in the line that is being sent: it does not overtake where it waits.
+    /// Takes note of a character that keeps its place within the line that is being sent. The line then overtakes
+    /// only in the pool.
     pub fn break_line(&mut self) {
         if self.has_only_led() {
             return;
@@ -298,19 +304,19 @@ impl Port {
         }
     }
 
-    /// Of the line that is being sent nothing but blanks before it has gone.
+    /// Whether only the blanks before the line that is being sent have been sent.
     pub fn has_only_led(&self) -> bool {
         let text = self.ledger.waiting.last().map_or("", |sent| &sent.line.text);
         self.rest.len() > text.len() && self.rest.front() == text.as_bytes().first()
             || self.rest.front() == Some(&b' ') && self.rest.len() > text.len() + 1
     }
 
-    /// Bytes of the line that is being sent that have gone, if there is one.
+    /// Whether a line has been begun and is not sent to its end.
     pub fn has_begun(&self) -> bool {
         !self.rest.is_empty()
     }
 
-    /// Puts a line of its own on the line, whatever there is: nothing waits.
+    /// Begins a line of the dialogue itself at once. No other line may wait.
     pub fn own(&mut self, id: u32, text: &str, now: u64) {
         let line = Line {
             text: text.to_string(),
@@ -321,17 +327,17 @@ impl Port {
         self.start(id, line, 0, End::Feed, now, 0);
     }
 
-    /// Nothing waits to be sent, or to be answered.
+    /// Whether nothing waits to be sent or to be answered.
     pub fn is_idle(&self) -> bool {
         self.is_done() && self.ledger.waiting.is_empty()
     }
 
-    /// Counts anew: what has been counted and belongs to no line yet may come on top.
+    /// Begins a new count. Bytes that were counted but belong to no line yet may come on top.
     pub fn count_anew(&mut self) {
         (self.counted, self.before) = ([0; 2], self.slack + self.carry);
     }
 
-    /// Whether all that was sent has been told, but for what counts with a line to come.
+    /// Whether the machine has counted all bytes that were sent, except those that count with a line to come.
     pub fn counts_right(&self) -> bool {
         let [sent, told] = self.counted;
         (sent.saturating_sub(self.slack)..=sent + self.before).contains(&told)

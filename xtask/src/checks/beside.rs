@@ -1,4 +1,4 @@
-//! A command of this program that runs beside the stages, in a process of its own.
+//! Runs a command of this program beside the stages, in a process of its own.
 
 use std::fs::{self, File};
 use std::path::PathBuf;
@@ -8,7 +8,8 @@ use anyhow::{Context, Result, ensure};
 
 use crate::process::{root, shown};
 
-/// What it prints goes to a file, and is shown once it has ended: in between it would tear what the stages print.
+/// A command that runs beside the stages. Its output goes to a file and is shown when it has ended, because it would
+/// otherwise mix with the output of the stages.
 pub struct Beside {
     command: Command,
     child: Child,
@@ -16,7 +17,7 @@ pub struct Beside {
 }
 
 impl Beside {
-    /// Starts this program with arguments.
+    /// Starts this program with arguments, in the background.
     pub fn start(arguments: &[&str]) -> Result<Self> {
         let folder = root().join("target/tmp");
         fs::create_dir_all(&folder)?;
@@ -28,7 +29,7 @@ impl Beside {
         Ok(Self { command, child, output })
     }
 
-    /// Waits for its end, and shows what it printed.
+    /// Waits until the command ends, and shows its output.
     pub fn wait(mut self) -> Result<()> {
         let status = self.child.wait()?;
         print!("{}", String::from_utf8_lossy(&fs::read(&self.output)?));
@@ -38,7 +39,8 @@ impl Beside {
 }
 
 impl Drop for Beside {
-    /// A stage has failed. A compiler that the command has started ends by itself; a command that has ended is not there any more.
+    /// Runs when a stage has failed. A compiler that the command has started ends by itself, and an error means that
+    /// the command has ended already.
     fn drop(&mut self) {
         let _ = self.child.kill();
         let _ = self.child.wait();

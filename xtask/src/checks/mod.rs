@@ -21,13 +21,13 @@ use crate::setup::{self, Scope};
 use crate::sim;
 use crate::size;
 
-/// A check and what it is called.
+/// A check and its name.
 struct Stage {
     name: &'static str,
     run: fn() -> Result<()>,
 }
 
-/// What needs no image. Images are built beside it: most of that time is a link, which takes one core.
+/// Stages that need no image. Images are built beside them: most of that time is a link, which takes one core.
 const WITHOUT_IMAGES: &[Stage] = &[
     Stage { name: "format", run: format },
     Stage { name: "lints", run: lints },
@@ -36,7 +36,8 @@ const WITHOUT_IMAGES: &[Stage] = &[
     Stage { name: "tests of simulated boards, built", run: build_simulator_tests },
 ];
 
-/// What needs the images. Senders are installed beside it, which is mostly a network's time, and the page is built.
+/// Stages that need the images. Beside them the senders are installed, which mostly waits for the network, and the
+/// page is built.
 const WITH_IMAGES: &[Stage] = &[
     Stage { name: "an image without capabilities", run: without_capabilities },
     Stage { name: "sizes and stack of every board", run: size_all },
@@ -44,11 +45,11 @@ const WITH_IMAGES: &[Stage] = &[
     Stage { name: "simulated and emulated boards", run: simulator_tests },
 ];
 
-/// What of all packages together is tested without an image.
+/// Test targets, of all packages together, that need no image.
 const HOST_TARGETS: [&str; 8] =
     ["--lib", "--bins", "--test", "host", "--test", "capabilities", "--test", "seeds"];
 
-/// What is tested on simulated and emulated boards.
+/// Test targets that run on simulated and emulated boards.
 const BOARD_TARGETS: [&str; 2] = ["--test", "chip"];
 
 /// Runs all checks; stops at the first that fails.
@@ -71,7 +72,7 @@ pub fn run() -> Result<()> {
     Ok(())
 }
 
-/// Runs a stage between its name and the time it took.
+/// Runs a stage. Prints its name before it and its time after it.
 fn stage(name: &str, run: impl FnOnce() -> Result<()>) -> Result<()> {
     println!("\n=== {name} ===");
     let start = Instant::now();
@@ -94,7 +95,7 @@ fn lints() -> Result<()> {
     Ok(())
 }
 
-/// The documentation of the source is made without a warning.
+/// Builds the documentation of the source; a warning is an error.
 fn documentation() -> Result<()> {
     let mut doc = host_cargo();
     doc.current_dir(root()).env("RUSTDOCFLAGS", "-D warnings");
@@ -103,8 +104,8 @@ fn documentation() -> Result<()> {
     run_child(doc.args(["doc", "--no-deps", "--document-private-items"]).args(packages))
 }
 
-/// Whether cargo has this subcommand; rustup may have to bring it first. Without rustup and
-/// without the component the stage is skipped, and says so.
+/// Whether cargo has this subcommand; rustup may have to install the component first. Without rustup and without the
+/// component a message says that the stage is skipped.
 fn has_component(subcommand: &str, component: &str) -> bool {
     let there = || probe(host_cargo().args([subcommand, "--version"])).is_some();
     if !there() && which("rustup").is_some() {
@@ -117,8 +118,8 @@ fn has_component(subcommand: &str, component: &str) -> bool {
     found
 }
 
-/// With what the fuzzers do, done once, with what the page is made of and what simulates, and with the firmware without capabilities,
-/// which refuses what it lacks.
+/// Runs the tests on the host: with the fuzzers' checks, done once; with the crates that make the page and that
+/// simulate; and with the firmware without capabilities, which must refuse what it lacks.
 fn host_tests() -> Result<()> {
     run_child(&mut tests(&HOST_TARGETS))?;
     run_child(&mut tests(&["--doc"]))?;
@@ -126,10 +127,10 @@ fn host_tests() -> Result<()> {
     cargo(&[&["test", "--package", "kerf", "--test", "capabilities"], &features[..]].concat())
 }
 
-/// What capabilities take of the flash, bytes, at the least: a check that leaving them out does leave them out.
+/// Least number of bytes of flash that capabilities take. It checks that leaving them out does leave them out.
 const CAPABILITIES: u64 = 8_000;
 
-/// The image without capabilities, which is built with the others, is smaller.
+/// Checks that the image without capabilities, which is built with the others, is smaller.
 fn without_capabilities() -> Result<()> {
     let board = Board::Ramps14;
     let flash = |elf: &Path| anyhow::Ok(elf::Image::load(elf)?.sizes.flash);
@@ -146,19 +147,20 @@ fn size_all() -> Result<()> {
     })
 }
 
-/// With the simulator's program, which some of them run.
+/// Builds the simulator's program, which some tests run, and the tests.
 fn build_simulator_tests() -> Result<()> {
     sim::build()?;
     run_child(tests(&BOARD_TARGETS).arg("--no-run"))
 }
 
-/// With those on the emulated chip, which are ignored where there may be no emulator.
+/// Runs the tests on boards, including those on the emulated chip, which are ignored by default because they need the
+/// emulator.
 fn simulator_tests() -> Result<()> {
     run_child(tests(&BOARD_TARGETS).args(["--", "--include-ignored"]))
 }
 
-/// What builds these tests and runs them. Of all packages together, even where few are chosen: the features of what they share are those
-/// of all, and it is compiled once.
+/// Returns the command that builds and runs these tests. It names all packages even where few are tested, because
+/// shared dependencies then have the same features and are compiled once.
 fn tests(targets: &[&str]) -> Command {
     let mut test = host_cargo();
     test.current_dir(root()).env("KERF_ELF_DIR", firmware::directory());

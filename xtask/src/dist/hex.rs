@@ -1,22 +1,22 @@
-//! From an image to Intel HEX, which avrdude takes: what of it lies in flash.
+//! Converts the part of an image that lies in flash to Intel HEX, which avrdude takes.
 
 use anyhow::{Context, Result, ensure};
 use object::Endianness;
 use object::read::elf::{ElfFile32, ProgramHeader};
 
-/// From here up addresses mean RAM, EEPROM and fuses.
+/// From this address up, addresses mean RAM, EEPROM and fuses.
 const FLASH_END: u64 = 0x4_0000;
 /// Bytes in a record.
 const RECORD: usize = 16;
 
-/// The parts of an image that are written to flash, each with its address.
+/// Returns the parts of an image that are written to flash, each with its address.
 fn parts(elf: &[u8]) -> Result<Vec<(u64, Vec<u8>)>> {
     let file = ElfFile32::<Endianness>::parse(elf).context("not an ELF of 32 bits")?;
     let endian = file.endian();
     let mut parts = Vec::new();
     for header in file.elf_program_headers() {
         let data = header.data(endian, elf).map_err(|()| anyhow::anyhow!("a part is cut off"))?;
-        // The load address: that of initial values is in flash, behind the code.
+        // The load address: initial values of RAM are stored in flash, behind the code.
         let address = u64::from(header.p_paddr(endian));
         if header.p_type(endian) == object::elf::PT_LOAD && !data.is_empty() && address < FLASH_END
         {
@@ -27,7 +27,7 @@ fn parts(elf: &[u8]) -> Result<Vec<(u64, Vec<u8>)>> {
     Ok(parts)
 }
 
-/// A record: its length, address, kind, bytes and checksum.
+/// Returns a record: its length, address, kind, bytes and checksum.
 fn record(address: u16, kind: u8, bytes: &[u8]) -> String {
     let [high, low] = address.to_be_bytes();
     let all = [&[bytes.len() as u8, high, low, kind], bytes].concat();
@@ -36,7 +36,7 @@ fn record(address: u16, kind: u8, bytes: &[u8]) -> String {
     format!(":{digits}\n")
 }
 
-/// The image as Intel HEX.
+/// Converts an image to Intel HEX.
 pub fn of_elf(elf: &[u8]) -> Result<String> {
     Ok(of_parts(&parts(elf)?))
 }
@@ -49,7 +49,7 @@ fn of_parts(parts: &[(u64, Vec<u8>)]) -> String {
             let address = start + at as u64;
             if address >> 16 != upper {
                 upper = address >> 16;
-                // The upper 16 bits of the addresses that follow.
+                // This record has the upper 16 bits of the addresses that follow.
                 text += &record(0, 4, &(upper as u16).to_be_bytes());
             }
             // No record crosses a boundary of 64 KiB.

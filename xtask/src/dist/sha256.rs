@@ -1,11 +1,12 @@
-//! SHA-256 (FIPS 180-4), for checksums of files: not worth a dependency.
+//! SHA-256 (FIPS 180-4), for checksums of files. It is too small to be worth a dependency.
 
 /// Fractional parts of the square roots of the first eight primes.
 const START: [u32; 8] = [
     0x6a09e667, 0xbb67ae85, 0x3c6ef372, 0xa54ff53a, 0x510e527f, 0x9b05688c, 0x1f83d9ab, 0x5be0cd19,
 ];
 
-/// The fractional part of the cube root of `n`, as 32 bits: the integer cube root of `n * 2^96`, without what is before the point.
+/// Returns the fractional part of the cube root of `n`, as 32 bits: the integer cube root of `n * 2^96`, without its
+/// integer part.
 fn cube_root_bits(n: u128) -> u32 {
     let (mut low, mut high) = (0u128, 1 << 36);
     while high - low > 1 {
@@ -15,7 +16,7 @@ fn cube_root_bits(n: u128) -> u32 {
     low as u32
 }
 
-/// The constants of the rounds, of the first 64 primes.
+/// Returns the constants of the rounds, from the first 64 primes.
 fn constants() -> [u32; 64] {
     let is_prime = |n: &u128| (2..*n).take_while(|d| d * d <= *n).all(|d| !n.is_multiple_of(d));
     let mut primes = (2u128..).filter(is_prime);
@@ -50,7 +51,7 @@ fn block(state: &mut [u32; 8], bytes: &[u8], constants: &[u32; 64]) {
     }
 }
 
-/// The checksum, as 64 hexadecimal digits.
+/// Returns the checksum, as 64 hexadecimal digits.
 pub fn hexadecimal(bytes: &[u8]) -> String {
     let mut all = bytes.to_vec();
     all.push(0x80);

@@ -1,16 +1,16 @@
 //! Refuses an image with slow or wrong arithmetic in it.
 //!
-//! avr-libc's and libgcc's hand-written routines win only while they come before
-//! `compiler_builtins` in link order. When that is lost everything still works, five times slower.
-//! `i32::checked_mul` and its like call `__mulosi4`, to which the compiler passes the place of a C `int` for the
-//! overflow. That has 16 bits on AVR, and `compiler_builtins` writes 32: over whatever lies behind it on
-//! the stack, such as the caller's frame pointer.
+//! The hand-written routines of avr-libc and libgcc are used only while these libraries come before
+//! `compiler_builtins` in link order. If that order is lost everything still works, but five times slower.
+//! `i32::checked_mul` and similar functions call `__mulosi4`, to which the compiler passes the address of a C `int`
+//! for the overflow flag. A C `int` has 16 bits on AVR, but `compiler_builtins` writes 32 bits, and so overwrites
+//! what lies behind it on the stack, such as the caller's frame pointer.
 
 use anyhow::{Result, ensure};
 
 use super::Image;
 
-/// Fails when the image contains Rust's soft float, any `f64` or 128-bit arithmetic, or what overwrites the
+/// Fails when the image contains Rust's soft float, any `f64` or 128-bit arithmetic, or a routine that overwrites the
 /// stack.
 pub fn check(image: &Image) -> Result<()> {
     let found: Vec<_> = image.named(is_forbidden).map(|s| format!("  {}", s.name)).collect();

@@ -17,7 +17,7 @@ pub struct Insn {
     pub op: String,
     /// The operands, such as `r28, 0x10`.
     pub args: Vec<String>,
-    /// Where a jump, branch or call goes.
+    /// The target of a jump, branch or call.
     pub target: Option<u32>,
 }
 
@@ -35,7 +35,7 @@ impl Code {
         Ok(Code::parse(&process::output(objdump.args(["-d", "--no-show-raw-insn"]).arg(elf))?))
     }
 
-    /// Reads the listing.
+    /// Parses the listing.
     pub fn parse(listing: &str) -> Code {
         let insns: Vec<_> = listing.lines().filter_map(parse_line).collect();
         let index = insns.iter().enumerate().map(|(i, insn)| (insn.address, i)).collect();
@@ -58,7 +58,7 @@ impl Code {
     }
 }
 
-/// `  fc:\tcall\t0x142\t; 0x142 <__bad_interrupt>`
+/// Parses a line such as `  fc:\tcall\t0x142\t; 0x142 <__bad_interrupt>`.
 fn parse_line(line: &str) -> Option<Insn> {
     let (address, rest) = line.split_once(":\t")?;
     let address = u32::from_str_radix(address.trim(), 16).ok()?;
@@ -73,13 +73,13 @@ fn goes_somewhere(op: &str) -> bool {
     matches!(op, "jmp" | "rjmp" | "call" | "rcall") || op.starts_with("br") && op != "break"
 }
 
-/// The comment has the address, except for `call 0` and `jmp 0`.
+/// Returns the target address, which is in the comment, except for `call 0` and `jmp 0`.
 fn target(args: &[String], comment: &str) -> Option<u32> {
     let word = comment.split_whitespace().next().or(args.last().map(String::as_str))?;
     number(word)
 }
 
-/// `0x1f` or `31`.
+/// Parses `0x1f` or `31`.
 pub fn number(word: &str) -> Option<u32> {
     match word.strip_prefix("0x") {
         Some(hex) => u32::from_str_radix(hex, 16).ok(),

@@ -1,7 +1,7 @@
-//! What one function does to the stack: its instructions are followed along every branch.
+//! Finds what one function does to the stack, by following its instructions along every branch.
 //!
-//! A jump into another function (a tail call) is followed like any other jump, so that only
-//! calls remain as edges of the call graph.
+//! A jump into another function (a tail call) is followed like any other jump. So the call graph needs edges for
+//! calls only.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::ops::Range;
@@ -11,35 +11,35 @@ use super::disasm::{Code, Insn, number};
 /// A call pushes three bytes on a chip with more than 128 KiB of flash.
 pub const RETURN_ADDRESS: u32 = 3;
 
-/// Deeper than this means a loop that pushes.
+/// A depth beyond this means a loop that pushes.
 const BOTTOMLESS: u32 = 8192;
 
-/// The stack pointer's low byte, which is written last.
+/// The stack pointer's low byte, which is written after the high byte.
 const SPL: &str = "0x3d";
 
 /// What the walk needs to know about the image besides its code.
 #[derive(Default)]
 pub struct Landmarks {
-    /// Ends of functions whose size is known: a call right before one does not return.
+    /// Ends of functions whose size is known. A call right before such an end does not return.
     pub ends: HashSet<u32>,
-    /// libgcc's shared prologue, which is jumped into and jumps back.
+    /// libgcc's shared prologue. A function jumps into it, and it jumps back.
     pub prologue_saves: Range<u32>,
-    /// The shared prologues of `crate::shrink`, which are called and return with more on the stack.
+    /// The shared prologues of `crate::shrink`. They are called, and return with more on the stack.
     pub enters: HashSet<u32>,
 }
 
-/// Stack use of one function. All depths are from its entry, its return address excluded.
+/// Stack use of one function. All depths count from its entry, without its return address.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Flow {
-    /// The most it pushes and reserves itself.
+    /// Most bytes that it pushes and reserves itself.
     pub frame: u32,
-    /// Callees, and the depth at which the deepest call to each happens.
+    /// Its callees, each with the depth of the deepest call.
     pub calls: BTreeMap<u32, u32>,
     /// The depth of the deepest indirect call.
     pub indirect: Option<u32>,
     /// Whether it enables interrupts.
     pub enables_interrupts: bool,
-    /// Whether no bound was found.
+    /// Whether no bound for its depth was found.
     pub bottomless: bool,
 }
 
@@ -77,7 +77,7 @@ impl Walk<'_> {
         true
     }
 
-    /// One instruction: its effect, and where control goes from there.
+    /// Follows one instruction: its effect, and where control goes from there.
     fn step(&mut self, at: usize, depth: u32, todo: &mut Vec<(usize, u32)>) {
         let Some(insn) = self.code.get(at) else { return };
         self.flow.enables_interrupts |= insn.op == "sei";
@@ -123,7 +123,7 @@ impl Walk<'_> {
         }
     }
 
-    /// Where a jump goes; libgcc's shared prologue pushes and comes back.
+    /// Returns where a jump goes, and the depth there. libgcc's shared prologue pushes and comes back.
     fn jump(&self, at: usize, insn: &Insn, depth: u32) -> Option<(usize, u32)> {
         let target = insn.target?;
         if !self.marks.prologue_saves.contains(&target) {
@@ -135,7 +135,8 @@ impl Walk<'_> {
         Some((at + 1, depth + u32::try_from(pushes).ok()?))
     }
 
-    /// The depth behind a shared prologue: what it pushes, and the frame whose size r26 and r27 hold.
+    /// Returns the depth after a shared prologue: what the prologue pushes, and the frame whose size is in r26 and
+    /// r27.
     fn enter(&mut self, at: usize, target: u32, depth: u32) -> u32 {
         let mut depth = depth + RETURN_ADDRESS;
         let mut inside = self.code.at(target);
@@ -154,7 +155,7 @@ impl Walk<'_> {
         depth.saturating_sub(RETURN_ADDRESS)
     }
 
-    /// What is loaded for a shared prologue that is called at `at`.
+    /// Returns the frame size that is loaded for a shared prologue that is called at `at`.
     fn frame_size(&self, at: usize) -> u32 {
         let loaded = |at: usize, register: &str| {
             let insn = self
@@ -181,14 +182,14 @@ impl Walk<'_> {
         }
     }
 
-    /// A call to the next instruction only makes room.
+    /// Whether a call goes to the next instruction, which only makes room on the stack.
     fn is_reservation(&self, at: usize, insn: &Insn) -> bool {
         let next = self.code.get(at + 1).map(|next| next.address);
         insn.target.is_some() && insn.target == next
     }
 
-    /// By how much the stack grows when `register` is written to the stack pointer: what was
-    /// subtracted from it since it was read, or lately, if the frame pointer was read long ago.
+    /// Returns by how much the stack grows when `register` is written to the stack pointer. It is what was subtracted
+    /// from the register since it was read. If the frame pointer was read long ago, only recent subtractions count.
     fn reserved(&self, at: usize, register: &str) -> i32 {
         let high = next_register(register);
         let (mut low_byte, mut high_byte) = (None, None);
@@ -210,7 +211,7 @@ impl Walk<'_> {
     }
 }
 
-/// `r29` after `r28`.
+/// Returns the register behind another: `r29` for `r28`.
 fn next_register(register: &str) -> String {
     let index = register.strip_prefix('r').and_then(|digits| digits.parse::<u8>().ok());
     index.map_or_else(String::new, |index| format!("r{}", index + 1))

@@ -1,4 +1,4 @@
-//! What is in a firmware image: sections, symbols with readable names, code; and what must not be.
+//! Reads a firmware image: sections, symbols with readable names, code. Refuses images with certain defects.
 
 mod arithmetic;
 mod disasm;
@@ -21,21 +21,21 @@ use disasm::Code;
 use crate::caps;
 use crate::chips::Chip;
 
-/// From here up, avr-gcc's addresses mean RAM; below, flash.
+/// From this address up, avr-gcc's addresses mean RAM; below it, flash.
 const RAM_BASE: u64 = 0x80_0000;
-/// From here up they mean EEPROM and fuses.
+/// From this address up, addresses mean EEPROM and fuses.
 const EEPROM_BASE: u64 = 0x81_0000;
 
 /// A named place in the image.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Symbol {
-    /// As in the source, as far as the mangling tells.
+    /// The name in the source, as far as the mangled name tells.
     pub name: String,
     /// Byte address; RAM from 0x800000.
     pub address: u64,
     /// Bytes; 0 for labels of assembler code.
     pub size: u64,
-    /// A static or a constant, not code.
+    /// Whether it is a static or a constant, not code.
     pub is_data: bool,
 }
 
@@ -46,7 +46,7 @@ impl Symbol {
     }
 }
 
-/// What an image takes.
+/// The sizes of an image, bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sizes {
     /// Code, constants and the initial values of `.data`.
@@ -58,7 +58,7 @@ pub struct Sizes {
 }
 
 impl Sizes {
-    /// All statics.
+    /// Bytes of all statics.
     pub fn ram(self) -> u64 {
         self.data + self.bss
     }
@@ -78,7 +78,7 @@ impl Sizes {
     }
 }
 
-/// Refuses an image that would not work, or far too slowly: see the modules.
+/// Refuses an image that would not work, or would be far too slow: see the modules.
 pub fn check(path: &Path) -> Result<()> {
     let image = Image::load(path)?;
     let (flash, shown) = (image.sizes.flash, path.display());
@@ -91,8 +91,8 @@ pub fn check(path: &Path) -> Result<()> {
     tables::check(&image)
 }
 
-/// Refuses a program that defects of the compiler have made wrong. It is the compiler's own, with nothing shared: these checks follow
-/// the code of each function from its beginning to its end.
+/// Refuses a program that has been made wrong by defects of the compiler. It must be the compiler's own program, with
+/// nothing shared, because these checks follow the code of each function from its beginning to its end.
 pub fn check_compiled(path: &Path, chip: &Chip) -> Result<()> {
     let (image, code) = (Image::load(path)?, Code::load(path)?);
     scratch::check(&image, &code)?;
@@ -105,9 +105,9 @@ pub fn check_compiled(path: &Path, chip: &Chip) -> Result<()> {
 
 /// A firmware image.
 pub struct Image {
-    /// Where it was read from.
+    /// The file that it was read from.
     pub path: PathBuf,
-    /// What it takes.
+    /// Its sizes.
     pub sizes: Sizes,
     /// Named places by address.
     pub symbols: Vec<Symbol>,
@@ -122,7 +122,7 @@ impl Image {
         Ok(Image { path: path.to_owned(), sizes: sizes(&file), symbols: symbols(&file) })
     }
 
-    /// The places whose name satisfies `wanted`.
+    /// Returns the symbols whose name satisfies `wanted`.
     pub fn named<'a>(
         &'a self,
         wanted: impl Fn(&str) -> bool + 'a,

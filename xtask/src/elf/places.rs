@@ -1,4 +1,4 @@
-//! Places in the code that the stack analysis starts from or has to know.
+//! Addresses in the code that the stack analysis starts from or needs to know.
 
 use anyhow::{Result, ensure};
 
@@ -8,7 +8,7 @@ use super::{Image, RAM_BASE};
 use crate::shrink::prologue::NAME as ENTER;
 use crate::shrink::text::TAKEN;
 
-/// The interrupt handlers. Vectors without one of their own share a way to the reset.
+/// Returns the interrupt handlers. Vectors without a handler of their own share a path to the reset.
 pub fn handlers(image: &Image) -> Vec<u32> {
     let bad = image.named(|name| name == "__bad_interrupt").next().map(|s| s.address);
     let is_handler = |name: &str| name.strip_prefix("__vector_").is_some_and(is_number);
@@ -22,7 +22,8 @@ fn is_number(text: &str) -> bool {
     text.parse::<u8>().is_ok()
 }
 
-/// The functions whose address is taken. The linker makes a stub for each beyond 128 KiB; `crate::shrink` names them all.
+/// Returns the functions whose address is taken. The linker makes a stub for each of them beyond 128 KiB;
+/// `crate::shrink` gives each a further name.
 pub fn addresses_taken(image: &Image, code: &Code) -> Vec<u32> {
     let place = |wanted: &str| image.named(|name| name == wanted).next().map(|s| s.address);
     let stubs = place("__trampolines_start").zip(place("__trampolines_end"));
@@ -44,7 +45,7 @@ pub fn landmarks(image: &Image) -> Landmarks {
     Landmarks { ends, prologue_saves, enters }
 }
 
-/// The name of an address; of several, that of the function with a size.
+/// Returns the name of an address. If it has several, returns the name of the function with a size.
 pub fn name_at(image: &Image, entry: u32) -> String {
     let at = image.symbols.binary_search_by_key(&u64::from(entry), |s| s.address);
     let Ok(mut at) = at else { return format!("{entry:#x}") };
@@ -54,7 +55,8 @@ pub fn name_at(image: &Image, entry: u32) -> String {
     image.symbols[at].name.clone()
 }
 
-/// The function that an instruction belongs to: labels of assembler code have no size.
+/// Returns the function that an instruction belongs to. Labels of assembler code have no size, so the last symbol
+/// before the instruction counts.
 pub fn function_at(image: &Image, insn: u32) -> &str {
     let before = |s: &&super::Symbol| {
         s.address <= u64::from(insn) && !s.is_data && !s.name.starts_with(TAKEN)
@@ -62,7 +64,7 @@ pub fn function_at(image: &Image, insn: u32) -> &str {
     image.symbols.iter().rfind(before).map_or("code without a name", |symbol| &symbol.name)
 }
 
-/// Fails if there are any instructions that do what they must not, and says where they are and what helps.
+/// Fails if some instructions were found. The error lists their addresses, what they do, and what helps.
 pub fn refuse(image: &Image, found: &[u32], does: &str, helps: &str) -> Result<()> {
     let place = |at: &u32| format!("  {at:#x} in {}", function_at(image, *at));
     let places: Vec<_> = found.iter().map(place).collect();
@@ -71,7 +73,7 @@ pub fn refuse(image: &Image, found: &[u32], does: &str, helps: &str) -> Result<(
     Ok(())
 }
 
-/// `exec` of `<...TaskStorage<kerf::tasks::exec::run::{closure#0}>>::poll`.
+/// Returns the name of a task: `exec` for `<...TaskStorage<kerf::tasks::exec::run::{closure#0}>>::poll`.
 pub fn task_name(poll: &str) -> Option<String> {
     if !poll.contains("TaskStorage<") || !poll.ends_with("::poll") {
         return None;
@@ -81,7 +83,7 @@ pub fn task_name(poll: &str) -> Option<String> {
     Some(name.to_owned())
 }
 
-/// Code addresses fit.
+/// Converts a code address to 32 bits.
 pub fn address(address: u64) -> u32 {
     u32::try_from(address).expect("AVR addresses have 24 bits")
 }

@@ -1,14 +1,14 @@
-//! Refuses an image in which a pointer is overwritten while it is still needed: another defect of the compiler.
+//! Refuses an image in which a pointer is overwritten while it is still needed, which is a defect of the compiler.
 //!
 //! LLVM's AVR backend (22) may load an atomic 16-bit word into the registers that point to it:
 //!
 //! ```text
-//!   ld  r30, Z          the low half of the pointer is gone
-//!   ldd r31, Z+1        from anywhere
+//!   ld  r30, Z          overwrites the low half of the pointer
+//!   ldd r31, Z+1        reads from a wrong address
 //! ```
 //!
-//! Behind a load into one half of its own pointer, up to the next branch or call, the pointer must not be used before one of its
-//! halves has been written again.
+//! After a load into one half of its own pointer, up to the next branch or call, the pointer must not be used until
+//! one of its halves has been written again.
 
 use anyhow::Result;
 
@@ -22,7 +22,7 @@ type Pointer = (char, [&'static str; 2]);
 const POINTERS: [Pointer; 3] =
     [('X', ["r26", "r27"]), ('Y', ["r28", "r29"]), ('Z', ["r30", "r31"])];
 
-/// Fails when some code uses half a pointer.
+/// Fails when some code uses a pointer of which a half was overwritten.
 pub fn check(image: &Image, code: &Code) -> Result<()> {
     let found = misused(code);
     places::refuse(
@@ -33,19 +33,19 @@ pub fn check(image: &Image, code: &Code) -> Result<()> {
     )
 }
 
-/// The addresses of instructions that use half a pointer.
+/// Returns the addresses of instructions that use such a pointer.
 fn misused(code: &Code) -> Vec<u32> {
     (0..code.len()).filter_map(|at| first_use(code, at)).collect()
 }
 
-/// The first use behind `at`, where a load overwrites half of its own pointer.
+/// If the instruction at `at` overwrites half of its own pointer, returns the address of the first use behind it.
 fn first_use(code: &Code, at: usize) -> Option<u32> {
     let pointer = overwritten(code.get(at)?)?;
     for insn in (at + 1..).map_while(|at| code.get(at)) {
         if uses(insn, pointer) {
             return Some(insn.address);
         }
-        // Once more written, the pointer may have been put together again.
+        // When a half is written again, the pointer may be whole again.
         if ends(insn) || writes(insn, pointer) {
             return None;
         }
@@ -53,7 +53,7 @@ fn first_use(code: &Code, at: usize) -> Option<u32> {
     None
 }
 
-/// The pointer of which the instruction overwrites a half by what it loads through it.
+/// Returns the pointer of which an instruction overwrites a half by a load through it.
 fn overwritten(insn: &Insn) -> Option<Pointer> {
     if !matches!(insn.op.as_str(), "ld" | "ldd") {
         return None;
@@ -63,7 +63,7 @@ fn overwritten(insn: &Insn) -> Option<Pointer> {
     pointer.1.contains(&target.as_str()).then_some(pointer)
 }
 
-/// Whether the instruction goes through the pointer.
+/// Whether the instruction accesses memory through the pointer.
 fn uses(insn: &Insn, (name, _): Pointer) -> bool {
     let through = |place: usize| {
         insn.args.get(place).is_some_and(|arg| arg.trim_start_matches('-').starts_with(name))
@@ -76,7 +76,7 @@ fn uses(insn: &Insn, (name, _): Pointer) -> bool {
     }
 }
 
-/// Whether the instruction writes to the pointer, as far as it is known.
+/// Whether the instruction writes to the pointer, as far as that is known.
 fn writes(insn: &Insn, (_, halves): Pointer) -> bool {
     let only_reads = matches!(
         insn.op.as_str(),
@@ -85,7 +85,7 @@ fn writes(insn: &Insn, (_, halves): Pointer) -> bool {
     !only_reads && insn.args.first().is_some_and(|arg| halves.contains(&arg.as_str()))
 }
 
-/// Whether others may come here, or it goes on elsewhere.
+/// Whether control may come to this instruction from elsewhere, or goes on elsewhere.
 fn ends(insn: &Insn) -> bool {
     insn.target.is_some() || matches!(insn.op.as_str(), "ret" | "reti")
 }
@@ -94,7 +94,7 @@ fn ends(insn: &Insn) -> bool {
 mod tests {
     use super::*;
 
-    /// One instruction each two bytes from address 0.
+    /// Returns what is found in code with one instruction every two bytes from address 0.
     fn found(lines: &[&str]) -> Vec<u32> {
         let rows = lines.iter().enumerate().map(|(i, l)| format!(" {:x}:\t{l}\n", 2 * i));
         misused(&Code::parse(&rows.collect::<String>()))

@@ -1,19 +1,19 @@
-//! Refuses an image that one defect of the compiler has made wrong.
+//! Refuses an image in which r0 is used for two things at once, which is a defect of the compiler.
 //!
-//! To reach a stack frame beyond 63 bytes LLVM's AVR backend (22) moves the frame pointer there and back,
-//! and keeps the flags in r0 meanwhile:
+//! To reach a stack frame beyond 63 bytes, LLVM's AVR backend (22) moves the frame pointer there and back, and saves
+//! the flags in r0 meanwhile:
 //!
 //! ```text
 //!   mul r24, r22        the product is in r1:r0
-//!   in  r0, 0x3f        flags kept, the product is gone
+//!   in  r0, 0x3f        saves the flags; the product is gone
 //!   subi r28, 0xC0
 //!   ...
-//!   out 0x3f, r0        flags restored
+//!   out 0x3f, r0        restores the flags
 //!   mov r18, r0         takes the flags for the product
 //! ```
 //!
-//! The backend takes r0 for free there, but a multiplication's result may still be in it. So from each
-//! such place on, along every branch, r0 must be written before it is read.
+//! The backend assumes that r0 is free there, but the result of a multiplication may still be in it. So from each of
+//! these places on, along every branch, r0 must be written before it is read.
 
 use std::collections::HashSet;
 
@@ -25,7 +25,7 @@ use super::places;
 
 const FLAGS: &str = "0x3f";
 
-/// Fails when some code reads r0 after flags were kept in it.
+/// Fails when some code reads r0 after flags were saved in it.
 pub fn check(image: &Image, code: &Code) -> Result<()> {
     let found = misread(code);
     places::refuse(
@@ -36,7 +36,7 @@ pub fn check(image: &Image, code: &Code) -> Result<()> {
     )
 }
 
-/// The addresses of instructions that take the flags for something else.
+/// Returns the addresses of instructions that take the flags for something else.
 fn misread(code: &Code) -> Vec<u32> {
     let mut found: Vec<_> = (0..code.len())
         .filter_map(|at| Some((at, code.get(at)?)))
@@ -55,7 +55,8 @@ fn follow(code: &Code) -> impl Fn((usize, &Insn)) -> Option<u32> {
     }
 }
 
-/// The first instruction behind `at` that reads r0 as it is, along any way that stays in the function.
+/// Returns the first instruction behind `at` that reads r0 before it is written, along any path that stays in the
+/// function.
 fn first_read(code: &Code, at: usize) -> Option<u32> {
     let mut seen = HashSet::new();
     let mut todo = vec![at + 1];
@@ -73,7 +74,7 @@ fn first_read(code: &Code, at: usize) -> Option<u32> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Effect {
     Reads,
-    /// Or leaves the function: nobody hands r0 over.
+    /// Writes r0, or leaves the function: no function passes r0 on.
     Writes,
     None,
 }
@@ -92,10 +93,10 @@ fn effect(insn: &Insn) -> Effect {
         "eor" if has(0) && has(1) => Effect::Writes,
         "in" | "ld" | "ldd" | "lds" | "pop" if has(0) => Effect::Writes,
         "mov" | "movw" if has(0) && !has(1) => Effect::Writes,
-        // Without operands they load r0.
+        // These instructions load r0 if they have no operands.
         "lpm" | "elpm" if has(0) || insn.args.iter().all(String::is_empty) => Effect::Writes,
         "spm" => Effect::Reads,
-        // Restores the flags; an interrupt's entry stores them.
+        // This instruction restores the flags. The entry of an interrupt saves them.
         "out" if insn.args == [FLAGS, "r0"] => Effect::None,
         "push" if has(0) => Effect::None,
         _ if has(0) || has(1) => Effect::Reads,
@@ -116,13 +117,13 @@ fn successors(code: &Code, at: usize, insn: &Insn) -> Vec<usize> {
 mod tests {
     use super::*;
 
-    /// One instruction each two bytes from address 0.
+    /// Returns what is found in code with one instruction every two bytes from address 0.
     fn found(lines: &[&str]) -> Vec<u32> {
         let rows = lines.iter().enumerate().map(|(i, l)| format!(" {:x}:\t{l}\n", 2 * i));
         misread(&Code::parse(&rows.collect::<String>()))
     }
 
-    /// A frame access between a multiplication and what follows.
+    /// Returns what is found if a frame access comes between a multiplication and `then`.
     fn frame_access(then: &[&str]) -> Vec<u32> {
         let access = ["mul\tr24, r22", "in\tr0, 0x3f", "subi\tr28, 0xC0", "sbci\tr29, 0xFF"];
         let back = ["std\tY+2, r18", "subi\tr28, 0x40", "sbci\tr29, 0x00", "out\t0x3f, r0"];

@@ -1,11 +1,11 @@
 //! The deepest stack, by analysis of the call graph.
 //!
-//! Thread mode runs from `main`. On top of it come every interrupt handler that enables
-//! interrupts again (the exec executor's), once each, and the deepest one that does not.
+//! Thread mode runs from `main`. On top of it, each interrupt handler that enables interrupts again (the exec
+//! executor's) counts once, plus the deepest handler that does not.
 //!
-//! Whom an indirect call reaches is an assumption: outside tasks (an executor's poll) the deepest
-//! task of that level or any other function whose address is taken; inside a task the deepest of
-//! the latter; and those are assumed not to make further indirect calls.
+//! Which functions an indirect call reaches is an assumption. Outside tasks (in an executor's poll) it reaches the
+//! deepest task of that level, or any other function whose address is taken. Inside a task it reaches the deepest
+//! function whose address is taken. These functions are assumed to make no further indirect calls.
 
 use std::collections::HashMap;
 
@@ -16,26 +16,26 @@ use super::disasm::Code;
 use super::flow::{self, Flow, Landmarks, RETURN_ADDRESS};
 use super::places::{address, addresses_taken, handlers, landmarks, name_at, task_name};
 
-/// One function on the way down and what it has on the stack there, its return address included.
+/// One function on a chain of calls, and what it has on the stack there, including its return address.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Link {
     /// The function.
     pub name: String,
-    /// Bytes.
+    /// Bytes on the stack.
     pub bytes: u32,
 }
 
-/// The deepest way down from a root.
+/// The deepest chain of calls from a root.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Chain {
-    /// From the root on.
+    /// The functions, from the root on.
     pub links: Vec<Link>,
-    /// Whether something in reach of the root enables interrupts.
+    /// Whether any function that the root reaches enables interrupts.
     enables_interrupts: bool,
 }
 
 impl Chain {
-    /// Bytes in all.
+    /// Bytes of all functions together.
     pub fn bytes(&self) -> u32 {
         self.links.iter().map(|link| link.bytes).sum()
     }
@@ -46,16 +46,16 @@ impl Chain {
     }
 }
 
-/// The result.
+/// The result of the analysis.
 #[derive(Debug, Default)]
 pub struct Stack {
-    /// Thread mode.
+    /// The deepest chain of thread mode.
     pub main: Chain,
-    /// Handlers that let others interrupt them.
+    /// The chains of handlers that let others interrupt them.
     pub nesting: Vec<Chain>,
-    /// The deepest handler that does not.
+    /// The deepest handler that does not let others interrupt it.
     pub short: Chain,
-    /// Where no bound was found: recursion, or a loop that pushes.
+    /// Functions without a bound: recursion, or a loop that pushes.
     pub unbounded: Vec<String>,
 }
 
@@ -65,14 +65,14 @@ impl Stack {
         Graph::new(image, Code::load(&image.path)?, interrupt_tasks).analyse()
     }
 
-    /// Everything at its deepest at once.
+    /// Bytes if everything is at its deepest at once.
     pub fn bytes(&self) -> u32 {
         let nesting: u32 = self.nesting.iter().map(Chain::bytes).sum();
         self.main.bytes() + nesting + self.short.bytes()
     }
 }
 
-/// Where a function runs, which decides whom its indirect calls reach.
+/// Where a function runs, which decides which functions its indirect calls reach.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 struct Place {
     interrupt: bool,
@@ -93,7 +93,7 @@ struct Graph<'a> {
     thread_tasks: Vec<u32>,
     interrupt_tasks: Vec<u32>,
     callbacks: Vec<u32>,
-    /// `None` while it is being worked out: meeting that again is recursion.
+    /// `None` while a chain is being computed. Meeting that again means recursion.
     chains: HashMap<(u32, Place), Option<Chain>>,
     unbounded: Vec<String>,
 }
@@ -131,14 +131,14 @@ impl<'a> Graph<'a> {
 
     fn root(&mut self, entry: u32, interrupt: bool) -> Chain {
         let mut chain = self.chain(entry, Place { interrupt, inside: Inside::Executor });
-        // The return address that the start-up code or the hardware pushed.
+        // Adds the return address that the start-up code or the hardware has pushed.
         if let Some(first) = chain.links.first_mut() {
             first.bytes += RETURN_ADDRESS;
         }
         chain
     }
 
-    /// The deepest way down from a function, its own return address excluded.
+    /// Returns the deepest chain of calls from a function, without its own return address.
     fn chain(&mut self, entry: u32, place: Place) -> Chain {
         match self.chains.get(&(entry, place)) {
             Some(Some(known)) => return known.clone(),
@@ -173,7 +173,7 @@ impl<'a> Graph<'a> {
         best
     }
 
-    /// Everything that a function may call, with the depth of the call.
+    /// Returns all functions that a function may call, with the depth of each call.
     fn callees(&self, flow: &Flow, place: Place) -> Vec<(u32, u32, Place)> {
         let mut all: Vec<_> =
             flow.calls.iter().map(|(callee, depth)| (*callee, *depth, place)).collect();

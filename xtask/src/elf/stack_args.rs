@@ -1,18 +1,19 @@
 //! Refuses an image in which a function reads arguments from the stack.
 //!
-//! LLVM's AVR backend (22) looks for them two bytes behind the saved registers, where the return address
-//! ends on small chips; on the ATmega2560 it has three bytes, so that the first byte of an argument is
-//! the last of the return address, and all others are one off:
+//! LLVM's AVR backend (22) looks for them two bytes behind the saved registers, where the return address ends on
+//! small chips. On the ATmega2560 a return address has three bytes. So the first byte of an argument is read from the
+//! last byte of the return address, and all other bytes are off by one:
 //!
 //! ```text
 //!   push r16 ... (n of them)
 //!   in   r28, 0x3d
 //!   in   r29, 0x3e
-//!   sbiw r28, size        Y+1 to Y+size are the function's own, n saved registers follow,
-//!   ldd  r24, Y+size+n+3  then three bytes of return address, of which this is the last
+//!   sbiw r28, size        Y+1 to Y+size belong to the function itself, then come n saved registers,
+//!   ldd  r24, Y+size+n+3  then three bytes of return address, of which this reads the last
 //! ```
 //!
-//! Arguments go to the stack when they take more than 18 bytes, or do not fit what is left of them.
+//! Arguments are passed on the stack when they take more than 18 bytes, or do not fit into the registers that are
+//! left.
 
 use anyhow::Result;
 
@@ -20,10 +21,10 @@ use super::Image;
 use super::disasm::{Code, Insn, number};
 use super::places::{self, landmarks};
 
-/// Bytes of a return address on the chips that the defect is of.
+/// Bytes of a return address on the chips with this defect.
 pub const RETURN_ADDRESS: usize = 3;
 
-/// Fails when some code reaches behind the registers that it saved.
+/// Fails when some code reads behind the registers that it has saved.
 pub fn check(image: &Image, code: &Code) -> Result<()> {
     let ends = landmarks(image).ends;
     let found = beyond(code, |address| ends.contains(&address));
@@ -35,7 +36,7 @@ pub fn check(image: &Image, code: &Code) -> Result<()> {
     )
 }
 
-/// The addresses of instructions that reach behind the saved registers of their function.
+/// Returns the addresses of instructions that read behind the saved registers of their function.
 fn beyond(code: &Code, ends: impl Fn(u32) -> bool) -> Vec<u32> {
     let mut found = Vec::new();
     for at in 0..code.len() {
@@ -46,10 +47,10 @@ fn beyond(code: &Code, ends: impl Fn(u32) -> bool) -> Vec<u32> {
     found
 }
 
-/// The first such instruction of the function that takes the stack pointer at `at`.
+/// Returns the first such instruction of the function that reads the stack pointer at `at`.
 fn first_beyond(code: &Code, at: usize, ends: impl Fn(u32) -> bool) -> Option<u32> {
     let saved = (0..at).rev().map_while(|i| code.get(i)).take_while(|i| i.op == "push").count();
-    // Where Y points, seen from the lowest saved register.
+    // The position of Y, relative to the lowest saved register.
     let (mut y, mut size) = (0, None);
     let mut high = 0;
     for insn in (at + 2..).map_while(|i| code.get(i)) {
@@ -64,7 +65,7 @@ fn first_beyond(code: &Code, at: usize, ends: impl Fn(u32) -> bool) -> Option<u3
                 let moved = (operand(insn)? << 8 | high) as u16;
                 y -= i32::from(moved as i16);
             }
-            // What follows an exit is reached from before it.
+            // Code behind an exit is reached from before the exit.
             ("ret" | "reti", _) => y = -size.unwrap_or(0),
             _ => {}
         }
@@ -82,7 +83,7 @@ fn operand(insn: &Insn) -> Option<i32> {
     insn.args.get(1).and_then(|word| number(word)).map(|value| value as i32)
 }
 
-/// The `q` of `ldd rX, Y+q`.
+/// Returns the `q` of `ldd rX, Y+q`.
 fn offset(insn: &Insn) -> Option<i32> {
     let from = |arg: &String| arg.strip_prefix("Y+").and_then(number).map(|q| q as i32);
     matches!(insn.op.as_str(), "ldd" | "std").then(|| insn.args.iter().find_map(from)).flatten()
@@ -92,7 +93,7 @@ fn offset(insn: &Insn) -> Option<i32> {
 mod tests {
     use super::*;
 
-    /// One instruction each two bytes from address 0; `f` ends at `ends`.
+    /// Returns what is found in code with one instruction every two bytes from address 0; `f` ends at `ends`.
     fn found(lines: &[&str], ends: u32) -> Vec<u32> {
         let rows = lines.iter().enumerate().map(|(i, l)| format!(" {:x}:\t{l}\n", 2 * i));
         let code = Code::parse(&rows.collect::<String>());
@@ -116,7 +117,7 @@ mod tests {
     fn what_is_the_functions_own_is_not() {
         let own = ["sbiw\tr28, 0x04", "out\t0x3d, r28", "ldd\tr24, Y+6", "std\tY+1, r2"];
         assert!(found(&[&ENTRY[..], &own].concat(), 100).is_empty());
-        // Behind an early exit, and of the next function, where Y is anything.
+        // Behind an early exit, and in the next function, Y may be anything.
         let exit =
             ["sbiw\tr28, 0x04", "out\t0x3d, r28", "adiw\tr28, 0x04", "ret\t", "ldd\tr24, Y+6"];
         assert!(found(&[&ENTRY[..], &exit].concat(), 100).is_empty());

@@ -1,14 +1,14 @@
 //! Refuses an image with constants in flash where `lpm` does not reach.
 //!
-//! `lpm` reads the first 64 KiB only; beyond them it would silently read something else. The linker
-//! puts `.progmem` sections right behind the vectors, so this holds until somebody places a table
-//! differently, or makes more of them than fit.
+//! `lpm` reads the first 64 KiB only; beyond them it would silently read something else. The linker puts `.progmem`
+//! sections right behind the vectors. So the check fails only if a table is placed differently, or if there are more
+//! tables than fit.
 
 use anyhow::{Result, ensure};
 
 use super::Image;
 
-/// Where the reach of `lpm` ends.
+/// End of the range that `lpm` reaches.
 const REACH: u64 = 0x1_0000;
 
 /// Fails when a table or text in flash lies beyond the reach of `lpm`.

@@ -1,7 +1,7 @@
 //! `cargo xtask fuzz`: builds the fuzzers (`tests/fuzz`) with coverage counters and runs them.
 //!
-//! Any Rust does: the counters are LLVM's, and stable options switch them on. What is found out is kept
-//! in `target/fuzz`: the corpus, from which the next run goes on, and findings, which it tries first.
+//! Any Rust works: the counters are LLVM's, and stable options switch them on. Results are kept in `target/fuzz`: the
+//! corpus, from which the next run continues, and findings, which it tries first.
 
 mod seeds;
 mod session;
@@ -17,13 +17,13 @@ use crate::process::{host_cargo, output, root, run as run_child};
 use crate::setup::{self, Scope};
 use session::Session;
 
-/// What makes LLVM put the counters in; as cargo-fuzz has it.
+/// The flags that make LLVM insert the counters, as in cargo-fuzz.
 const FLAGS: &str = "-Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
                      -Cllvm-args=-sanitizer-coverage-inline-8bit-counters \
                      -Cllvm-args=-sanitizer-coverage-pc-table \
                      -Cllvm-args=-simplifycfg-branch-fold-threshold=0 -Ccodegen-units=1";
 
-/// What makes it tell what values are compared, too.
+/// The flag that also reports which values are compared.
 const COMPARES: &str = "-Cllvm-args=-sanitizer-coverage-trace-compares";
 
 /// `cargo xtask fuzz`
@@ -32,7 +32,7 @@ pub struct FuzzArgs {
     /// How long each target runs
     #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..))]
     minutes: u64,
-    /// This target only: lines for the interpreter, or bytes for the machine's serial line
+    /// Only this target: lines for the interpreter, or bytes for the machine's serial line
     #[arg(long, value_enum)]
     target: Option<Target>,
 }
@@ -60,7 +60,8 @@ impl Target {
         }
     }
 
-    /// With the values compared a machine takes three times as long; it has the words to try instead.
+    /// Returns the flags of the target. With the compared values a machine takes three times as long, so the serial
+    /// target goes without them and uses the dictionary.
     fn flags(self) -> String {
         match self {
             Target::Lines => format!("{FLAGS} {COMPARES}"),
@@ -68,12 +69,12 @@ impl Target {
         }
     }
 
-    /// After how many inputs it begins anew, if ever: each machine leaves 9 KB behind.
+    /// Number of inputs after which the fuzzer restarts; `None` for never. Each machine leaks 9 KB.
     fn runs(self) -> Option<u64> {
         (self == Target::Serial).then_some(200_000)
     }
 
-    /// What its inputs begin with.
+    /// The first bytes of its inputs.
     fn prefixes(self) -> &'static [&'static str] {
         match self {
             Target::Lines => &[""],
@@ -82,18 +83,18 @@ impl Target {
         }
     }
 
-    /// Where it keeps something.
+    /// Returns the folder for one kind of its files.
     fn folder(self, what: &str) -> PathBuf {
         home().join(what).join(self.name())
     }
 }
 
-/// Everything of the fuzzers that is no source.
+/// Returns the folder for all files of the fuzzers except sources.
 fn home() -> PathBuf {
     root().join("target/fuzz")
 }
 
-/// Builds and runs the targets, and tells what came of it. Fails if anything was found.
+/// Builds and runs the targets, and prints the results. Fails if anything was found.
 pub fn run(args: &FuzzArgs) -> Result<ExitCode> {
     setup::ensure(Scope::Fuzzers)?;
     let targets = args.target.map_or_else(|| Target::value_variants().to_vec(), |one| vec![one]);
@@ -111,8 +112,8 @@ pub fn run(args: &FuzzArgs) -> Result<ExitCode> {
     Ok(if clean { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// Builds a fuzzer; where it lies. The host is named, so that the flags are for them alone and not for
-/// what is run to build them.
+/// Builds a fuzzer; returns its path. The host is named as the target, so that the flags apply to the fuzzer only and
+/// not to programs that run during the build.
 fn build(target: Target) -> Result<PathBuf> {
     let host = host()?;
     let folder = home().join("build");
@@ -128,7 +129,7 @@ fn build(target: Target) -> Result<PathBuf> {
     Ok(folder.join(host).join("fuzz").join(target.name()))
 }
 
-/// What Rust calls this machine.
+/// Returns Rust's name for the computer's architecture and system.
 fn host() -> Result<String> {
     let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
     let text = output(Command::new(rustc).arg("-vV"))?;
@@ -136,7 +137,7 @@ fn host() -> Result<String> {
     host.map(str::to_owned).context("rustc does not tell its host")
 }
 
-/// A folder that is there.
+/// Creates a folder if it does not exist.
 fn make(folder: &Path) -> Result<()> {
     std::fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))
 }

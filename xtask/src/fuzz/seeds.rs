@@ -1,4 +1,4 @@
-//! What the fuzzers begin with: G-code and transcripts of the repository, in pieces.
+//! The first inputs of the fuzzers: G-code and transcripts of the repository, in pieces.
 
 use std::fs;
 use std::path::Path;
@@ -8,15 +8,15 @@ use anyhow::{Context, Result};
 use super::{Target, make};
 use crate::process::root;
 
-/// Where G-code and transcripts lie, and the ending of their files. Not all need be there.
+/// Folders with G-code and transcripts, and the endings of their files. Not all of them need exist.
 const SOURCES: [(&str, &str); 3] =
     [("examples", "gcode"), ("tests/nist", "ngc"), ("tests/transcripts", "txt")];
-/// What a transcript's lines begin with that are sent.
+/// Beginning of the lines in a transcript that are sent.
 const SENT: &str = "-> ";
-/// Pieces of a file: one that is long says the same again and again.
+/// Most pieces of a file, because a long file repeats itself.
 const PIECES: usize = 8;
 
-/// Writes the seeds of a target anew.
+/// Writes the seeds of a target, replacing the former ones.
 pub fn write(target: Target) -> Result<()> {
     let folder = target.folder("seeds");
     let _ = fs::remove_dir_all(&folder);
@@ -35,7 +35,7 @@ pub fn write(target: Target) -> Result<()> {
     Ok(())
 }
 
-/// The names and texts of the files in a folder.
+/// Returns the names and texts of the files in a folder.
 fn texts(folder: &Path, ending: &str) -> Vec<(String, String)> {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let files = entries.map(|entry| entry.path());
@@ -47,7 +47,7 @@ fn texts(folder: &Path, ending: &str) -> Vec<(String, String)> {
     files.filter_map(text).collect()
 }
 
-/// The lines that are sent, each with its end.
+/// Returns the lines that are sent, each with its end.
 fn lines(text: &str) -> Vec<Vec<u8>> {
     let is_transcript = text.lines().any(|line| line.starts_with(SENT));
     let sent = text.lines().filter_map(|line| match line.strip_prefix(SENT) {
@@ -57,7 +57,7 @@ fn lines(text: &str) -> Vec<Vec<u8>> {
     sent.map(|line| [&line[..], b"\n"].concat()).collect()
 }
 
-/// `\x05` is the byte 5.
+/// Replaces escapes by bytes: `\x05` is the byte 5. `None` if an escape is malformed.
 fn unescape(line: &str) -> Option<Vec<u8>> {
     let mut parts = line.split("\\x");
     let mut bytes = parts.next()?.as_bytes().to_vec();
@@ -68,7 +68,7 @@ fn unescape(line: &str) -> Option<Vec<u8>> {
     Some(bytes)
 }
 
-/// The first pieces of a text, of whole lines.
+/// Returns the first pieces of a text, made of whole lines.
 fn pieces(lines: &[Vec<u8>], longest: usize) -> impl Iterator<Item = Vec<u8>> {
     let mut pieces = vec![Vec::new()];
     for line in lines {

@@ -1,4 +1,4 @@
-//! A run of one fuzzer, its words passed on, and what is in them.
+//! A run of one fuzzer: passes its output on, and extracts results from it.
 
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
@@ -10,21 +10,21 @@ use anyhow::{Context, Result, ensure};
 use super::{Target, make};
 use crate::process::{root, shown};
 
-/// An input takes milliseconds. In seconds.
+/// Longest time of an input, s. Usually an input takes milliseconds.
 const TIMEOUT: u64 = 20;
-/// Far more than a fuzzer leaves behind before it begins anew. In MiB.
+/// Most memory of a fuzzer, MiB. This is far more than it leaks before it restarts.
 const MEMORY: u64 = 4_096;
 
-/// What stands before the name of a file that a fuzzer has written an input to.
+/// The text before the name of a file that a fuzzer has written an input to.
 const WRITTEN: &str = "Test unit written to ";
 
-/// What came of it.
+/// The results of a run.
 #[derive(Debug, Default, PartialEq)]
 pub struct Session {
     runs: u64,
-    /// Edges, and features, which tell how often edges were taken, too.
+    /// Number of edges, and of features, which also count how often edges were taken.
     coverage: (u64, u64),
-    /// Inputs in the corpus.
+    /// Number of inputs in the corpus.
     corpus: u64,
     /// Inputs that break something.
     pub findings: Vec<PathBuf>,
@@ -43,7 +43,7 @@ impl Session {
         }
     }
 
-    /// Until the fuzzer begins anew.
+    /// Runs the fuzzer until it restarts or the time is over.
     fn turn(&mut self, target: Target, program: &Path, time: Duration) -> Result<()> {
         make(&target.folder("corpus"))?;
         make(&target.folder("findings"))?;
@@ -64,7 +64,7 @@ impl Session {
         Ok(())
     }
 
-    /// Takes what there is in a line: `#4096 pulse  cov: 905 ft: 3301 corp: 364/30Kb ...`.
+    /// Takes the results from a line such as `#4096 pulse  cov: 905 ft: 3301 corp: 364/30Kb ...`.
     fn hear(&mut self, line: &str, before: u64) {
         if let Some((_, file)) = line.split_once(WRITTEN) {
             self.findings.extend(Some(PathBuf::from(file)).filter(|file| !is_slow_unit(file)));
@@ -88,7 +88,7 @@ impl Session {
         }
     }
 
-    /// Says it.
+    /// Prints the results.
     pub fn tell(&self, target: Target, program: &Path) {
         let Self { runs, coverage: (edges, features), corpus, findings } = self;
         let name = target.name();
@@ -117,7 +117,7 @@ fn command(target: Target, program: &Path, time: Duration) -> Command {
     fuzzer
 }
 
-/// An input that takes long, but not too long.
+/// Whether a file is an input that takes long, but not too long.
 fn is_slow_unit(file: &Path) -> bool {
     file.file_name().is_some_and(|name| name.to_string_lossy().starts_with("slow-unit-"))
 }

@@ -1,6 +1,6 @@
 //! The main example: a mounting bracket of 60 by 40 by 4 mm, cut with a 3 mm tool.
 //!
-//! Positions are relative to the part's lower left corner; tool radius is allowed for.
+//! Positions are relative to the part's lower left corner. The tool radius is included.
 
 use super::program::{Point, Program, on_circle};
 
@@ -31,7 +31,7 @@ fn at(x: f64, y: f64) -> Point {
     (ORIGIN.0 + x, ORIGIN.1 + y)
 }
 
-/// Numbers from 0.
+/// Returns the numbers from 0 up to `count`, exclusive.
 fn upto(count: u8) -> impl Iterator<Item = f64> {
     (0..count).map(f64::from)
 }
@@ -60,7 +60,7 @@ fn holes(p: &mut Program) {
     }
 }
 
-/// Drills in four bites, up for the chips after each.
+/// Drills in four pecks, and retracts after each to clear chips.
 fn peck(p: &mut Program) {
     const BITES: [f64; 4] = [-1.2, -2.4, -3.6, -4.8];
     p.rapid_z(0.5);
@@ -77,7 +77,7 @@ fn peck(p: &mut Program) {
     p.rapid_z(SAFE);
 }
 
-/// A round pocket in rings from the inside out.
+/// A round pocket, cut in rings from the inside outwards.
 fn bearing_seat(p: &mut Program) {
     let centre = at(20.0, 20.0);
     p.note("bearing seat, 17 mm wide, 3 deep");
@@ -113,7 +113,7 @@ fn slot(p: &mut Program, y: f64) {
     p.rapid_z(SAFE);
 }
 
-/// Circles that creep forward: never the full width of the tool at once.
+/// Circles that move forward slowly, so that the tool never cuts with its full width.
 fn trochoidal_slot(p: &mut Program) {
     const RADIUS: f64 = 1.5;
     for (depth, feed) in [(-2.25, 750.0), (-4.5, 650.0)] {

@@ -1,15 +1,15 @@
-//! Runs a job on paper: where it goes and how long it takes at the least.
+//! Computes where a job goes and the least time that it takes.
 
 use std::f64::consts::TAU;
 
-/// Nothing moves faster, in mm/min.
+/// The highest feed, mm/min.
 const FASTEST: f64 = 800.0;
 
-/// What a job does.
+/// The result of a dry run.
 pub struct DryRun {
-    /// Lines without comments.
+    /// Number of lines without comments.
     pub lines: usize,
-    /// Arcs.
+    /// Number of arcs.
     pub arcs: usize,
     /// Least and greatest position.
     pub x: (f64, f64),
@@ -19,13 +19,13 @@ pub struct DryRun {
     pub z: (f64, f64),
     /// Least and greatest feed.
     pub feed: (f64, f64),
-    /// Time without ramps.
+    /// Time without ramps, s.
     pub seconds: f64,
-    /// How far an arc's end is from its circle, at worst.
+    /// The largest distance of an arc's end from its circle.
     pub radius_error: f64,
 }
 
-/// Reads the words that the examples use; anything else is a mistake in the example.
+/// Reads the words that the examples use. Any other word is an error in the example.
 pub fn dry_run(job: &str) -> DryRun {
     let nowhere = (f64::INFINITY, f64::NEG_INFINITY);
     let mut run = DryRun {
@@ -86,13 +86,13 @@ fn distance(from: [f64; 3], to: [f64; 3]) -> f64 {
     from.iter().zip(to).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
 }
 
-/// Length of an arc, and by how much the two radii differ.
+/// Returns the length of an arc, and the difference of its two radii.
 fn arc(from: [f64; 3], to: [f64; 3], offset: [f64; 2], counter_clockwise: bool) -> (f64, f64) {
     let end = [to[0] - from[0] - offset[0], to[1] - from[1] - offset[1]];
     let radius = offset[0].hypot(offset[1]);
     let sweep = end[1].atan2(end[0]) - (-offset[1]).atan2(-offset[0]);
     let sweep = if counter_clockwise { sweep } else { -sweep }.rem_euclid(TAU);
-    // A hair below zero is a full turn too many.
+    // An angle just below a full turn is a rounding error of 0.
     let sweep = if sweep > TAU - 1e-3 { 0.0 } else { sweep };
     (sweep * radius, (end[0].hypot(end[1]) - radius).abs())
 }

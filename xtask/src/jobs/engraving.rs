@@ -1,8 +1,8 @@
-//! Slow motion: short moves at low feeds, and a plunge slower than most.
+//! Slow motion: short moves at low feeds, and a very slow plunge.
 
 use super::program::{Point, Program};
 
-/// Length of one move, at most.
+/// Most length of one move, mm.
 const STEP: f64 = 0.25;
 const DEPTH: f64 = -0.05;
 const ORIGIN: Point = (15.0, 15.0);
@@ -43,7 +43,7 @@ fn engrave(p: &mut Program, stroke: &[Point], origin: Point, feed: f64, plunge: 
     p.plunge(0.0, 60.0);
     p.plunge(DEPTH, plunge);
     for (index, line) in stroke.windows(2).enumerate() {
-        // Each straight part a little faster than the one before.
+        // Each straight part is a little faster than the part before it.
         let feed = (feed + 5.0 * f64::from(u8::try_from(index).expect("few parts"))).min(120.0);
         for (n, point) in pieces(line[0], line[1]).into_iter().enumerate() {
             if n == 0 { p.cut_at(place(point), feed) } else { p.cut(place(point)) }
@@ -52,7 +52,7 @@ fn engrave(p: &mut Program, stroke: &[Point], origin: Point, feed: f64, plunge: 
     p.rapid_z(1.0);
 }
 
-/// A straight line as equal moves of at most `STEP`.
+/// Divides a straight line into equal moves of at most `STEP`.
 fn pieces(from: Point, to: Point) -> Vec<Point> {
     let (dx, dy) = (to.0 - from.0, to.1 - from.1);
     let mut count = 1.0;

@@ -1,4 +1,4 @@
-//! Writes the example jobs: plain arithmetic, the same text every time.
+//! Writes the example jobs. They are computed, so that the text is the same every time.
 
 mod bracket;
 #[cfg(test)]
@@ -15,7 +15,7 @@ use anyhow::{Context, Result};
 
 use crate::process::root;
 
-/// An example: its file's name and what it contains.
+/// An example: the name of its file, and the function that returns its text.
 type Job = (&'static str, fn() -> String);
 
 const JOBS: [Job; 5] = [
@@ -26,14 +26,14 @@ const JOBS: [Job; 5] = [
     (PRINT, print::job),
 ];
 
-/// The one that a printer prints.
+/// The example for a printer.
 const PRINT: &str = "print.gcode";
 
 fn path(name: &str) -> PathBuf {
     root().join("examples").join(name)
 }
 
-/// `cargo xtask jobs`: writes them all.
+/// `cargo xtask jobs`: writes all examples.
 pub fn write() -> Result<()> {
     for (name, job) in JOBS {
         let path = path(name);
@@ -68,7 +68,7 @@ mod tests {
         assert!(run.lines >= 500, "{} lines", run.lines);
         assert!(run.arcs >= 150, "{} arcs", run.arcs);
         assert!((300.0..=800.0).contains(&run.feed.0) && run.feed.1 <= 800.0, "{:?}", run.feed);
-        // Without ramps; with them it must still be under six minutes.
+        // The time without ramps. With ramps it must still be under six minutes.
         assert!((120.0..300.0).contains(&run.seconds), "{} s", run.seconds);
     }
 

@@ -1,4 +1,4 @@
-//! A small print, as a slicer writes it: a ring of 20 mm, three layers high.
+//! A small print, written like the output of a slicer: a ring of 20 mm, three layers high.
 
 use std::f64::consts::PI;
 use std::fmt::Write;
@@ -11,13 +11,14 @@ const INNER: f64 = 6.0;
 const LAYERS: u32 = 3;
 const HEIGHT: f64 = 0.2;
 const WIDTH: f64 = 0.45;
-/// Diameter of the filament.
+/// Diameter of the filament, mm.
 const FILAMENT: f64 = 1.75;
-/// Length of the straight pieces of a circle.
+/// Length of the straight pieces of a circle, mm.
 const CHORD: f64 = 0.5;
-/// Distance of the lines that fill.
+/// Distance of the infill lines, mm.
 const FILL: f64 = 1.5;
-/// How far the filament is pulled back for travels from here on.
+/// Length by which the filament is retracted for travels, mm, and the length of a travel from which on it is
+/// retracted.
 const RETRACTION: f64 = 0.8;
 const FAR: f64 = 2.0;
 
@@ -55,7 +56,7 @@ G1 X5 Y100 F6000 ; show the print
 M84 ; motors off
 ";
 
-/// The file.
+/// Returns the text of the file.
 pub fn job() -> String {
     let mut print = Print::default();
     print.text.push_str("; A ring of 20 mm, three layers of 0.2 mm, as a slicer writes it\n");
@@ -71,7 +72,7 @@ pub fn job() -> String {
 struct Print {
     text: String,
     at: Point,
-    /// Of filament, since the layer began.
+    /// Length of filament since the layer began.
     e: f64,
     feed: u32,
 }

@@ -1,4 +1,4 @@
-//! A G-code program in the making.
+//! Writes a G-code program.
 
 use std::f64::consts::PI;
 use std::fmt::Write;
@@ -6,20 +6,20 @@ use std::fmt::Write;
 /// A point in the XY plane, in millimetres.
 pub type Point = (f64, f64);
 
-/// The point at an angle, in degrees, on a circle.
+/// Returns the point at an angle, in degrees, on a circle.
 pub fn on_circle(centre: Point, radius: f64, degrees: f64) -> Point {
     let angle = degrees * PI / 180.0;
     (centre.0 + radius * angle.cos(), centre.1 + radius * angle.sin())
 }
 
-/// Lines of G-code in the order of cutting.
+/// The lines of a G-code program, in the order of cutting.
 #[derive(Default)]
 pub struct Program {
     text: String,
 }
 
 impl Program {
-    /// Begins with a title and the modes that all examples use.
+    /// Begins a program with a title and the modes that all examples use.
     pub fn new(title: &str) -> Program {
         let mut program = Program::default();
         program.note(title);
@@ -27,60 +27,60 @@ impl Program {
         program
     }
 
-    /// A line as it stands.
+    /// Adds a line as it stands.
     pub fn line(&mut self, line: &str) {
         self.text.push_str(line);
         self.text.push('\n');
     }
 
-    /// A comment.
+    /// Adds a comment.
     pub fn note(&mut self, note: &str) {
         self.line(&format!("({note})"));
     }
 
-    /// Rapid in the plane.
+    /// Adds a rapid move in the plane.
     pub fn rapid(&mut self, to: Point) {
         self.line(&format!("G0 X{} Y{}", number(to.0), number(to.1)));
     }
 
-    /// Rapid up or down.
+    /// Adds a rapid move up or down.
     pub fn rapid_z(&mut self, z: f64) {
         self.line(&format!("G0 Z{}", number(z)));
     }
 
-    /// Straight cut in the plane.
+    /// Adds a straight cut in the plane.
     pub fn cut(&mut self, to: Point) {
         self.line(&format!("G1 X{} Y{}", number(to.0), number(to.1)));
     }
 
-    /// Straight cut in the plane with a feed.
+    /// Adds a straight cut in the plane with a feed.
     pub fn cut_at(&mut self, to: Point, feed: f64) {
         self.line(&format!("G1 X{} Y{} F{}", number(to.0), number(to.1), number(feed)));
     }
 
-    /// Cut down.
+    /// Adds a cut downwards.
     pub fn plunge(&mut self, z: f64, feed: f64) {
         self.line(&format!("G1 Z{} F{}", number(z), number(feed)));
     }
 
-    /// Arc from a point around a centre; counter-clockwise is G3.
+    /// Adds an arc from a point around a centre; counter-clockwise is G3.
     pub fn arc(&mut self, from: Point, to: Point, centre: Point, counter_clockwise: bool) {
         let word = if counter_clockwise { "G3" } else { "G2" };
         let (i, j) = (number(centre.0 - from.0), number(centre.1 - from.1));
         self.line(&format!("{word} X{} Y{} I{i} J{j}", number(to.0), number(to.1)));
     }
 
-    /// Dwell.
+    /// Adds a dwell.
     pub fn wait(&mut self, seconds: f64) {
         self.line(&format!("G4 P{}", number(seconds)));
     }
 
-    /// The whole text.
+    /// Returns the whole text.
     pub fn text(self) -> String {
         self.text
     }
 
-    /// The whole text with a line number on every line but the comments.
+    /// Returns the whole text with a line number on every line except comments.
     pub fn numbered(self) -> String {
         let mut text = String::new();
         let mut n = 0;
@@ -96,7 +96,7 @@ impl Program {
     }
 }
 
-/// At most four decimals, none that say nothing, and no negative zero.
+/// Formats a number with at most four decimals, without trailing zeros and without a negative zero.
 fn number(value: f64) -> String {
     let text = format!("{value:.4}");
     let text = text.trim_end_matches('0').trim_end_matches('.');

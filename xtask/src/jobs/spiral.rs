@@ -1,10 +1,10 @@
-//! Many short segments at a high feed: what look-ahead is for.
+//! Many short segments at a high feed, which need look-ahead.
 
 use super::program::{Program, on_circle};
 
 const SEGMENTS: u32 = 2000;
 const CHORD: f64 = 0.1;
-/// Radial distance between turns.
+/// Radial distance between turns, mm.
 const PITCH: f64 = 1.0;
 const CENTRE: (f64, f64) = (20.0, 20.0);
 
@@ -27,7 +27,7 @@ fn point(degrees: f64) -> (f64, f64) {
     on_circle(CENTRE, PITCH * degrees / 360.0, degrees)
 }
 
-/// The angle one chord on, by bisection.
+/// Finds, by bisection, the angle that is one chord further along the spiral.
 fn next(from: f64) -> f64 {
     let start = point(from);
     let (mut low, mut high) = (from, from + 30.0);

@@ -1,39 +1,39 @@
-//! Reads a line of the interpreter's output: `   12 N..... NAME(argument, argument)`.
+//! Parses a line of the interpreter's output: `   12 N..... NAME(argument, argument)`.
 
 use anyhow::{Context, Result};
 
 /// A canonical command.
 #[derive(Debug, PartialEq)]
 pub struct Canon<'a> {
-    /// What it does.
+    /// The name of the command.
     pub name: &'a str,
     arguments: Vec<&'a str>,
 }
 
 impl<'a> Canon<'a> {
-    /// The command on a line, if there is one.
+    /// Parses the command on a line; `None` if there is none.
     pub fn read(line: &'a str) -> Option<Self> {
         let (head, rest) = line.split_once('(')?;
         let name = head.split_whitespace().last()?;
-        // A comment may have any text in it, but nobody asks for its arguments.
+        // A comment may have any text in it, but its arguments are never used.
         let inside = rest.rsplit_once(')')?.0;
         let arguments = inside.split([',', ' ']).filter(|word| !word.is_empty()).collect();
         Some(Self { name, arguments })
     }
 
-    /// An argument as it stands.
+    /// Returns an argument as text.
     pub fn word(&self, index: usize) -> Result<&'a str> {
         let word = self.arguments.get(index).copied();
         word.with_context(|| format!("{} has no argument {index}", self.name))
     }
 
-    /// An argument that is a number.
+    /// Returns an argument as a number.
     pub fn number(&self, index: usize) -> Result<f64> {
         let word = self.word(index)?;
         word.parse().with_context(|| format!("{} of {} is no number", word, self.name))
     }
 
-    /// Arguments that are numbers, from `first` on.
+    /// Returns `N` arguments as numbers, from `first` on.
     pub fn numbers<const N: usize>(&self, first: usize) -> Result<[f64; N]> {
         let mut numbers = [0.0; N];
         for (index, number) in numbers.iter_mut().enumerate() {

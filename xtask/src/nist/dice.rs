@@ -1,15 +1,15 @@
-//! Random numbers that are the same on every machine: xorshift64*, of G. Marsaglia and S. Vigna.
+//! Pseudo-random numbers that are the same on every computer: xorshift64*, by G. Marsaglia and S. Vigna.
 
 /// A source of random numbers.
 pub struct Dice(u64);
 
 impl Dice {
-    /// That of a seed.
+    /// The generator of a seed.
     pub fn new(seed: u64) -> Self {
         Self(seed.wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1)
     }
 
-    /// From 0 to one below `end`.
+    /// Returns a number from 0 to `end - 1`.
     pub fn below(&mut self, end: usize) -> usize {
         self.0 ^= self.0 >> 12;
         self.0 ^= self.0 << 25;
@@ -17,7 +17,7 @@ impl Dice {
         (self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 33) as usize % end
     }
 
-    /// One of these.
+    /// Returns one of the elements.
     pub fn of<T: Copy>(&mut self, choice: &[T]) -> T {
         choice[self.below(choice.len())]
     }

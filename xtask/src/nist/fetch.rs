@@ -1,4 +1,4 @@
-//! Gets the interpreter from the distribution's packages, without installing any.
+//! Gets the interpreter from the distribution's packages, without installing them.
 
 use std::path::Path;
 use std::process::Command;
@@ -8,9 +8,9 @@ use anyhow::{Context, Result, ensure};
 use super::oracle::Oracle;
 use crate::process::{output, root, run, which};
 
-/// The package with the interpreter, as Debian 12 has it.
+/// The package with the interpreter, named as in Debian 12.
 const MAIN: &str = "linuxcnc-uspace";
-/// The libraries that it needs and that a plain machine lacks.
+/// The libraries that the interpreter needs and that a plain installation lacks.
 const LIBRARIES: [&str; 7] = [
     "libboost-python1.74.0",
     "libpython3.11",
@@ -21,7 +21,7 @@ const LIBRARIES: [&str; 7] = [
     "libtirpc3",
 ];
 
-/// The interpreter, fetched unless an earlier run did.
+/// Returns the interpreter. Fetches it unless an earlier run has done so.
 pub fn oracle() -> Result<Oracle> {
     let dir = root().join("target/nist");
     let stamp = dir.join("version");
@@ -33,7 +33,7 @@ pub fn oracle() -> Result<Oracle> {
     Ok(Oracle { root: dir.join("root"), work: dir.join("work"), version })
 }
 
-/// Downloads and unpacks; gives the version.
+/// Downloads and unpacks the packages; returns the version.
 fn fetch(dir: &Path) -> Result<String> {
     for tool in ["apt-get", "dpkg-deb"] {
         ensure!(
@@ -41,7 +41,7 @@ fn fetch(dir: &Path) -> Result<String> {
             "`{tool}` is missing: {MAIN} comes as a package of Debian 12"
         );
     }
-    // What an interrupted run left behind.
+    // Removes what an interrupted run has left behind.
     let _ = std::fs::remove_dir_all(dir);
     let packages = dir.join("packages");
     std::fs::create_dir_all(&packages)?;

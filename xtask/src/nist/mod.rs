@@ -1,17 +1,17 @@
-//! An independent word on G-code: runs a NIST-derived interpreter over `tests/nist/*.ngc` and writes
-//! beside each program the motion that it makes of it.
+//! An independent reading of G-code: runs a NIST-derived interpreter over `tests/nist/*.ngc`, and writes the motion
+//! of each program beside it.
 //!
-//! | module | for |
+//! | module | purpose |
 //! |---|---|
 //! | [`fetch`] | gets the interpreter from the distribution's packages |
 //! | [`oracle`] | runs it over a program |
 //! | [`canon`] | reads a line of its output |
-//! | [`place`] | where the machine is: units, systems, lengths |
+//! | [`place`] | the position of the machine: units, systems, lengths |
 //! | [`motion`] | the normalised motion |
-//! | [`random`] | programs made at random, of [`dice`] |
+//! | [`random`] | random programs, made with [`dice`] |
 //!
-//! The files and their format: `tests/nist/README.md`. Neither the tests nor the checks come here: they
-//! use the motions that lie in the repository.
+//! `tests/nist/README.md` describes the files and their format. Neither the tests nor the checks use this module:
+//! they use the motions that are stored in the repository.
 
 mod canon;
 mod dice;
@@ -32,13 +32,13 @@ use random::Program;
 
 use crate::process::{root, run as run_command};
 
-/// What `cargo xtask nist` takes.
+/// Arguments of `cargo xtask nist`.
 #[derive(clap::Args)]
 pub struct Args {
     /// Write nothing: fail where a motion differs from what the interpreter makes now
     #[arg(long)]
     check: bool,
-    /// Instead, make N programs at random and check that Kerf agrees with the interpreter about them
+    /// Instead, make N random programs and check that Kerf agrees with the interpreter about them
     #[arg(long, value_name = "N", conflicts_with = "check")]
     random: Option<u64>,
     /// The first program's seed
@@ -69,7 +69,7 @@ pub fn run(args: &Args) -> Result<()> {
     Ok(())
 }
 
-/// Makes programs, with what the interpreter makes of them, and leaves it to Kerf's tests to compare.
+/// Makes random programs and their motions, and runs Kerf's tests to compare.
 fn random(oracle: &Oracle, seeds: std::ops::Range<u64>) -> Result<()> {
     let dir = root().join("target/nist/random");
     let _ = fs::remove_dir_all(&dir);
@@ -101,7 +101,7 @@ fn programs() -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// Writes a program's motion unless it is to be checked; says whether it was there as it should be.
+/// Writes a program's motion, unless it is only checked. Returns whether the stored motion was right.
 fn store(program: &Path, motion: &str, check: bool) -> Result<bool> {
     let file = program.with_extension("motion");
     let old = fs::read_to_string(&file).unwrap_or_default();
@@ -119,7 +119,7 @@ fn name(file: &Path) -> String {
     file.strip_prefix(root()).unwrap_or(file).display().to_string()
 }
 
-/// Where two motions begin to differ.
+/// Returns the first difference between two motions.
 fn difference(old: &str, new: &str) -> String {
     let (mut old, mut new) = (old.lines(), new.lines());
     let mut number = 0;

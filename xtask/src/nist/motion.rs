@@ -1,11 +1,11 @@
-//! The normalised motion: one line for each move and for all else that the machine does.
+//! The normalised motion: one line for each move and for every other action of the machine.
 
 use anyhow::{Result, bail};
 
 use super::canon::Canon;
 use super::place::{Axes, Frame, written};
 
-/// The plane of arcs: its name, its first and second axis, and the third.
+/// The plane of arcs: its name, its first and second axis, and its third axis.
 type Plane = (&'static str, [usize; 3]);
 const XY: Plane = ("XY", [0, 1, 2]);
 const ZX: Plane = ("ZX", [2, 0, 1]);
@@ -15,7 +15,7 @@ const YZ: Plane = ("YZ", [1, 2, 0]);
 pub struct Motion {
     frame: Frame,
     plane: Plane,
-    /// The place as it is written, to know a move that goes nowhere.
+    /// The position as text, to recognise a move that goes nowhere.
     place: String,
     spindle: &'static str,
     mist: bool,
@@ -24,7 +24,7 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// The motion that the interpreter's output tells of.
+    /// Returns the motion of the interpreter's output.
     pub fn of(canon: &str) -> Result<String> {
         let mut motion = Self {
             frame: Frame::new(),
@@ -57,7 +57,7 @@ impl Motion {
         Ok(())
     }
 
-    /// Units, offsets and planes.
+    /// Executes commands for units, offsets and planes. Returns whether it was such a command.
     fn set(&mut self, canon: &Canon) -> Result<bool> {
         match canon.name {
             "USE_LENGTH_UNITS" => self.frame.set_unit(unit(canon.word(0)?)?),
@@ -71,7 +71,7 @@ impl Motion {
         Ok(true)
     }
 
-    /// Spindle and coolant: what changes is told, what is repeated is not.
+    /// Executes commands for spindle and coolant. Writes changes only, no repetitions.
     fn switch(&mut self, name: &str) -> bool {
         match name {
             "START_SPINDLE_CLOCKWISE" => self.turn("CW"),
@@ -93,7 +93,7 @@ impl Motion {
         self.spindle = to;
     }
 
-    /// Off is told when neither is left on.
+    /// Writes that coolant is off when neither kind is left on.
     fn cool(&mut self, mist: bool, flood: bool, told: &str) {
         let changed = (mist, flood) != (self.mist, self.flood);
         (self.mist, self.flood) = (mist, flood);
@@ -102,7 +102,7 @@ impl Motion {
         }
     }
 
-    /// A straight move, unless it goes nowhere.
+    /// Writes a straight move, unless it goes nowhere.
     fn line(&mut self, kind: &str, end: Axes) {
         let place = self.written_place(end);
         if place != self.place {
@@ -111,13 +111,14 @@ impl Motion {
         }
     }
 
-    /// A probing is told even where it begins.
+    /// Writes a probing move, even if it ends where it begins.
     fn probe(&mut self, end: Axes) {
         self.place = self.written_place(end);
         self.say(&format!("PROBE{}", self.place));
     }
 
-    /// The ends and the centre along the plane's axes, the turns, the end along the third axis, A B C.
+    /// Writes an arc: the end and the centre along the plane's axes, the turns, the end along the third axis, and A B
+    /// C.
     fn arc(&mut self, canon: &Canon) -> Result<()> {
         let [first_end, second_end, first_centre, second_centre] = canon.numbers(0)?;
         let [third_end, a, b, c] = canon.numbers(5)?;
@@ -162,7 +163,7 @@ fn plane(name: &str) -> Result<Plane> {
     }
 }
 
-/// Commands that move nothing and that no motion tells of.
+/// Whether a command moves nothing and is not part of a motion.
 fn is_silent(name: &str) -> bool {
     const NAMES: [&str; 24] = [
         "CLEAR_AUX_OUTPUT_BIT",

@@ -8,23 +8,23 @@ use anyhow::{Context, Result, ensure};
 
 use super::motion::Motion;
 
-/// Settings: millimetres, and nothing else.
+/// Settings of the interpreter: millimetres, and nothing else.
 const SETTINGS: &str = "[TRAJ]\nLINEAR_UNITS = mm\nANGULAR_UNITS = degree\n[RS274NGC]\n";
-/// How many tools the table has, all of no length: `G10 L1` only changes tools that are there.
+/// Number of tools in the table, all without length. `G10 L1` only changes existing tools.
 const TOOLS: usize = 9;
 
-/// The interpreter: where it was unpacked, and where it may write.
+/// The interpreter: the folder where it was unpacked, and a folder where it may write.
 pub struct Oracle {
     /// The unpacked packages.
     pub root: PathBuf,
-    /// For the files that it wants.
+    /// The folder for the files that it needs.
     pub work: PathBuf,
-    /// Package and version.
+    /// Name and version of the package.
     pub version: String,
 }
 
 impl Oracle {
-    /// The normalised motion of a program that starts at the machine's origin with everything reset.
+    /// Returns the normalised motion of a program that starts at the machine's origin with everything reset.
     pub fn motion(&self, program: &Path) -> Result<String> {
         self.reset()?;
         let output = self.command(program).output().context("cannot run the interpreter")?;
@@ -34,7 +34,7 @@ impl Oracle {
         Motion::of(&canon)
     }
 
-    /// The interpreter writes its files at the end: each program gets new ones.
+    /// Writes new files for the interpreter, because it changes its files at the end of each program.
     fn reset(&self) -> Result<()> {
         let _ = fs::remove_dir_all(&self.work);
         fs::create_dir_all(&self.work)?;

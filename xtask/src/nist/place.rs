@@ -1,17 +1,17 @@
-//! Where the machine is. The interpreter speaks in the program's unit and coordinates; a place here is
-//! in machine coordinates, in millimetres and degrees.
+//! The position of the machine. The interpreter uses the program's unit and coordinates. A position here is in
+//! machine coordinates, in millimetres and degrees.
 
 use std::fmt::Write;
 
 /// X Y Z A B C.
 pub type Axes = [f64; 6];
 
-/// How many of the axes are lengths.
+/// Number of axes that are lengths.
 const LENGTHS: usize = 3;
 
-/// What lies between the program's coordinates and the machine's, in millimetres.
+/// The difference between the program's coordinates and the machine's, in millimetres.
 pub struct Frame {
-    /// Millimetres of the program's unit.
+    /// The program's unit in millimetres.
     unit: f64,
     system: Axes,
     shift: Axes,
@@ -19,32 +19,32 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// Millimetres and no offset.
+    /// A frame in millimetres without offsets.
     pub const fn new() -> Self {
         Self { unit: 1.0, system: [0.0; 6], shift: [0.0; 6], tool: [0.0; 6] }
     }
 
-    /// The unit of all that follows; offsets keep their size.
+    /// Sets the unit of all that follows; offsets keep their size.
     pub fn set_unit(&mut self, millimetres: f64) {
         self.unit = millimetres;
     }
 
-    /// The origin of the coordinate system in use.
+    /// Sets the origin of the coordinate system in use.
     pub fn set_system(&mut self, offset: Axes) {
         self.system = self.scaled(offset);
     }
 
-    /// The shift by G92.
+    /// Sets the shift by G92.
     pub fn set_shift(&mut self, offset: Axes) {
         self.shift = self.scaled(offset);
     }
 
-    /// The tool's length.
+    /// Sets the tool's length.
     pub fn set_tool(&mut self, offset: Axes) {
         self.tool = self.scaled(offset);
     }
 
-    /// A coordinate of the program on an axis, in the machine's.
+    /// Converts a coordinate of the program on an axis to a machine coordinate.
     pub fn machine(&self, axis: usize, value: f64) -> f64 {
         let unit = if axis < LENGTHS { self.unit } else { 1.0 };
         value * unit + self.system[axis] + self.shift[axis] + self.tool[axis]
@@ -56,7 +56,7 @@ impl Frame {
     }
 }
 
-/// Numbers as a motion has them: four decimals, no negative zero, each after a blank.
+/// Formats numbers for a motion: four decimals, no negative zero, each after a blank.
 pub fn written(numbers: &[f64]) -> String {
     numbers.iter().fold(String::new(), |mut text, number| {
         let shown = format!("{number:.4}");

@@ -1,5 +1,5 @@
-//! Programs made at random, of lines that both interpreters take and understand alike: what is known to
-//! differ (`tests/nist/README.md`, `tests/support/differences.rs`) is left out.
+//! Random programs of lines that both interpreters accept and read alike. Known differences (`tests/nist/README.md`,
+//! `tests/support/differences.rs`) are left out.
 
 mod series;
 
@@ -7,27 +7,27 @@ use std::fmt::Write;
 
 use super::dice::Dice;
 
-/// Lines in a program, at least.
+/// Least number of lines in a program.
 const LINES: usize = 200;
 
-/// A program, and what it has to know of its state to go on.
+/// A program, and the state that is needed to continue it.
 pub struct Program {
     dice: Dice,
     text: String,
     lines: usize,
     inch: bool,
     incremental: bool,
-    /// G17, G18, G19.
+    /// Index of the plane: G17, G18, G19.
     plane: usize,
     /// Whether axis words alone are a straight move.
     straight: bool,
 }
 
-/// Depth axis last, as planes have them.
+/// The axes of the planes, with the depth axis last.
 const PLANES: [[char; 3]; 3] = [['X', 'Y', 'Z'], ['Z', 'X', 'Y'], ['Y', 'Z', 'X']];
 
 impl Program {
-    /// The program of a seed: always the same.
+    /// Returns the program of a seed, which is always the same.
     pub fn of(seed: u64) -> String {
         let mut program = Self {
             dice: Dice::new(seed),
@@ -70,7 +70,7 @@ impl Program {
         };
         let words = self.some("XYZABC");
         let more = self.dice.of(&["", "", "", "", "M3 S100", "M5", "M7", "M8", "M9", "M4", "M1"]);
-        // The order of words means nothing.
+        // The order of words does not matter.
         let line = match self.dice.below(3) {
             0 => format!("{words} {more} {code}"),
             1 => format!("{more} {code} {words}"),
@@ -80,7 +80,7 @@ impl Program {
         self.straight = true;
     }
 
-    /// In G91, where a half circle is one wherever it begins.
+    /// Adds an arc in G91, where a half circle has the same words wherever it begins.
     fn arc(&mut self) {
         let [first, second, depth] = PLANES[self.plane];
         let code = self.dice.of(&["G2", "G3"]);
@@ -101,7 +101,7 @@ impl Program {
                 format!("G91 {code} {ends} R{sign}{radius} {more}")
             }
         };
-        // A helix or a turn of A from nowhere to nowhere is a full circle.
+        // A helix, or a turn of A, with a zero distance is a full circle.
         if !line.starts_with("G91") && !self.incremental {
             line = format!("{code} {}", offsets.concat());
         }
@@ -119,7 +119,7 @@ impl Program {
                 self.say(&format!("G{}", 17 + self.plane));
             }
             3 => {
-                // A length in force and another unit: the other interpreter is wrong.
+                // The other interpreter is wrong with a tool length in force when the unit changes.
                 self.say("G49");
                 self.inch = !self.inch;
                 self.say(if self.inch { "G20" } else { "G21" });
@@ -143,7 +143,7 @@ impl Program {
     }
 
     fn offsets(&mut self) {
-        // Tools along axes that turn, G28 of the other interpreter forgets.
+        // Tool lengths along rotary axes are left out, because the other interpreter forgets them at G28.
         let axes = self.dice.of(&["XYZ", "XYZAC"]);
         let words = self.some(axes);
         let line = match self.dice.below(10) {
@@ -163,8 +163,8 @@ impl Program {
         let tool = 1 + self.dice.below(9);
         let line = match self.dice.below(6) {
             0 | 2 => {
-                // A change takes the place anew, and the other interpreter forgets a length that no
-                // move has seen.
+                // A tool change makes the other interpreter read the position anew, and it forgets a tool length that
+                // no move has used.
                 self.everywhere();
                 format!("T{tool} M6{}", self.dice.of(&["", "\nG43"]))
             }
@@ -176,7 +176,7 @@ impl Program {
         self.say(&line);
     }
 
-    /// All lengths.
+    /// Adds a move of all linear axes.
     fn everywhere(&mut self) {
         let to = ["X", "Y", "Z"].map(|axis| format!("{axis}{}", self.value(-50, 50)));
         self.say(&format!("G90 G0 {}", to.join(" ")));
@@ -226,11 +226,11 @@ impl Program {
         let axis = self.dice.of(&["X", "Y", "Z"]);
         let way = self.value(1, 9);
         self.say(&format!("G38.2 {axis}{way}"));
-        // The other interpreter goes on from about 0.254 mm before that place.
+        // The other interpreter goes on from about 0.254 mm before that position.
         self.everywhere();
     }
 
-    /// Some axes' words, at least one.
+    /// Returns the words of some axes, at least one.
     fn some(&mut self, axes: &str) -> String {
         let chosen = 1 + self.dice.below((1 << axes.len()) - 1);
         let mut words = String::new();
@@ -248,13 +248,13 @@ impl Program {
         self.number(value)
     }
 
-    /// Hundredths of a millimetre, of which none is too little to be a move.
+    /// Returns hundredths of a millimetre, never a value too small to be a move.
     fn units(&mut self, low: i32, high: i32) -> i32 {
         (low * 2 + self.dice.below((high - low) as usize * 2) as i32) * 50 + 25
     }
 
-    /// Hundredths of a millimetre in the unit in force. An inch is taken for 25 mm: what matters is that it
-    /// is of about the same size, in few decimals.
+    /// Formats hundredths of a millimetre in the unit in force. An inch is taken as 25 mm, because only a similar
+    /// size with few decimals matters.
     fn number(&self, hundredths: i32) -> String {
         let (sign, size) = (if hundredths < 0 { "-" } else { "" }, hundredths.unsigned_abs());
         match self.inch {
@@ -270,7 +270,7 @@ impl Program {
     }
 }
 
-/// I, J or K, which go with X, Y and Z.
+/// Returns I, J or K, which belong to X, Y and Z.
 fn offset(axis: char, number: &str) -> String {
     let letter = char::from(b'I' + (axis as u8 - b'X'));
     format!(" {letter}{number}")

@@ -1,4 +1,4 @@
-//! The emulator of the chip: rp2040js from npm, and beside it what is ours (`tests/rp2040/emulator`).
+//! The emulator of the chip: rp2040js from npm, and our own program (`tests/rp2040/emulator`).
 
 use std::fs;
 use std::path::PathBuf;
@@ -12,7 +12,7 @@ use crate::process::{root, run};
 /// Its folder in `target`, where `kerf-sim` looks for it beside the images.
 const FOLDER: &str = "rp2040-emulator";
 
-/// Installs it. Programs find the packages of npm beside them, so that ours are copied there.
+/// Installs the emulator. Programs look for packages of npm beside themselves, so our own files are copied there.
 pub fn install() -> Result<PathBuf> {
     let sources = root().join("tests/rp2040");
     let folder = npm::install(FOLDER, &sources)?;
@@ -24,7 +24,7 @@ pub fn install() -> Result<PathBuf> {
     Ok(folder)
 }
 
-/// Runs the tests of what is put right in rp2040js.
+/// Runs the tests of our corrections to rp2040js.
 pub fn test() -> Result<()> {
     let folder = install()?;
     run(Command::new("node").args(["--test", "."]).current_dir(folder))

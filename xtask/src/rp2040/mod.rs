@@ -1,4 +1,4 @@
-//! Boards with an RP2040: builds their images, makes what the chip's boot loader takes, and puts their emulator where it is looked for.
+//! Boards with an RP2040: builds their images, converts them for the chip's boot loader, and installs the emulator.
 
 pub mod emulator;
 pub mod uf2;
@@ -14,15 +14,16 @@ use crate::toolchain::Toolchain;
 /// The instruction set of its cores.
 const TARGET: &str = "thumbv6m-none-eabi";
 
-/// Scripts of `cortex-m-rt` and `embassy-rp`, which find `memory.x` beside the chip's sources; `--nmagic`: sections are not moved to pages.
+/// Linker scripts of `cortex-m-rt` and `embassy-rp`, which find `memory.x` in the folder of the chip's sources. With
+/// `--nmagic` sections are not aligned to pages.
 const FLAGS: &str = "-C linker=ld.lld -C link-arg=-Tlink.x -C link-arg=-Tlink-rp.x -C link-arg=-Lsrc/hal/rp2040 -C link-arg=--nmagic";
 
-/// Flash that the image may take: 2 MiB without the part of `memory.x` that keeps settings.
+/// Flash that the image may take: 2 MiB minus the part of `memory.x` that stores settings.
 const FLASH: u64 = (2 << 20) - (64 << 10);
-/// RAM for statics, of 256 KiB; the rest is the stack's.
+/// RAM for statics, of 256 KiB; the rest is for the stack.
 const STATIC_RAM: u64 = 192 << 10;
 
-/// What an image takes, bytes.
+/// The sizes of an image, bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sizes {
     /// Code, constants and initial values.
@@ -31,7 +32,7 @@ pub struct Sizes {
     pub ram: u64,
 }
 
-/// Builds an image with these features, and keeps it under its name.
+/// Builds an image with these features, and copies it to its own name.
 pub fn build(features: &str, image: &Path) -> Result<PathBuf> {
     let rust = Toolchain::find().context("no Rust that can build for it; `cargo xtask setup`")?;
     let target = root().join("target/rp2040");
@@ -48,7 +49,7 @@ pub fn build(features: &str, image: &Path) -> Result<PathBuf> {
     Ok(image.to_owned())
 }
 
-/// Prints what an image takes, and fails past a cap.
+/// Prints the sizes of an image, and fails past a cap.
 pub fn show(image: &Path) -> Result<()> {
     let sizes = check(image)?;
     println!("{}", image.display());
@@ -57,7 +58,7 @@ pub fn show(image: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Refuses an image for which there is no room.
+/// Refuses an image that is too large.
 fn check(image: &Path) -> Result<Sizes> {
     let sizes = sizes(&std::fs::read(image)?)?;
     ensure!(sizes.flash <= FLASH, "flash {} > {FLASH}", sizes.flash);
@@ -65,9 +66,9 @@ fn check(image: &Path) -> Result<Sizes> {
     Ok(sizes)
 }
 
-/// What an ELF file puts into flash, and into RAM.
+/// Returns what an ELF file puts into flash, and into RAM.
 fn sizes(elf: &[u8]) -> Result<Sizes> {
-    /// From here up it is RAM.
+    /// From this address up, addresses mean RAM.
     const RAM: u64 = 0x2000_0000;
     const ALLOCATED: u64 = object::elf::SHF_ALLOC as u64;
     let file = File::parse(elf)?;

@@ -1,4 +1,4 @@
-//! UF2, which the boot loader of the RP2040 takes: blocks of 512 bytes, each with 256 bytes of flash and where they go.
+//! UF2, the format of the RP2040's boot loader: blocks of 512 bytes, each with 256 bytes of flash and their address.
 //!
 //! <https://github.com/microsoft/uf2>
 
@@ -9,18 +9,18 @@ use object::read::elf::{ElfFile32, FileHeader, ProgramHeader};
 
 const MAGIC: [u32; 2] = [0x0A32_4655, 0x9E5D_5157];
 const END: u32 = 0x0AB1_6F30;
-/// The family of the chip is told.
+/// The flag which says that a block names the family of the chip.
 const HAS_FAMILY: u32 = 0x2000;
-/// The RP2040.
+/// The family of the RP2040.
 const FAMILY: u32 = 0xE48B_FF56;
-/// Bytes of flash in a block: what the chip programs at once.
+/// Bytes of flash in a block: the chip programs this many at once.
 const PAGE: usize = 256;
-/// Where the flash is.
+/// The addresses of the flash.
 const FLASH: std::ops::Range<u32> = 0x1000_0000..0x1100_0000;
 
 type Pages = BTreeMap<u32, [u8; PAGE]>;
 
-/// The file for an image.
+/// Converts an image to UF2.
 pub fn of_elf(elf: &[u8]) -> Result<Vec<u8>> {
     let file = ElfFile32::<object::Endianness>::parse(elf)?;
     let endian = file.endian();
@@ -37,7 +37,7 @@ pub fn of_elf(elf: &[u8]) -> Result<Vec<u8>> {
     Ok(blocks(&pages))
 }
 
-/// Puts bytes into pages; what is between them stays erased.
+/// Puts bytes into pages; the bytes between them stay erased.
 fn put(pages: &mut Pages, at: u32, bytes: &[u8]) {
     for (at, byte) in (at..).zip(bytes) {
         let within = at as usize % PAGE;

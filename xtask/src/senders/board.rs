@@ -1,4 +1,4 @@
-//! The simulated board behind a serial port, and where its motors end.
+//! The simulated board behind a serial port, and the end positions of its motors.
 
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::process::{Child, ChildStdout, Command, Stdio};
 
 use anyhow::{Context, Result, ensure};
 
-/// A board that serves a sender. It ends when this does.
+/// A board that serves a sender. It ends when this value is dropped.
 pub struct Board {
     child: Child,
     output: BufReader<ChildStdout>,
@@ -15,7 +15,7 @@ pub struct Board {
 }
 
 impl Board {
-    /// Starts it. `damage` is what the simulator takes for `--damage`.
+    /// Starts a board. `damage` is the argument of the simulator's `--damage`.
     pub fn start(
         program: &Path,
         elf: &Path,
@@ -40,7 +40,8 @@ impl Board {
         Ok(board)
     }
 
-    /// Ends its standard input and thereby it; tells where its motors are, and whether that is where the job ends.
+    /// Ends the board's standard input, and thereby the board. Returns whether its motors are where the job ends, and
+    /// their positions as text.
     pub fn end(mut self) -> Result<(bool, String)> {
         drop(self.child.stdin.take());
         let mut text = String::new();
@@ -52,13 +53,13 @@ impl Board {
 
 impl Drop for Board {
     fn drop(&mut self) {
-        // It has ended already, or something has failed and been told.
+        // The board has ended already, or something has failed and was reported.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
 }
 
-/// The motors of a simulator's last words: `motor 1: 0 of 0, 1931244 in all`.
+/// Returns the motors from a simulator's last lines, such as `motor 1: 0 of 0, 1931244 in all`.
 fn motors(text: &str) -> String {
     let shown = |line: &str| {
         let words: Vec<_> = line.strip_prefix("arrival ")?.split_whitespace().collect();

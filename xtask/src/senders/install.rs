@@ -9,28 +9,28 @@ use crate::npm;
 use crate::process::{root, run};
 use crate::setup::python;
 
-/// The folder of the Python that most of the senders in Python are installed for.
+/// The folder of the Python environment that most senders in Python are installed in.
 const PYTHON: &str = "python";
 
-/// A Python with packages of PyPI.
+/// A Python environment with packages of PyPI.
 struct Packages {
-    /// The list of the packages, as pip reads it, among the drivers.
+    /// The list of the packages, as pip reads it, in the folder of the drivers.
     list: &'static str,
-    /// The folder of the Python.
+    /// The folder of the environment.
     folder: &'static str,
-    /// Whether pip installs what the packages ask for, besides the list.
+    /// Whether pip also installs the dependencies of the listed packages.
     with_all: bool,
 }
 
 const PACKAGES: [Packages; 2] = [
-    // bCNC asks for packages that only its window needs.
+    // bCNC depends on packages that only its window needs.
     Packages { list: "requirements.txt", folder: PYTHON, with_all: false },
-    // OctoPrint asks for versions of its own.
+    // OctoPrint depends on certain versions of other packages.
     Packages { list: "requirements-octoprint.txt", folder: "octoprint", with_all: true },
 ];
 
-/// The folder that the senders are installed in, which they are unless an earlier run did it. No scripts of npm's run: `g2core-api` has one that builds a
-/// serial port too old to build.
+/// Installs the senders, unless an earlier run has done so, and returns their folder. Install scripts of npm packages
+/// do not run: the script of `g2core-api` builds a serial port that is too old to build.
 pub fn senders() -> Result<PathBuf> {
     let folder = npm::install("senders", &drivers())?;
     for packages in &PACKAGES {
@@ -39,13 +39,13 @@ pub fn senders() -> Result<PathBuf> {
     Ok(folder)
 }
 
-/// The Python that drivers in Python run with, in the folder of [`senders`].
+/// Returns the Python that runs the drivers in Python, in the folder of [`senders`].
 pub fn python_of(folder: &Path) -> PathBuf {
     folder.join(PYTHON).join("bin/python")
 }
 
 impl Packages {
-    /// Installs the packages, unless an earlier run did it.
+    /// Installs the packages, unless an earlier run has done so.
     fn install(&self, folder: &Path) -> Result<()> {
         let wanted = drivers().join(self.list);
         let wanted =
@@ -68,7 +68,7 @@ impl Packages {
     }
 }
 
-/// Where the drivers lie.
+/// Returns the folder of the drivers.
 pub fn drivers() -> PathBuf {
     root().join("tests/senders")
 }

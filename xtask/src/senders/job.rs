@@ -1,13 +1,13 @@
-//! What hosts of printers send: 2,000 short moves, each relative to the one before, so that a line that is carried out twice, or not at all, shows
-//! where the job ends.
+//! The job of printing hosts: 2,000 short moves, each relative to the one before. A line that is executed twice, or
+//! not at all, shows in the end position.
 
 use std::fmt::Write;
 
-/// The moves of the job.
+/// Number of moves in the job.
 const MOVES: u32 = 2_000;
-/// How far from its middle a job strays before it turns back, thousandths of a mm.
+/// Distance from its middle at which the job turns back, thousandths of a mm.
 const FAR: i32 = 15_000;
-/// One move in so many is a travel, with the filament pulled back.
+/// One in so many moves is a travel, with the filament retracted.
 const TRAVEL_EVERY: u32 = 50;
 
 const START: &str = "\
@@ -25,7 +25,7 @@ M107
 G90
 ";
 
-/// The file.
+/// Returns the text of the file.
 pub fn prints() -> String {
     let mut text = START.to_owned();
     let (mut at, mut random) = ([0; 2], 21u32);

@@ -1,17 +1,17 @@
 //! `cargo xtask senders`: real senders of G-code against the simulated board.
 //!
-//! | module | for |
+//! | module | purpose |
 //! |---|---|
 //! | [`install`] | gets the senders by npm and pip |
-//! | [`job`] | what hosts of printers send |
-//! | [`board`] | the simulated board behind a serial port, and where its motors end |
+//! | [`job`] | the job of printing hosts |
+//! | [`board`] | the simulated board behind a serial port, and the end positions of its motors |
 //! | [`pool`] | how many sessions run at once |
 //! | [`session`] | one sender at one board |
-//! | [`step`] | what a sender's driver tells of its steps |
-//! | [`table`] | what came of it all |
+//! | [`step`] | the steps that a sender's driver reports |
+//! | [`table`] | the results of all sessions |
 //!
-//! The drivers are `tests/senders/*.js` and `*.py`. Each has a board of its own, as fast as the computer can make
-//! it, and sends the whole job; then every motor has to be where the job ends, to the step.
+//! The drivers are `tests/senders/*.js` and `*.py`. Each has a board of its own, which runs as fast as the computer
+//! allows, and sends the whole job. At the end every motor must be where the job ends, to the step.
 
 mod board;
 mod install;
@@ -36,13 +36,13 @@ use session::Session;
 /// `cargo xtask senders`
 #[derive(Args, Default)]
 pub struct SendersArgs {
-    /// This sender only
+    /// Only this sender
     #[arg(long, value_enum)]
     sender: Option<Sender>,
-    /// The job that they send, a file of G-code
+    /// The G-code file that they send
     #[arg(long, value_name = "JOB")]
     job: Option<PathBuf>,
-    /// The board: of those whose chip is emulated pico-cnc, which senders that print are not for
+    /// The board; of the emulated ones only pico-cnc, which is not for printing hosts
     #[arg(long, value_enum)]
     board: Option<Board>,
     /// Install the senders and run none
@@ -50,7 +50,7 @@ pub struct SendersArgs {
     install: bool,
 }
 
-/// A sender that there is a driver for.
+/// A sender that has a driver.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
 enum Sender {
     Cncjs,
@@ -66,7 +66,7 @@ enum Sender {
 }
 
 impl Sender {
-    /// Its name.
+    /// Returns its name.
     fn name(self) -> &'static str {
         match self {
             Sender::Cncjs => "cncjs",
@@ -82,7 +82,7 @@ impl Sender {
         }
     }
 
-    /// Its driver, and what that is told besides port and job.
+    /// Returns its driver, and the driver's further argument besides port and job.
     fn driver(self) -> (&'static str, Option<&'static str>) {
         match self {
             Sender::Cncjs => ("cncjs.js", None),
@@ -100,7 +100,7 @@ impl Sender {
 }
 
 impl Sender {
-    /// Whether it is a host of printers.
+    /// Whether it is a printing host.
     fn prints(self) -> bool {
         matches!(
             self,
@@ -108,23 +108,25 @@ impl Sender {
         )
     }
 
-    /// The board that this sender is tried with by default.
+    /// Returns the board for this sender by default.
     fn board(self) -> Board {
         if self.prints() { Board::Ramps14 } else { Board::default() }
     }
 
-    /// One line in a hundred of a host that sends checksums is damaged on its way, by a seed.
+    /// Returns the damage for a host that sends checksums: one line in a hundred is damaged on its way, by a seed.
     fn damage(self) -> Option<&'static str> {
         (self == Sender::Printcore).then_some("100:21")
     }
 }
 
-/// All senders, with a job of half the usual one's time: what is tried are conversations. Whole jobs are the simulator's.
+/// Runs all senders with a job of half the usual time, because the conversations are tested. Whole jobs are tested
+/// with the simulator.
 pub fn run_short() -> Result<()> {
     run(&SendersArgs { job: Some(root().join("examples/engraving.gcode")), ..Default::default() })
 }
 
-/// A sender of TinyG's dialect and one of grbl's at the emulated RP2040, one after the other: an emulator has a core of the computer to itself.
+/// Runs a sender of TinyG's dialect and one of grbl's at the emulated RP2040, in sequence, because an emulator needs
+/// a core of the computer to itself.
 pub fn run_emulated() -> Result<()> {
     for sender in [Sender::Cncjs, Sender::GrblStreamer] {
         let job = Some(root().join("examples/square.gcode"));
@@ -134,7 +136,7 @@ pub fn run_emulated() -> Result<()> {
     Ok(())
 }
 
-/// Runs the senders, a few at once, and shows what came of it. Fails if anything did.
+/// Runs the senders, a few at once, and shows the results. Fails if a sender failed.
 pub fn run(args: &SendersArgs) -> Result<()> {
     let job = args.job.clone().unwrap_or_else(|| root().join("examples/bracket.gcode"));
     ensure!(job.is_file(), "there is no job {}", job.display());
@@ -156,7 +158,7 @@ pub fn run(args: &SendersArgs) -> Result<()> {
         elves.push(sim::prepare(board_of(sender), Machine::default())?);
     }
     let program = sim::program();
-    // A printer's host sends what a printer prints.
+    // A printing host sends a print.
     let print = folder.join("print.gcode");
     std::fs::write(&print, job::prints())?;
     let session = &|(sender, elf): (Sender, &PathBuf)| {

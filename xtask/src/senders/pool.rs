@@ -1,18 +1,21 @@
-//! Sessions beside each other, a few at once.
+//! Runs sessions in parallel, a few at once.
 //!
-//! A simulated board takes all that a core of the computer has, and drivers limit their steps by the clock on the wall. More sessions than cores take as
-//! long in sum, but each of their steps takes longer: with ten at once on two cores homing took a minute.
+//! A simulated board uses a whole core of the computer, and drivers limit the time of their steps by the wall clock.
+//! With more sessions than cores the total time is the same, but each step takes longer: with ten at once on two
+//! cores homing took a minute.
 
 use std::num::NonZero;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
-/// How many sessions run at once: one a core, and one more for the time in which a sender starts and its board has nothing to do.
+/// Returns how many sessions run at once: one for each core, and one more for the time in which a sender starts and
+/// its board is idle.
 pub fn at_once() -> usize {
     thread::available_parallelism().map_or(1, NonZero::get) + 1
 }
 
-/// Does something with each of `items`, at most `at_once` of them at a time, first come first served. Results are in the order of the items.
+/// Calls a function with each of `items`, at most `at_once` at a time, in their order. Results are in the order of
+/// the items.
 pub fn run<T: Copy + Sync, R: Send>(
     items: &[T],
     at_once: usize,

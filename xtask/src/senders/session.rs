@@ -1,4 +1,4 @@
-//! One sender at one board.
+//! A session of one sender at one board.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader};
@@ -17,23 +17,23 @@ use super::step::{Outcome, Step};
 
 /// The step that every session ends with.
 pub const ARRIVAL: &str = "exact final step";
-/// A driver limits its steps itself; one that has not ended after this long never will.
+/// Longest time of a driver. A driver limits its steps itself, so one that takes longer never ends.
 const LIMIT: Duration = Duration::from_secs(15 * 60);
 
-/// What a session needs.
+/// The data that a session needs.
 pub struct Session<'a> {
     pub sender: Sender,
-    /// The simulator.
+    /// The path of the simulator.
     pub program: &'a Path,
     pub elf: &'a Path,
     /// The board that the image is for.
     pub board: crate::boards::Board,
     pub job: &'a Path,
-    /// Where the senders are installed.
+    /// The folder of the installed senders.
     pub folder: &'a Path,
 }
 
-/// What came of a session.
+/// The result of a session.
 pub struct Done {
     pub sender: &'static str,
     pub steps: Vec<Step>,
@@ -41,12 +41,12 @@ pub struct Done {
 }
 
 impl Session<'_> {
-    /// What the driver says besides its steps.
+    /// Returns the file for the driver's other output.
     fn log(&self) -> PathBuf {
         self.folder.join(self.sender.name()).with_extension("log")
     }
 
-    /// Runs it and shows its steps as they come. Whatever goes wrong is a step that has failed.
+    /// Runs the session and shows its steps as they come. Any error becomes a failed step.
     pub fn run(&self) -> Done {
         let began = Instant::now();
         let sender = self.sender.name();
@@ -83,7 +83,7 @@ impl Session<'_> {
     }
 }
 
-/// A sender's driver, with all that it starts in a process group of its own.
+/// A sender's driver, which is in a process group with everything that it starts.
 struct Driver {
     child: Child,
     lines: Receiver<String>,
@@ -99,7 +99,7 @@ impl Driver {
         let mut command = Command::new(&program);
         command.arg(install::drivers().join(script)).arg(port).arg(session.job).args(word);
         command.current_dir(session.folder);
-        // A driver gives up when its standard input ends, which it does with us, however that comes.
+        // A driver gives up when its standard input ends. That happens when this program ends, for whatever reason.
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).process_group(0);
         command.stderr(File::create(session.log()).context("no log")?);
         let child = command.spawn();
@@ -112,7 +112,7 @@ impl Driver {
         Ok(Driver { child, lines })
     }
 
-    /// Its next line; none when it has ended.
+    /// Returns the driver's next line; `None` when it has ended.
     fn line(&mut self, end: Instant) -> Result<Option<String>> {
         use std::sync::mpsc::RecvTimeoutError::{Disconnected, Timeout};
         match self.lines.recv_timeout(end.saturating_duration_since(Instant::now())) {
@@ -125,7 +125,7 @@ impl Driver {
 
 impl Drop for Driver {
     fn drop(&mut self) {
-        // Most often they have ended; then there is nothing to do.
+        // Usually the driver has ended, and nothing is left to do.
         if !matches!(self.child.try_wait(), Ok(Some(_))) {
             let kill = format!("kill -KILL -{}", self.child.id());
             let _ = Command::new("sh").args(["-c", &kill]).status();

@@ -1,21 +1,21 @@
-//! What a sender's driver tells of its steps: a line each, `step`, the result, the name, details, parted
-//! by tabs.
+//! The steps that a sender's driver reports, one on each line: `step`, the result, the name and details, separated by
+//! tabs.
 
-/// What came of a step.
+/// The result of a step.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Outcome {
-    /// As it should be.
+    /// The step did what it should.
     Passed,
-    /// Not as it should be.
+    /// The step failed.
     Failed,
-    /// The firmware does not do this so far.
+    /// The firmware does not support this yet.
     NotYet,
 }
 
 impl Outcome {
     const ALL: [Outcome; 3] = [Outcome::Passed, Outcome::Failed, Outcome::NotYet];
 
-    /// As the drivers write it.
+    /// Returns the name that the drivers write.
     pub fn name(self) -> &'static str {
         match self {
             Outcome::Passed => "passed",
@@ -28,11 +28,11 @@ impl Outcome {
 /// A step of a test.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Step {
-    /// What it does.
+    /// What the step does.
     pub name: String,
-    /// What came of it.
+    /// Its result.
     pub outcome: Outcome,
-    /// For people.
+    /// Details for readers.
     pub details: String,
 }
 
@@ -42,7 +42,7 @@ impl Step {
         Step { name: name.to_owned(), outcome: Outcome::Failed, details: details.into() }
     }
 
-    /// Reads a line of a driver; `None` if it tells of no step.
+    /// Parses a line of a driver; `None` if the line is no step.
     pub fn parse(line: &str) -> Option<Step> {
         let mut parts = line.strip_prefix("step\t")?.splitn(3, '\t');
         let outcome = parts.next()?;

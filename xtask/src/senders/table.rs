@@ -1,9 +1,9 @@
-//! What came of it all, as a table.
+//! Prints the results as a table.
 
 use super::session::{ARRIVAL, Done};
 use super::step::{Outcome, Step};
 
-/// Prints every step of every sender. Returns whether all has passed.
+/// Prints every step of every sender. Returns whether all steps have passed.
 pub fn show(sessions: &[Done]) -> bool {
     println!("\n{:<14}{:<20}{:<10}details", "sender", "step", "result");
     for (done, step) in steps(sessions) {
@@ -24,7 +24,7 @@ pub fn show(sessions: &[Done]) -> bool {
 /// Senders with a job of their own.
 const OWN_JOB: [&str; 4] = ["cncjs-marlin", "marlin-host", "octoprint", "printcore"];
 
-/// Whether the motors have made the same steps, not only the same way on balance, for every sender.
+/// Whether the motors have made the same number of steps, in both directions together, for every sender.
 fn agree(sessions: &[Done]) -> bool {
     let motors = steps(sessions).filter(|(done, _)| !OWN_JOB.contains(&done.sender));
     let motors = motors.filter(|(_, step)| step.name == ARRIVAL);

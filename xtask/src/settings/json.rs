@@ -1,9 +1,9 @@
-//! As much JSON as settings need: objects of objects, numbers as they are written, strings. Keys may be without quotes, as the machine
-//! tells them with `js` 0.
+//! As much JSON as settings need: objects of objects, numbers in their original spelling, strings. Keys may lack
+//! quotes, as in the machine's answers with `js` 0.
 
 use std::fmt::{self, Display, Formatter};
 
-/// A value. What is neither object nor string is kept as it was written.
+/// A value. A value that is neither object, array nor string is kept as it was written.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Json {
     /// Its members, in their order.
@@ -17,19 +17,19 @@ pub enum Json {
 }
 
 impl Json {
-    /// Reads a text; `None` of what is no JSON.
+    /// Parses a text; `None` if it is not JSON.
     pub fn parse(text: &str) -> Option<Json> {
         let mut rest = text.trim();
         let value = value(&mut rest)?;
         rest.trim().is_empty().then_some(value)
     }
 
-    /// A member of an object.
+    /// Returns a member of an object.
     pub fn get(&self, name: &str) -> Option<&Json> {
         self.members().iter().find(|(key, _)| key == name).map(|(_, value)| value)
     }
 
-    /// The members of an object; none of anything else.
+    /// Returns the members of an object; none for any other value.
     pub fn members(&self) -> &[(String, Json)] {
         match self {
             Json::Object(members) => members,
@@ -37,7 +37,7 @@ impl Json {
         }
     }
 
-    /// A number.
+    /// Returns the value as a number; `None` if it is none.
     pub fn number(&self) -> Option<f64> {
         match self {
             Json::Plain(text) => text.parse().ok(),
@@ -45,7 +45,7 @@ impl Json {
         }
     }
 
-    /// An element of an array.
+    /// Returns an element of an array.
     pub fn at(&self, index: usize) -> Option<&Json> {
         match self {
             Json::Array(elements) => elements.get(index),
@@ -53,7 +53,7 @@ impl Json {
         }
     }
 
-    /// Whether it is the same value: numbers as numbers.
+    /// Whether the values are equal. Numbers are compared as numbers.
     pub fn is_same(&self, other: &Json) -> bool {
         match (self.number(), other.number()) {
             (Some(a), Some(b)) => a == b,
@@ -86,7 +86,7 @@ impl Json {
     }
 }
 
-/// Over several lines, for people.
+/// Writes the value over several lines, for readers.
 impl Display for Json {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         self.write(0, f)
@@ -98,7 +98,7 @@ fn take(rest: &mut &str, c: char) -> Option<()> {
     Some(())
 }
 
-/// Up to a quote that no backslash stands before.
+/// Parses a string up to a quote without a backslash before it.
 fn text(rest: &mut &str) -> Option<String> {
     take(rest, '"')?;
     let mut escaped = false;

@@ -1,4 +1,4 @@
-//! `cargo xtask settings save|load`: all that a machine keeps, to a file and back.
+//! `cargo xtask settings save|load`: saves all that a machine stores to a file, and loads it back.
 
 mod json;
 mod port;
@@ -25,20 +25,20 @@ pub struct SettingsArgs {
 enum Action {
     /// Write all settings, offsets, tools and stored positions to a file
     Save(Place),
-    /// Send them back, and see that they have arrived. The board starts anew at the end: home it
+    /// Send them back, and check that they have arrived. The board restarts at the end: home it
     Load(Place),
 }
 
 #[derive(Args)]
 struct Place {
-    /// The board's serial port, such as /dev/ttyACM0. Opening it resets a board
+    /// The board's serial port, such as /dev/ttyACM0. Opening it resets the board
     #[arg(long)]
     port: PathBuf,
     /// The file, in JSON: see docs/settings.schema.json
     file: PathBuf,
 }
 
-/// Does what the arguments say.
+/// Saves or loads, as the arguments say.
 pub fn run(args: &SettingsArgs) -> Result<ExitCode> {
     match &args.action {
         Action::Save(place) => save(place),

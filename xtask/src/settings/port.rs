@@ -1,4 +1,4 @@
-//! A serial port, by the system's own means.
+//! A serial port, accessed by the system's own means.
 
 use std::fs::{File, OpenOptions};
 use std::io::{Read, Write};
@@ -15,18 +15,18 @@ use crate::process::run;
 
 /// The rate of a board after a reset.
 const RATE: &str = "115200";
-/// How long a board may take from the reset to its greeting.
+/// Longest time from a reset to the greeting.
 const GREETING: Duration = Duration::from_secs(5);
-/// How long an answer may take.
+/// Longest time of an answer.
 const ANSWER: Duration = Duration::from_secs(5);
-/// A port that is open.
+/// An open port.
 pub struct Port {
     port: File,
     heard: Receiver<String>,
 }
 
 impl Port {
-    /// Opens a port, and waits for the greeting of a board that resets.
+    /// Opens a port, and waits for the greeting in case the board resets.
     pub fn open(path: &Path) -> Result<Port> {
         let name = path.display();
         let port = OpenOptions::new().read(true).write(true).open(path);
@@ -39,7 +39,7 @@ impl Port {
             while let Ok(n @ 1..) = reader.read(&mut bytes) {
                 for byte in &bytes[..n] {
                     match byte {
-                        // Flow control stands between lines.
+                        // Flow control characters may stand between lines.
                         b'\r' | 0x11 | 0x13 => {}
                         b'\n' => {
                             let text = String::from_utf8_lossy(&line).into_owned();
@@ -54,12 +54,12 @@ impl Port {
             }
         });
         let mut port = Port { port, heard };
-        // A board that is there already says nothing.
+        // A board that did not reset sends no greeting.
         port.wait(GREETING, |line| line.contains("SYSTEM READY"));
         Ok(port)
     }
 
-    /// The next line that is meant.
+    /// Returns the next line that `is_meant` accepts; `None` when the time is over.
     fn wait(&mut self, longest: Duration, is_meant: impl Fn(&str) -> bool) -> Option<String> {
         let end = Instant::now() + longest;
         loop {
@@ -81,13 +81,13 @@ impl Line for Port {
     fn restart(&mut self) -> Result<(), String> {
         self.port.write_all(b"{reset:1}\n").map_err(|error| error.to_string())?;
         let greeting = self.wait(GREETING, |line| line.contains("SYSTEM READY"));
-        // One that tells nothing (`jv` 0) greets nobody either.
+        // A board that is silent (`jv` 0) sends no greeting either.
         drop(greeting);
         Ok(())
     }
 }
 
-/// Rate and mode of the line.
+/// Sets the rate and the mode of the line.
 fn set_up(path: &Path) -> Result<()> {
     if cfg!(windows) {
         let mode = format!("{}: BAUD={RATE} PARITY=N DATA=8 STOP=1", path.display());

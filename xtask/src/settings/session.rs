@@ -1,22 +1,22 @@
 //! Saving and loading, over any line to the machine.
 //!
-//! A file has the groups as the machine tells them. Loading sends motors first, for the speeds of axes are held against their steps,
-//! and what changes the conversation itself last. Each value is written by itself, so that a power cut in the middle leaves each the old
-//! or the new one.
+//! A file has the groups as the machine reports them. Loading sends the motors first, because the speeds of axes are
+//! checked against the motors' steps, and sends the settings that change the conversation last. Each value is written
+//! on its own, so that a power cut leaves either the old or the new value.
 
 use super::json::Json;
 
-/// A line to a machine: what it says to a request, however long that takes.
+/// A line to a machine. An answer may take any time.
 pub trait Line {
-    /// Sends a line; its answer, whatever the status. Nothing if the machine is silent.
+    /// Sends a line and returns its answer, whatever the status; `None` if the machine is silent.
     fn ask(&mut self, line: &str) -> Option<String>;
-    /// The machine starts anew, and is ready when this returns.
+    /// Restarts the machine; returns when it is ready.
     fn restart(&mut self) -> Result<(), String>;
 }
 
-/// Longest line that is sent: the machine takes 254 characters.
+/// Longest line that is sent; the machine takes 254 characters.
 const LINE: usize = 200;
-/// How often it is asked whether everything is stored.
+/// How often the machine is asked whether everything is stored.
 const KEPT: usize = 2_000;
 
 /// The groups of settings, in the order in which they are loaded.
@@ -24,27 +24,27 @@ const GROUPS: [&str; 21] = [
     "1", "2", "3", "4", "x", "y", "z", "a", "b", "c", "p1", "sp", "co", "sq", "he1", "he3", "uda",
     "udb", "udc", "udd", "sys",
 ];
-/// Those that an image may lack, and what it refuses them with.
+/// Groups that an image may lack.
 const HEATERS: [&str; 2] = ["he1", "he3"];
 const UNKNOWN: f64 = 100.0;
 /// Coordinate systems.
 const SYSTEMS: [&str; 9] = ["g54", "g55", "g56", "g57", "g58", "g59", "g591", "g592", "g593"];
 const TOOLS: usize = 10;
-/// Stored positions, and the code that stores one.
+/// Stored positions, and the code that stores each.
 const STORED: [(&str, &str); 2] = [("g28", "G28.1"), ("g30", "G30.1")];
 
-/// Settings that say what the machine is, or hold for the line only: they are not sent back.
+/// Settings that describe the machine, or hold for the line only. They are not sent back.
 const FIXED: [&str; 8] = ["fb", "fv", "hp", "hv", "id", "net", "baud", "kerf"];
-/// Settings that change how the machine answers: they are sent last, in this order.
+/// Settings that change how the machine answers. They are sent last, in this order.
 const TALK: [&str; 12] = ["ej", "js", "tv", "ec", "ee", "ex", "rxm", "sv", "si", "qv", "dia", "jv"];
-/// Settings that may stop the machine as soon as they hold: they are sent when all else is stored.
+/// Settings that may stop the machine as soon as they take effect. They are sent when all other settings are stored.
 const STOPPING: [&str; 2] = ["saf", "est"];
-/// The profile: it overwrites motors and axes, and goes first.
+/// The machine profile. It overwrites motors and axes, so it is sent first.
 const PROFILE: &str = "mch";
 /// The status of a value that cannot be set.
 const READ_ONLY: f64 = 104.0;
 
-/// What the machine says to a line: its body and its status.
+/// Sends a line. Returns the body and the status of the answer.
 fn exchange(line: &mut impl Line, request: &str) -> Result<(Json, f64), String> {
     let heard = line.ask(request).ok_or_else(|| format!("no answer to {request}"))?;
     let json = Json::parse(&heard).ok_or_else(|| format!("{request}: {heard}"))?;
@@ -53,7 +53,7 @@ fn exchange(line: &mut impl Line, request: &str) -> Result<(Json, f64), String> 
     Ok((body.cloned().unwrap_or(Json::Object(Vec::new())), status))
 }
 
-/// The body of the answer to a request that has to be carried out; an error if it is refused.
+/// Sends a request that must be executed, and returns the body of its answer; an error if it is refused.
 fn done(line: &mut impl Line, request: &str) -> Result<Json, String> {
     match exchange(line, request)? {
         (body, 0.0) => Ok(body),
@@ -66,13 +66,13 @@ fn number(line: &mut impl Line, name: &str) -> Result<f64, String> {
     body.get(name).and_then(Json::number).ok_or_else(|| format!("no {name}"))
 }
 
-/// How the conversation was before: verbosity and units.
+/// Verbosity and units before the conversation.
 struct Before {
     verbosity: Option<String>,
     inches: bool,
 }
 
-/// How much answers tell, if that is less than values: 0 is silence, 1 has no messages.
+/// Returns the verbosity of answers if it is too low to report values: 0 is silence, 1 has no messages.
 fn verbosity(line: &mut impl Line) -> Option<u8> {
     let tells = |heard: Option<String>, name| {
         let json = heard.and_then(|heard| Json::parse(&heard));
@@ -88,7 +88,7 @@ fn verbosity(line: &mut impl Line) -> Option<u8> {
     }
 }
 
-/// Has the machine tell values, in millimetres.
+/// Makes the machine report values, in millimetres.
 fn begin(line: &mut impl Line) -> Result<Before, String> {
     let verbosity = verbosity(line);
     if verbosity.is_some() {
@@ -99,7 +99,7 @@ fn begin(line: &mut impl Line) -> Result<Before, String> {
     Ok(Before { verbosity: verbosity.map(|verbosity| verbosity.to_string()), inches })
 }
 
-/// Sends what may not be answered.
+/// Sends a line that may stay unanswered.
 fn ask_quietly(line: &mut impl Line, request: &str) {
     let _ = line.ask(request);
 }
@@ -113,14 +113,14 @@ fn end(line: &mut impl Line, before: &Before) {
     }
 }
 
-/// All that can be saved: names of groups.
+/// Returns the names of all groups that can be saved.
 fn groups() -> impl Iterator<Item = String> {
     let tools = (1..=TOOLS).map(|n| format!("tt{n}"));
     let named = GROUPS.iter().chain(&SYSTEMS).map(|name| name.to_string());
     named.chain(tools).chain(STORED.iter().map(|(name, _)| name.to_string()))
 }
 
-/// Everything that the machine keeps.
+/// Returns all that the machine stores.
 pub fn save(line: &mut impl Line) -> Result<Json, String> {
     let before = begin(line)?;
     let mut all = Vec::new();
@@ -134,7 +134,7 @@ pub fn save(line: &mut impl Line) -> Result<Json, String> {
         let members = body.get(&group).ok_or_else(|| format!("no {group}"))?;
         let mut members = members.members().to_vec();
         for (name, value) in &mut members {
-            // What the machine says only because it has been asked to for this.
+            // The machine has this value only because `begin` has set it.
             if let ("jv", Some(verbosity)) = (name.as_str(), &before.verbosity) {
                 *value = Json::Plain(verbosity.clone());
             }
@@ -145,7 +145,7 @@ pub fn save(line: &mut impl Line) -> Result<Json, String> {
     Ok(Json::Object(all))
 }
 
-/// A value as the machine takes it.
+/// Returns a value in the spelling that the machine accepts.
 fn spelled(value: &Json) -> String {
     match value {
         Json::Text(text) => format!("\"{text}\""),
@@ -154,7 +154,7 @@ fn spelled(value: &Json) -> String {
     }
 }
 
-/// Sends members of a group, as many at a time as a line has room for; what was refused, and why.
+/// Sends members of a group, as many at a time as a line has room for. Returns those that were refused, and why.
 fn put(
     line: &mut impl Line,
     group: &str,
@@ -162,7 +162,7 @@ fn put(
     refused: &mut Vec<String>,
 ) -> Result<(), String> {
     let pair = |(name, value): &(String, Json)| format!("{name}:{}", spelled(value));
-    // Those of the system stand for themselves: as a group some of them cannot be set.
+    // Settings of the system are sent without their group, because some of them cannot be set as a group.
     let request = |members: &[(String, Json)]| {
         let pairs = members.iter().map(pair).collect::<Vec<_>>().join(",");
         if group == "sys" { format!("{{{pairs}}}") } else { format!("{{{group}:{{{pairs}}}}}") }
@@ -175,7 +175,7 @@ fn put(
         if exchange(line, &request(some))?.1 == 0.0 {
             continue;
         }
-        // One by one, to know which it is.
+        // Sends them one by one to find the refused one.
         for member in some {
             let (_, status) = exchange(line, &request(std::slice::from_ref(member)))?;
             if status != 0.0 && status != READ_ONLY {
@@ -186,7 +186,8 @@ fn put(
     Ok(())
 }
 
-/// Has a position stored as it was: the machine is told that it is there, and nothing moves. It is not homed afterwards, for it starts anew.
+/// Stores a position as it was. The machine is told that it is at that position, and nothing moves. It is not homed
+/// afterwards, because it restarts.
 fn store(line: &mut impl Line, code: &str, position: &Json) -> Result<(), String> {
     let here = done(line, "{mpo:n}")?;
     let here = here.get("mpo").ok_or("no mpo")?;
@@ -201,7 +202,8 @@ fn store(line: &mut impl Line, code: &str, position: &Json) -> Result<(), String
     done(line, code).map(drop)
 }
 
-/// Sends everything back; what was refused or is not as it should be. The machine starts anew at the end, and has to be homed.
+/// Sends everything back. Returns what was refused or differs afterwards. The machine restarts at the end, and must
+/// be homed.
 pub fn load(line: &mut impl Line, file: &Json) -> Result<Vec<String>, String> {
     let before = begin(line)?;
     let stat = number(line, "stat")?;
@@ -251,7 +253,7 @@ pub fn load(line: &mut impl Line, file: &Json) -> Result<Vec<String>, String> {
     Ok(wrong)
 }
 
-/// Reads a group again; what is not as it should be.
+/// Reads a group again. Returns the values that differ from the file.
 fn differ(
     line: &mut impl Line,
     group: &str,

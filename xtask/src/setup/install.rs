@@ -1,4 +1,4 @@
-//! How to install what is missing, decided apart from doing it.
+//! Decides how to install missing tools, separately from installing them.
 
 use std::io::{IsTerminal, Write};
 use std::process::{Command, Stdio};
@@ -6,10 +6,10 @@ use std::process::{Command, Stdio};
 use super::needs::Need;
 use crate::process::{self, probe, which};
 
-/// How rustup brings a toolchain that can build for AVR.
+/// The command by which rustup installs a toolchain that can build for AVR.
 pub const RUSTUP: &str = "rustup toolchain install nightly --profile minimal --component rust-src";
 
-/// What this machine and this user can do.
+/// What this computer and this user can do.
 #[derive(Clone, Copy, Debug)]
 pub struct Means {
     apt: bool,
@@ -19,7 +19,7 @@ pub struct Means {
 }
 
 impl Means {
-    /// Finds out.
+    /// Finds the means of this computer.
     pub fn here() -> Means {
         let apt = which("apt-get").is_some();
         let root = probe(Command::new("id").arg("-u")).as_deref() == Some("0");
@@ -28,25 +28,25 @@ impl Means {
     }
 }
 
-/// One command, and what to do should it fail.
+/// One command, and an alternative if it fails.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Step {
-    /// The command, words parted by blanks.
+    /// The command, words separated by blanks.
     pub command: String,
-    /// Tried when the command fails.
+    /// The command to try if the first one fails.
     pub otherwise: Option<&'static str>,
 }
 
-/// What to do.
+/// The commands to run.
 #[derive(Debug)]
 pub struct Plan {
-    /// In this order; empty where we know no way.
+    /// The commands, in order; empty if no way is known.
     pub steps: Vec<Step>,
-    /// Whether we may do it ourselves.
+    /// Whether this program can run them itself: as root, or with a `sudo` that asks for no password.
     pub automatic: bool,
 }
 
-/// How to get what is missing.
+/// Returns the plan for installing what is missing.
 pub fn plan(missing: &[&Need], means: Means) -> Plan {
     if !means.apt {
         return Plan { steps: Vec::new(), automatic: false };
@@ -56,7 +56,7 @@ pub fn plan(missing: &[&Need], means: Means) -> Plan {
     if !tools.is_empty() {
         steps.push(apt(means, &install_line(&tools), None));
     }
-    // Apart from the rest: not every release has these packages, and then rustup may help.
+    // Rust is a step of its own: not every release has these packages, and then rustup may help.
     if !rust.is_empty() {
         steps.push(apt(means, &install_line(&rust), means.rustup.then_some(RUSTUP)));
     }
@@ -77,7 +77,7 @@ fn apt(means: Means, command: &str, otherwise: Option<&'static str>) -> Step {
     Step { command: format!("{rights}env DEBIAN_FRONTEND=noninteractive {command}"), otherwise }
 }
 
-/// Asks when somebody is there to ask.
+/// Asks the user, if there is one at the terminal. Returns whether the user agrees.
 pub fn agreed(steps: &[Step]) -> bool {
     if !std::io::stdin().is_terminal() {
         return true;
@@ -97,7 +97,8 @@ fn is_yes(answer: &str) -> bool {
     matches!(answer.trim().to_ascii_lowercase().as_str(), "" | "y" | "yes")
 }
 
-/// Runs the steps. A failure is told but does not end it: what counts is what is there afterwards.
+/// Runs the steps. A failure is reported but does not stop the rest, because only the presence of the tools
+/// afterwards counts.
 pub fn execute(steps: &[Step]) {
     for step in steps {
         if !execute_one(&step.command)

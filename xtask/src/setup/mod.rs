@@ -1,7 +1,7 @@
-//! Finds the tools and installs what is missing, where that can be done.
+//! Finds the tools and installs missing ones, where that is possible.
 //!
-//! On Debian and its kin `apt-get` does it, as root or through `sudo` when that asks for no
-//! password. Anywhere else, and whenever the user says no, the exact commands are printed.
+//! On Debian and its relatives `apt-get` installs them, as root or through `sudo` if that needs no password. On other
+//! systems, and whenever the user says no, the exact commands are printed.
 
 mod install;
 mod needs;
@@ -15,7 +15,7 @@ use needs::Need;
 pub use needs::{Scope, python};
 pub use wasm::TARGET;
 
-/// Makes sure that the tools are there; silent when they are.
+/// Makes sure that the tools are there. Prints nothing if they are.
 pub fn ensure(scope: Scope) -> Result<()> {
     ensure_programs(scope)?;
     if scope.covers(Scope::Web) { wasm::ensure() } else { Ok(()) }
@@ -40,7 +40,7 @@ fn ensure_programs(scope: Scope) -> Result<()> {
     Ok(())
 }
 
-/// `cargo xtask setup`: makes sure, and says what is used.
+/// `cargo xtask setup`: makes sure that the tools are there, and prints which ones are used.
 pub fn report() -> Result<()> {
     ensure(Scope::Everything)?;
     if let Some(rust) = Toolchain::find() {

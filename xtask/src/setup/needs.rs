@@ -1,4 +1,4 @@
-//! What the commands need, how to see that it is there, and Debian's names for it.
+//! The tools that the commands need, how to detect each, and Debian's names for them.
 
 use std::path::Path;
 use std::process::Command;
@@ -6,7 +6,7 @@ use std::process::Command;
 use crate::process::{probe, which};
 use crate::toolchain::Toolchain;
 
-/// How much a command needs.
+/// What a command needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Scope {
     /// Building the firmware.
@@ -15,19 +15,19 @@ pub enum Scope {
     Simulator,
     /// Building for the RP2040.
     Arm,
-    /// Running its emulator, beside the simulator.
+    /// Running the RP2040's emulator, beside the simulator.
     Emulator,
     /// Building the fuzzers, and nothing else.
     Fuzzers,
     /// Running senders at the simulator.
     Senders,
-    /// Those of them that are written in Python.
+    /// Running the senders that are written in Python.
     Python,
     /// Building the page.
     Web,
     /// Running the page in a browser.
     WebTests,
-    /// All of it.
+    /// Everything.
     Everything,
 }
 
@@ -53,19 +53,19 @@ impl Scope {
     }
 }
 
-/// One thing that must be there.
+/// A tool that must be there.
 pub struct Need {
-    /// What it is.
+    /// The name of the tool.
     pub what: &'static str,
-    /// The Debian packages that bring it.
+    /// The Debian packages that contain it.
     pub packages: &'static [&'static str],
-    /// Whether it is a Rust toolchain, which rustup could bring as well.
+    /// Whether it is a Rust toolchain, which rustup could install as well.
     pub is_rust: bool,
     scope: Scope,
     present: fn() -> bool,
 }
 
-/// Everything, in the order in which it is reported.
+/// All tools, in the order in which they are reported.
 pub static NEEDS: [Need; 12] = [
     Need {
         what: "Rust with its library sources (rustup nightly with rust-src, or Debian's)",
@@ -116,12 +116,13 @@ const fn tool(
     Need { what, packages, is_rust: false, scope, present }
 }
 
-/// What is not there.
+/// Returns the tools that are missing.
 pub fn missing(scope: Scope) -> Vec<&'static Need> {
     NEEDS.iter().filter(|need| scope.covers(need.scope) && !(need.present)()).collect()
 }
 
-/// The first Python that can make environments; Debian's own lacks that unless `python3-venv` is there.
+/// Returns the first Python that can make environments; `None` if there is none. Debian's own cannot unless
+/// `python3-venv` is installed.
 pub fn python() -> Option<&'static str> {
     let mut known = ["python3", "/usr/bin/python3"].into_iter();
     known.find(|name| probe(Command::new(name).args(["-c", "import ensurepip, venv"])).is_some())
@@ -131,13 +132,13 @@ fn has(program: &str) -> bool {
     which(program).is_some()
 }
 
-/// avr-gcc prints a path when it finds the start-up code, else just the name.
+/// Whether avr-libc is there. avr-gcc prints a path if it finds the start-up code, else just the name.
 fn avr_libc() -> bool {
     let ask = ["-mmcu=atmega2560", "-print-file-name=crtatmega2560.o"];
     probe(Command::new("avr-gcc").args(ask)).is_some_and(|file| Path::new(&file).is_absolute())
 }
 
-/// Looks where bindgen looks.
+/// Whether libclang is there. Looks where bindgen looks.
 fn libclang() -> bool {
     let given = std::env::var_os("LIBCLANG_PATH").into_iter().map(Into::into);
     let asked = probe(Command::new("llvm-config").arg("--libdir")).into_iter().map(Into::into);

@@ -1,5 +1,5 @@
-//! Rust's library for WebAssembly, for the cargo that runs this: rustup brings it, which needs no rights. Without rustup it is named as missing, for Debian
-//! has none that is new enough.
+//! Rust's library for WebAssembly, for the cargo that runs this program. rustup installs it without special rights.
+//! Without rustup it is reported as missing, because Debian has no library that is new enough.
 
 use std::path::Path;
 use std::process::Command;
@@ -10,17 +10,17 @@ use crate::process::{probe, run, which};
 
 /// The target.
 pub const TARGET: &str = "wasm32-unknown-unknown";
-/// How rustup brings its library.
+/// The command by which rustup installs its library.
 const RUSTUP: &str = "rustup target add wasm32-unknown-unknown";
 
-/// Makes sure that it is there; silent when it is.
+/// Makes sure that the library is there. Prints nothing if it is.
 pub fn ensure() -> Result<()> {
     if is_there() {
         return Ok(());
     }
     if which("rustup").is_some() {
         eprintln!("setup: {RUSTUP}");
-        // What counts is what is there afterwards.
+        // An error is ignored, because only the presence of the library afterwards counts.
         let _ = run(Command::new("rustup").args(["target", "add", TARGET]));
     }
     ensure!(
@@ -30,7 +30,7 @@ pub fn ensure() -> Result<()> {
     Ok(())
 }
 
-/// Whether the `rustc` of this cargo has it.
+/// Whether the `rustc` of this cargo has the library.
 fn is_there() -> bool {
     let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
     let mut ask = Command::new(rustc);

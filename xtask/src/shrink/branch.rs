@@ -1,4 +1,4 @@
-//! Branches go where they lead, not round a jump.
+//! Lets branches go directly to their destination, instead of around a jump.
 //!
 //! ```text
 //!   breq .LBB0_1
@@ -6,7 +6,8 @@
 //! .LBB0_1:                    .LBB0_1:
 //! ```
 //!
-//! Where that is too far, another jump to the same place may be near, and the branch goes to that:
+//! Where the destination is too far, another jump to the same destination may be near. The branch then goes to that
+//! jump:
 //!
 //! ```text
 //!   breq .LBB0_1                brne .Lway_0_0
@@ -16,10 +17,11 @@
 //!   rjmp .LBB0_7                rjmp .LBB0_7
 //! ```
 //!
-//! That costs a cycle on one way, and saves one on the other.
+//! That costs a cycle on one path, and saves one on the other.
 //!
-//! LLVM writes a branch round a jump before it knows how far the way is. A branch reaches 63 words back or forth, and what is written
-//! here never lies further apart in the image: the linker only shortens. Were it otherwise, the linker would refuse the branch.
+//! LLVM writes a branch around a jump before it knows the distance. A branch reaches 63 words back or forth. Code
+//! that is within reach here never lies further apart in the image, because the linker only shortens. If it did, the
+//! linker would refuse the branch.
 
 use std::collections::HashMap;
 
@@ -27,16 +29,16 @@ use anyhow::{Result, bail, ensure};
 
 use super::text::{Function, Insn, Line, Program};
 
-/// How far a branch reaches, bytes, less the two of the jump that goes.
+/// How far a branch reaches, bytes, minus the two bytes of the jump that is removed.
 pub const REACH: usize = 124;
 
-/// Makes branches of all functions short but those of interrupts: this costs no cycle.
+/// Shortens the branches of all functions except interrupts. This costs no cycle.
 pub fn shorten(program: &mut Program) {
     let functions = program.functions.iter_mut().enumerate();
     for (number, function) in
         functions.filter(|(_, function)| function.insns().all(|insn| insn.op != "reti"))
     {
-        // What became shorter brings more within reach.
+        // Code that has become shorter brings more destinations within reach.
         loop {
             let before = function.lines.len();
             shorten_in(function);
@@ -48,10 +50,10 @@ pub fn shorten(program: &mut Program) {
     }
 }
 
-/// The labels of jumps that branches go by.
+/// Beginning of the labels of jumps that branches go by.
 const WAY: &str = ".Lway_";
 
-/// Has branches round a jump go to another jump to the same place.
+/// Lets branches around a jump go to another jump to the same destination.
 fn go_by_others(function: &mut Function, number: usize) {
     let places = Places::of(function);
     let code = code(function);
@@ -78,7 +80,7 @@ fn go_by_others(function: &mut Function, number: usize) {
             let distance = places.lines[*way].abs_diff(places.lines[at[0]]);
             *to == short.args && *way != at[1] && !gone.contains(way) && distance <= REACH
         };
-        // One that others go by is as good as one more.
+        // A jump that other branches go by already is preferred.
         let way = jumps.iter().filter(is_way).max_by_key(|(way, _)| ways.contains(way));
         if let Some((way, _)) = way {
             let name = ways.iter().position(|known| known == way).unwrap_or_else(|| {
@@ -102,7 +104,7 @@ fn go_by_others(function: &mut Function, number: usize) {
     function.lines = lines;
 }
 
-/// Code in which branches go where the jumps lead that they go by.
+/// Returns code in which branches go to the destinations of the jumps that they go by.
 pub fn straight(code: Vec<Line>) -> Result<Vec<Line>> {
     let mut leads = HashMap::new();
     for (at, line) in code.iter().enumerate() {
@@ -127,7 +129,7 @@ pub fn straight(code: Vec<Line>) -> Result<Vec<Line>> {
     Ok(code.into_iter().filter_map(straight).collect())
 }
 
-/// The lines of a function that make code, and labels.
+/// Returns the lines of a function that make code, and labels.
 fn code(function: &Function) -> Vec<usize> {
     (0..function.lines.len()).filter(|at| !matches!(function.lines[*at], Line::Note(_))).collect()
 }
@@ -152,7 +154,7 @@ fn shorten_in(function: &mut Function) {
     function.lines.retain(|_| !gone.contains(&line.next().expect("lines are finite")));
 }
 
-/// The branch that does what a branch round a jump does; `behind` is what follows the two.
+/// Returns the branch that replaces a branch around a jump; `behind` is the code that follows the two.
 pub fn short<'a>(
     branch: &Insn,
     jump: &Insn,
@@ -165,7 +167,7 @@ pub fn short<'a>(
     Some(Insn { op: op.into(), args: jump.args.clone() })
 }
 
-/// The branch on the opposite condition.
+/// Returns the branch on the opposite condition; `None` if there is none.
 pub fn inverse(op: &str) -> Option<&'static str> {
     const PAIRS: [(&str, &str); 6] = [
         ("breq", "brne"),
@@ -178,7 +180,7 @@ pub fn inverse(op: &str) -> Option<&'static str> {
     PAIRS.iter().find_map(|(a, b)| if op == *a { Some(*b) } else { (op == *b).then_some(*a) })
 }
 
-/// Where the lines of a function lie at most, bytes from its beginning.
+/// The largest possible distance of each line of a function from its beginning, bytes.
 struct Places {
     lines: Vec<usize>,
     labels: HashMap<String, usize>,
@@ -192,7 +194,7 @@ impl Places {
             places.lines.push(place);
             match line {
                 Line::Insn(insn) => place += insn.size(),
-                // What a line of the source takes is not known: no branch goes past it.
+                // The size of assembler from the source is unknown, so no branch goes past it.
                 Line::Fixed(_) => place += REACH + 1,
                 Line::Label(label) => drop(places.labels.insert(label.clone(), place)),
                 Line::Note(_) => {}
@@ -253,7 +255,7 @@ mod tests {
     fn what_does_something_else_stays() {
         let away = "nop\n".repeat(70);
         for text in [
-            // It is not the jump that is gone round, goes too far, or goes past what nobody knows the size of.
+            // It does not go around the jump, it goes too far, or it goes past code of unknown size.
             "breq .LBB0_7\nrjmp .LBB0_7\n.LBB0_1:\nnop\n.LBB0_7:\nret".to_owned(),
             "breq .LBB0_1\nrjmp .LBB0_7\nnop\n.LBB0_1:\nnop\n.LBB0_7:\nret".to_owned(),
             format!("breq .LBB0_1\nrjmp .LBB0_7\n.LBB0_1:\n{away}.LBB0_7:\nret"),

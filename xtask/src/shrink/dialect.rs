@@ -1,8 +1,8 @@
-//! What LLVM writes for AVR and binutils' assembler reads otherwise.
+//! Translates what LLVM writes for AVR but binutils' assembler reads differently.
 
 use std::borrow::Cow;
 
-/// A line as `avr-as` reads it.
+/// Translates a line for `avr-as`.
 pub fn translate(line: &str) -> Cow<'_, str> {
     let code = line.trim_start();
     if code.starts_with(".file") {
@@ -17,7 +17,7 @@ pub fn translate(line: &str) -> Cow<'_, str> {
     }
 }
 
-/// `.file 3 "folder" "name"`, with the folder in a string of its own.
+/// Translates `.file 3 "folder" "name"`, which has the folder in a string of its own.
 fn file(line: &str) -> Option<String> {
     let (before, name) = line.split_once("\" \"")?;
     Some(format!("{before}/{name}"))

@@ -1,4 +1,4 @@
-//! From assembler text to an image: assembles it, and links it as `rustc` linked its own.
+//! Assembles the text, and links it with the arguments that `rustc` used.
 
 use std::path::Path;
 use std::process::Command;
@@ -8,8 +8,9 @@ use anyhow::{Context, Result, ensure};
 use crate::chips::Chip;
 use crate::process::run;
 
-/// What `rustc` takes for its linker. If `KERF_LINK` names a file, it writes its arguments there, one a line, and leaves an empty file where
-/// the program was to be: that is linked from the text later. Else it links.
+/// The script that `rustc` uses as its linker. If `KERF_LINK` names a file, the script writes its arguments there,
+/// one a line, and creates an empty file in place of the program, which is linked from the text later. Otherwise the
+/// script links.
 const SCRIPT: &str = r#"#!/bin/sh
 [ -n "$KERF_LINK" ] || exec avr-gcc "$@"
 printf '%s\n' "$@" > "$KERF_LINK"
@@ -17,7 +18,7 @@ while [ "$1" != -o ]; do shift; done
 : > "$2"
 "#;
 
-/// The variable of the environment by which the script learns where to write.
+/// The environment variable that tells the script where to write.
 pub const KEPT: &str = "KERF_LINK";
 
 /// Writes the script.
@@ -30,13 +31,13 @@ pub fn write_script(path: &Path) -> Result<()> {
     run(Command::new("chmod").arg("+x").arg(path))
 }
 
-/// How an image was linked.
+/// The arguments with which an image was linked.
 pub struct Link {
     arguments: Vec<String>,
 }
 
 impl Link {
-    /// Reads what the script wrote down.
+    /// Reads the arguments that the script has written.
     pub fn read(kept: &Path) -> Result<Link> {
         let text = std::fs::read_to_string(kept)
             .with_context(|| format!("cannot read {}", kept.display()))?;
@@ -48,7 +49,7 @@ impl Link {
         let (source, object) = (elf.with_extension("s"), elf.with_extension("o"));
         std::fs::write(&source, text)
             .with_context(|| format!("cannot write {}", source.display()))?;
-        // Without `-mlink-relax` distances would be fixed here, and the linker could shorten nothing.
+        // Without `-mlink-relax` the assembler would fix distances, and the linker could shorten nothing.
         run(Command::new("avr-gcc")
             .args(["-c", &format!("-mmcu={}", chip.name), "-Wa,-mlink-relax"])
             .arg(&source)
@@ -58,7 +59,8 @@ impl Link {
         run(Command::new("avr-gcc").args(self.with(&object, &elf.to_string_lossy())?))
     }
 
-    /// The arguments with another program and another image. `rustc` first asks for `-no-pie`, which this linker does not know.
+    /// Returns the arguments with another object and another image. `rustc` also passes `-no-pie`, which this linker
+    /// does not know.
     fn with(&self, object: &str, elf: &str) -> Result<Vec<String>> {
         let known = self.arguments.iter().filter(|argument| *argument != "-no-pie");
         let mut arguments: Vec<String> = known.cloned().collect();

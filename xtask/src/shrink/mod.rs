@@ -1,22 +1,23 @@
-//! Makes the image smaller: what the compiler wrote is rewritten before it is linked.
+//! Makes the image smaller: rewrites the compiler's program before it is linked.
 //!
-//! Fat LTO gives one assembler text for the whole program, so that what repeats can be shared wherever it stands. LLVM does nothing of
-//! the kind for AVR. Cold functions share all that repeats, warm ones their ends, hot ones nothing ([`hot`]); assembler of the source is never changed.
+//! Fat LTO gives one assembler text for the whole program, so repeated code can be shared wherever it stands. LLVM
+//! does not do that for AVR. Cold functions share all code that repeats, warm functions share their ends, and hot
+//! functions share nothing ([`hot`]). Assembler from the source is never changed.
 //!
 //! | module | what it does | flash, bytes |
 //! |---|---|---|
 //! | [`text`], `dialect` | reads LLVM's text, writes it for `avr-as` | |
-//! | [`tidy`] | leaves out what the compiler need not have written, and runs both to compare them | 18,200 |
-//! | [`prologue`] | shares what functions begin with | 5,900 |
-//! | [`repeats`] | shares any other code that repeats, ends of functions above all | 14,500 |
-//! | [`branch`] | branches go where they lead, not round a jump | 2,700 |
-//! | [`order`] | puts functions near those they call, which shortens calls | 2,100 |
-//! | [`via`] | has calls over a long way go by one jump | 1,200 |
-//! | [`verify`] | puts back what is shared, and compares with the tidied text | |
+//! | [`tidy`] | removes what the compiler need not have written, and runs old and new code to compare them | 18,200 |
+//! | [`prologue`] | shares the beginnings of functions | 5,900 |
+//! | [`repeats`] | shares any other code that repeats, above all ends of functions | 14,500 |
+//! | [`branch`] | lets branches go directly to their destination, not around a jump | 2,700 |
+//! | [`order`] | puts functions near the functions that they call, which shortens calls | 2,100 |
+//! | [`via`] | lets several calls over a long distance go by one jump | 1,200 |
+//! | [`verify`] | puts shared code back, and compares the result with the tidied text | |
 //! | [`link`] | assembles and links, as `rustc` did | |
 //!
-//! A shared piece costs its caller 7 to 25 cycles, and three bytes of stack while it runs. `crate::elf` checks the program that is linked
-//! from the compiler's own text for the compiler's defects, and the stack in the image that was made.
+//! A shared piece costs its caller 7 to 25 cycles, and three bytes of stack while it runs. `crate::elf` searches the
+//! compiler's own program for the compiler's defects, and analyses the stack of the final image.
 
 mod branch;
 mod dialect;
@@ -39,9 +40,9 @@ use text::{Function, Insn, Line, Program};
 
 /// Two texts for the assembler.
 pub struct Texts {
-    /// The program as the compiler wrote it, without what only a debugger reads.
+    /// The program as the compiler wrote it, without debug information.
     pub plain: String,
-    /// What is linked: the program tidied, with what cold functions share.
+    /// The program that is linked: tidied, with shared code.
     pub small: String,
 }
 
@@ -68,7 +69,7 @@ fn heat(function: &Function) -> Heat {
     hot::heat(&format!("{:#}", rustc_demangle::demangle(&function.name)))
 }
 
-/// The names that assembler of the source contains.
+/// Returns the names that assembler from the source contains.
 fn names_in_source(program: &Program) -> HashSet<String> {
     let words = program.functions.iter().flat_map(Function::fixed);
     let words =
@@ -76,7 +77,7 @@ fn names_in_source(program: &Program) -> HashSet<String> {
     words.map(str::to_owned).collect()
 }
 
-/// Of each line of a function: whether it runs while assembler of the source keeps interrupts off.
+/// Returns for each line of a function whether it runs while assembler from the source keeps interrupts off.
 fn quiet(function: &Function) -> Vec<bool> {
     let mut off = false;
     let mut line = |line: &Line| {

@@ -1,11 +1,11 @@
-//! Functions stand near those that they call.
+//! Puts functions near the functions that they call.
 //!
-//! A call or jump takes four bytes anywhere, and two within 4 KB, which the linker finds out (`--relax`). So the order of functions
-//! decides how large the program is: the more calls go to neighbours, the smaller.
+//! A call or jump takes four bytes, but only two within 4 KB, which the linker finds out (`--relax`). So the order of
+//! functions decides how large the program is: the more calls go to neighbours, the smaller it is.
 //!
-//! The best order is out of reach, and a good one is enough: functions that call each other most are put together first, then
-//! each function is tried beside all that it calls or is called by, and moved where most calls are short. The result depends on the program
-//! alone.
+//! The best order cannot be computed, but a good one is enough. Functions that call each other most are put together
+//! first. Then each function is tried beside all functions that it calls or is called by, and moved to where most
+//! calls are short. The result depends on the program alone.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -13,24 +13,24 @@ use super::text::{Insn, Line, Program};
 
 /// How far a short call reaches, bytes.
 const REACH: usize = 4_090;
-/// Groups grow no larger, bytes: what is in one reaches all of it.
+/// Most bytes of a group. All functions in a group reach each other.
 const GROUP: usize = 4_000;
-/// How often each function is tried elsewhere.
+/// How often each function is tried in other places.
 const SWEEPS: usize = 4;
 
 /// A call or jump from one function to another.
 struct Call {
     from: usize,
-    /// Where in the function it stands, bytes.
+    /// Position of the call in its function, bytes.
     offset: usize,
     to: usize,
 }
 
-/// The program as far as the order depends on it.
+/// The part of the program that the order depends on.
 struct Map {
     sizes: Vec<usize>,
     calls: Vec<Call>,
-    /// Of each function: those that it calls or is called by.
+    /// For each function, the functions that it calls or is called by.
     neighbours: Vec<Vec<usize>>,
 }
 
@@ -80,7 +80,7 @@ impl Map {
         Map { sizes, calls, neighbours }
     }
 
-    /// Functions that call each other often stand in one group.
+    /// Returns an order in which functions that call each other often stand in one group.
     fn grouped(&self) -> Vec<usize> {
         let mut often: BTreeMap<(usize, usize), usize> = BTreeMap::new();
         for call in &self.calls {
@@ -102,7 +102,7 @@ impl Map {
         groups.concat()
     }
 
-    /// Tries each function elsewhere; returns whether one was moved.
+    /// Tries each function in other places. Returns whether one was moved.
     fn improve(&self, order: &mut Vec<usize>) -> bool {
         let mut moved = false;
         let mut least = self.cost(order);
@@ -132,7 +132,8 @@ impl Map {
         moved
     }
 
-    /// What the long calls cost: each the same, and a little more the longer it is, so that ways lead to shorter ones.
+    /// Returns the cost of the long calls. Each costs the same, plus a little more the longer it is, so that moves in
+    /// the right direction pay off.
     fn cost(&self, order: &[usize]) -> usize {
         const LONG: usize = 1_000;
         let mut places = vec![0; order.len()];
@@ -149,7 +150,7 @@ impl Map {
     }
 }
 
-/// Whom an instruction calls or jumps to.
+/// Returns the function that an instruction calls or jumps to.
 fn target(insn: &Insn) -> Option<&str> {
     matches!(insn.op.as_str(), "call" | "rcall" | "jmp" | "rjmp").then_some(insn.args.as_str())
 }

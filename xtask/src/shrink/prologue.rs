@@ -1,6 +1,7 @@
-//! Cold functions share what they begin with.
+//! Lets cold functions share their beginnings.
 //!
-//! A function saves the registers that its caller expects back, two bytes each, and makes a frame in 16 bytes more:
+//! A function saves the registers that its caller expects unchanged, two bytes each, and makes a frame in 16 more
+//! bytes:
 //!
 //! ```text
 //!   push r16                            ldi  r26, 5        (frames of more than a byte: r27 as well)
@@ -17,12 +18,13 @@
 //!   out  61, r28                        sub  r28, r26 ...
 //! ```
 //!
-//! The shared code takes its return address off the stack, does what the function did, and puts the address back.
+//! The shared code takes its return address off the stack, does the work of the beginning, and puts the address back.
 //!
-//! It may use r0, r26, r27, r30, r31 and the flags: LLVM's calling convention for AVR hands arguments over in r8 to r25 alone, and
-//! has the callee expect nothing in those. What assembler of the source calls is left alone, for that may have a convention of its own.
+//! It may use r0, r26, r27, r30, r31 and the flags. LLVM's calling convention for AVR passes arguments in r8 to r25
+//! only, and the callee expects nothing in those registers. Functions that assembler from the source calls are not
+//! changed, because the assembler may have a convention of its own.
 //!
-//! Ends of functions need nothing of the kind: [`super::repeats`] shares them like any other code.
+//! Ends of functions need no special treatment: [`super::repeats`] shares them like any other code.
 
 use std::collections::BTreeMap;
 
@@ -30,7 +32,7 @@ use super::hot::Heat;
 use super::text::{Function, Insn, Line, Program};
 use super::{heat, names_in_source};
 
-/// What a function begins with.
+/// The beginning of a function.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Entry {
     /// The registers that it pushes, in this order.
@@ -41,7 +43,8 @@ struct Entry {
     lines: Vec<usize>,
 }
 
-/// Which functions can share: those that save the same registers and make a frame, of one byte or two, or none.
+/// The kind of a beginning. Functions with the same kind can share: they save the same registers and make a frame of
+/// one byte or two, or none.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Kind {
     saved: Vec<String>,
@@ -55,10 +58,10 @@ enum Frame {
     Word,
 }
 
-/// How the shared routines are called.
+/// Beginning of the names of shared routines.
 pub const NAME: &str = "__enter_";
 
-/// Shares the beginnings of cold functions, as far as that makes the program smaller.
+/// Shares the beginnings of cold functions where that makes the program smaller.
 pub fn share(program: &mut Program) {
     let in_source = names_in_source(program);
     let mut groups: BTreeMap<Kind, Vec<(usize, Entry)>> = BTreeMap::new();
@@ -97,7 +100,7 @@ fn kind(entry: &Entry) -> Kind {
     Kind { saved: entry.saved.clone(), frame }
 }
 
-/// What a function begins with, if it is what LLVM usually writes.
+/// Returns the beginning of a function if it is what LLVM usually writes; else `None`.
 fn entry(function: &Function) -> Option<Entry> {
     let mut code =
         function.lines.iter().enumerate().filter(|(_, line)| !matches!(line, Line::Note(_)));
@@ -114,7 +117,7 @@ fn entry(function: &Function) -> Option<Entry> {
     (count > 0).then_some(entry)
 }
 
-/// The size of the frame that some instructions make first.
+/// Returns the size of the frame that the first instructions make.
 fn frame<'a>(mut code: impl Iterator<Item = &'a Insn> + Clone) -> Option<u16> {
     let rest = code.clone();
     let number = |args: &str, register: &str| {
@@ -130,7 +133,7 @@ fn frame<'a>(mut code: impl Iterator<Item = &'a Insn> + Clone) -> Option<u16> {
     (rest.take(wanted.len()).eq(wanted.iter())).then_some(size)
 }
 
-/// The instructions that LLVM writes for a frame.
+/// Returns the instructions that LLVM writes for a frame.
 fn written_frame(size: Option<u16>) -> Vec<Insn> {
     let Some(size) = size else { return Vec::new() };
     let reserve = match size {
@@ -142,18 +145,18 @@ fn written_frame(size: Option<u16>) -> Vec<Insn> {
     ))
 }
 
-/// One instruction a line.
+/// Parses one instruction a line.
 fn insns(text: &str) -> Vec<Insn> {
     text.lines().map(Insn::new).collect()
 }
 
-/// The instructions that LLVM writes for an entry.
+/// Returns the instructions that LLVM writes for a beginning.
 fn written(entry: &Entry) -> Vec<Insn> {
     let pushes = entry.saved.iter().map(|register| Insn::new(&format!("push {register}")));
     pushes.chain(written_frame(entry.frame)).collect()
 }
 
-/// What stands in a function instead.
+/// Returns the instructions that replace a beginning.
 fn call(entry: &Entry, name: &str) -> Vec<Insn> {
     let size = match entry.frame {
         None => String::new(),
@@ -163,7 +166,7 @@ fn call(entry: &Entry, name: &str) -> Vec<Insn> {
     insns(&format!("{size}call {name}"))
 }
 
-/// The shared code.
+/// Returns the shared code.
 fn routine(kind: &Kind) -> Vec<Insn> {
     let clear = if kind.frame == Frame::Byte { "clr r27\n" } else { "" };
     let pushes: String = kind.saved.iter().map(|register| format!("push {register}\n")).collect();
@@ -193,7 +196,7 @@ fn replace(function: &mut Function, entry: &Entry, name: &str) {
     function.lines = lines;
 }
 
-/// The instructions for which a call of a shared routine stands; `before` is what loads the size of the frame.
+/// Returns the instructions that a call of a shared routine stands for; `before` loads the size of the frame.
 pub fn put_back(routine: &[Insn], before: &[Insn]) -> Option<Vec<Insn>> {
     let saved: Vec<_> = routine.iter().filter(|i| i.op == "push").map(|i| i.args.clone()).collect();
     let saved =
@@ -220,7 +223,7 @@ mod tests {
     const Y: &str = "push r28\npush r29\nin r28, 61\nin r29, 62\n";
     const SET: &str = "in r0, 63\ncli\nout 62, r29\nout 63, r0\nout 61, r28\n";
 
-    /// The functions, each several times, with shared beginnings.
+    /// Returns the functions, each several times, with shared beginnings.
     fn shared(functions: &[(&str, String)]) -> Program {
         let copies = (0..8)
             .flat_map(|n| functions.iter().map(move |(name, code)| (format!("{name}{n}"), code)));

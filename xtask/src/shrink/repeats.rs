@@ -1,4 +1,4 @@
-//! Cold code that stands in several places is shared.
+//! Shares cold code that stands in several places.
 //!
 //! ```text
 //!   movw r24, r28                       call __part_0
@@ -10,18 +10,20 @@
 //!                                       ret
 //! ```
 //!
-//! What ends with `ret` is jumped to instead (`__tail_0`), which costs no stack, and may take anything off the stack: that shares
-//! the ends of functions. It costs two or three cycles, so that warm functions share these, and nothing else.
+//! Code that ends with `ret` is jumped to instead (`__tail_0`). This costs no stack, and the code may take anything
+//! off the stack, so the ends of functions can be shared. It costs two or three cycles, so warm functions share their
+//! ends and nothing else.
 //!
-//! `call`, `jmp` and `ret` change no register and no flag, so that a part may begin and end anywhere; but
+//! `call`, `jmp` and `ret` change no register and no flag, so a part may begin and end anywhere. But:
 //!
-//! - it holds no branch, no label and no assembler of the source;
-//! - a part that is called does not touch the stack pointer, for its return address lies on top (it may well reach the frame, which
-//!   goes by Y), nor does it turn interrupts off or on: what runs while they are off stays as short as it was;
-//! - nothing is taken from between `cli` and what turns interrupts on again;
+//! - a part has no branch, no label and no assembler from the source;
+//! - a part that is called does not touch the stack pointer, because its return address lies on top (it may access the
+//!   frame, through Y), and it does not disable or enable interrupts, so that code with interrupts off stays as short
+//!   as it was;
+//! - nothing is taken from between `cli` and the instruction that enables interrupts again;
 //! - an instruction that another one may skip stays where it is.
 //!
-//! The part that saves most goes first, until none saves anything. Parts of parts are found in another round.
+//! The part that saves most is shared first, until no part saves anything. Parts of parts are found in another round.
 
 use std::collections::{BinaryHeap, HashMap};
 
@@ -29,19 +31,19 @@ use super::hot::Heat;
 use super::text::{Function, Insn, Line, Program};
 use super::{heat, prologue, quiet};
 
-/// What a part is called whose end is a `ret` of its own.
+/// Beginning of the names of parts with a `ret` of their own.
 pub const PART: &str = "__part_";
-/// What a part is called that takes the `ret` with it.
+/// Beginning of the names of parts that include the `ret` of the function.
 pub const TAIL: &str = "__tail_";
 
-/// No part is longer, instructions.
+/// Most instructions of a part.
 const LONGEST: usize = 60;
-/// How often parts of parts are looked for.
+/// Number of rounds, in which parts of parts are found.
 const ROUNDS: usize = 3;
-/// What a call or jump to a part takes, bytes: the linker makes two of the four where the way is short.
+/// Bytes of a call or jump to a part. The linker makes it two where the distance is short.
 const SITE: usize = 4;
 
-/// Shares what repeats in cold functions.
+/// Shares code that repeats in cold functions.
 pub fn share(program: &mut Program) {
     let mut made = 0;
     for _ in 0..ROUNDS {
@@ -76,16 +78,16 @@ fn round(program: &mut Program, made: &mut usize) {
     program.functions.iter_mut().for_each(|function| function.lines.retain(|line| *line != gone()));
 }
 
-/// What may be done with an instruction.
+/// How an instruction may be shared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Class {
-    /// May stand in any part.
+    /// It may stand in any part.
     Plain,
-    /// Only in one that is jumped to.
+    /// It may stand only in a part that is jumped to.
     Tail,
-    /// Ends one that is jumped to.
+    /// It ends a part that is jumped to.
     Ret,
-    /// In none.
+    /// It may stand in no part.
     Barrier,
 }
 
@@ -99,7 +101,7 @@ fn class(insn: &Insn) -> Class {
         "ret" => Class::Ret,
         "cli" | "sei" => Class::Tail,
         "icall" | "eicall" => Class::Barrier,
-        // It returns with more on the stack.
+        // The prologue returns with more on the stack.
         "call" if insn.args.starts_with(prologue::NAME) => Class::Barrier,
         _ if insn.is_jump() => Class::Barrier,
         _ if touches_stack || sets_stack => Class::Tail,
@@ -107,18 +109,18 @@ fn class(insn: &Insn) -> Class {
     }
 }
 
-/// All that could be shared, as numbers: equal instructions have equal numbers.
+/// All code that could be shared, as numbers. Equal instructions have equal numbers.
 struct Stream {
-    /// Of each place: the instruction, or a barrier.
+    /// For each place: the number of its instruction, or of a barrier.
     numbers: Vec<u32>,
     classes: Vec<Class>,
-    /// Where it stands: function, line.
+    /// For each place: its function and its line.
     origins: Vec<Origin>,
-    /// Of each number.
+    /// For each number: its instruction.
     insns: Vec<Insn>,
 }
 
-/// Places where the same instructions stand.
+/// Places with the same sequence of instructions.
 struct Group {
     length: usize,
     places: Vec<usize>,
@@ -183,10 +185,10 @@ impl Stream {
         }
     }
 
-    /// All that repeats and could save something.
+    /// Returns all sequences that repeat and could save something.
     fn groups(&self) -> Vec<Group> {
         let mut found = Vec::new();
-        // What repeats with one instruction more repeats without it.
+        // A sequence that repeats with one more instruction also repeats without it.
         let mut starts: Vec<usize> =
             (0..self.numbers.len()).filter(|at| self.goes_on(*at)).collect();
         for length in 2..=LONGEST {
@@ -203,7 +205,7 @@ impl Stream {
                 same.into_values().filter(|places| places.len() > 1).collect();
             repeated.sort_unstable();
             starts.extend(repeated.iter().flatten());
-            // Only some places of a group may be in functions that share more than ends.
+            // Only some places of a group may be in functions that share more than their ends.
             let parts = repeated.into_iter().map(|mut places| {
                 places.retain(|at| self.is_part(*at, length));
                 places
@@ -214,12 +216,12 @@ impl Stream {
         found
     }
 
-    /// Whether something may follow the instruction in a part.
+    /// Whether another instruction may follow in a part.
     fn goes_on(&self, at: usize) -> bool {
         !matches!(self.classes[at], Class::Barrier | Class::Ret)
     }
 
-    /// The places of a group that nothing has been taken from and that do not overlap.
+    /// Returns the places of a group from which nothing has been taken yet and that do not overlap.
     fn free(&self, group: &Group) -> Vec<usize> {
         let mut end = 0;
         let mut free = Vec::new();
@@ -234,7 +236,7 @@ impl Stream {
         free
     }
 
-    /// How many bytes it saves to share these, if any.
+    /// Returns how many bytes it saves to share these places; `None` if it saves none.
     fn saving(&self, places: &[usize], length: usize) -> Option<usize> {
         let first = *places.first()?;
         let size: usize = self.code(first, length).map(Insn::size).sum();
@@ -279,13 +281,13 @@ type Origin = (usize, usize);
 /// A part that is shared.
 struct Change {
     routine: Function,
-    /// The call or jump that stands for it.
+    /// The call or jump that replaces it.
     site: Insn,
-    /// Where its instructions were, of each place that it is taken from.
+    /// The former places of its instructions, for each place that it is taken from.
     places: Vec<Vec<Origin>>,
 }
 
-/// What stands in the place of an instruction that is taken away, until the end of the round.
+/// The placeholder for an instruction that is taken away, until the end of the round.
 fn gone() -> Line {
     Line::Note("\t; shared".into())
 }

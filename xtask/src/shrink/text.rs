@@ -4,7 +4,7 @@ use std::collections::{BTreeSet, HashSet};
 
 use super::dialect;
 
-/// Other names of functions whose address is taken.
+/// Beginning of the further names of functions whose address is taken.
 pub const TAKEN: &str = "__taken_";
 
 /// One line of a function.
@@ -12,11 +12,11 @@ pub const TAKEN: &str = "__taken_";
 pub enum Line {
     /// An instruction that the compiler made.
     Insn(Insn),
-    /// A place that branches go to.
+    /// A label that branches go to.
     Label(String),
-    /// A line of assembler from the source: nobody changes it.
+    /// A line of assembler from the source. No pass changes it.
     Fixed(String),
-    /// What makes no code: directives, labels and places in the source for a debugger.
+    /// A line that makes no code: directives, labels and source positions for a debugger.
     Note(String),
 }
 
@@ -30,13 +30,13 @@ pub struct Insn {
 }
 
 impl Insn {
-    /// `push r2`: an instruction in one string, for what the passes make themselves.
+    /// Makes an instruction from a string such as `push r2`, for code that the passes make.
     pub fn new(text: &str) -> Insn {
         let (op, args) = text.trim().split_once(char::is_whitespace).unwrap_or((text.trim(), ""));
         Insn { op: op.to_owned(), args: args.trim().to_owned() }
     }
 
-    /// What it takes at most, bytes.
+    /// Most bytes that it takes.
     pub fn size(&self) -> usize {
         match self.op.as_str() {
             "call" | "jmp" | "lds" | "sts" => 4,
@@ -44,19 +44,19 @@ impl Insn {
         }
     }
 
-    /// Whether what follows it is not what runs next, always or sometimes.
+    /// Whether the next instruction may not be the one that follows in the text.
     pub fn is_jump(&self) -> bool {
         self.is_branch()
             || matches!(self.op.as_str(), "rjmp" | "jmp" | "ijmp" | "eijmp" | "ret" | "reti")
             || self.is_skip()
     }
 
-    /// A branch on a flag.
+    /// Whether it is a branch on a flag.
     pub fn is_branch(&self) -> bool {
         self.op.starts_with("br") && self.op != "break"
     }
 
-    /// Leaves out the next instruction, or not.
+    /// Whether it may skip the next instruction.
     pub fn is_skip(&self) -> bool {
         matches!(self.op.as_str(), "sbrc" | "sbrs" | "sbic" | "sbis" | "cpse")
     }
@@ -67,7 +67,7 @@ impl Insn {
 pub struct Function {
     /// Its symbol.
     pub name: String,
-    /// From the directive of its section to that of its size.
+    /// Its lines, from the directive of its section to the directive of its size.
     pub lines: Vec<Line>,
 }
 
@@ -86,7 +86,7 @@ impl Function {
         Function { name: name.into(), lines }
     }
 
-    /// Its instructions.
+    /// Returns its instructions.
     pub fn insns(&self) -> impl Iterator<Item = &Insn> {
         self.lines.iter().filter_map(|line| match line {
             Line::Insn(insn) => Some(insn),
@@ -94,7 +94,7 @@ impl Function {
         })
     }
 
-    /// What makes code, and the places that code goes to.
+    /// Returns the lines that make code, and labels.
     pub fn code(&self) -> impl Iterator<Item = &Line> {
         self.lines.iter().filter(|line| !matches!(line, Line::Note(_)))
     }
@@ -111,23 +111,23 @@ impl Function {
 /// A program.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Program {
-    /// Definitions, and names of source files: before all code.
+    /// Definitions, and names of source files. They stand before all code.
     pub head: Vec<String>,
     /// The functions in the order in which they will stand in flash.
     pub functions: Vec<Function>,
-    /// Data, start-up code, what a debugger wants to know.
+    /// Data, start-up code, and debug information.
     pub rest: Vec<String>,
 }
 
 impl Program {
-    /// Reads the text as LLVM writes it.
+    /// Parses the text as LLVM writes it.
     pub fn parse(text: &str) -> Program {
         let mut reader = Reader::default();
         text.lines().for_each(|line| reader.line(line));
         reader.finish()
     }
 
-    /// The text for the assembler.
+    /// Returns the text for the assembler.
     pub fn text(&self) -> String {
         let mut text = String::new();
         let mut line = |line: &str| {
@@ -148,7 +148,7 @@ impl Program {
         text
     }
 
-    /// The words outside of calls and jumps: what they name others than these functions may call, by its name.
+    /// Returns the words outside calls and jumps. Functions that they name may be called from elsewhere.
     pub fn names_elsewhere(&self) -> HashSet<String> {
         let fixed = self.functions.iter().flat_map(Function::fixed);
         let around = self.head.iter().chain(&self.rest).map(String::as_str);
@@ -162,7 +162,8 @@ impl Program {
         lines.flat_map(|line| line.split(|c| !is_name(c))).map(str::to_owned).collect()
     }
 
-    /// The functions whose address is taken: in the image nothing tells. The analysis of the stack finds them by other names.
+    /// Returns the functions whose address is taken. The image does not show that, so the analysis of the stack finds
+    /// them by further names.
     pub fn taken(&self) -> BTreeSet<&str> {
         let code = self
             .functions
@@ -175,14 +176,15 @@ impl Program {
     }
 }
 
-/// The function whose address a line takes.
+/// Returns the function whose address a line takes.
 fn address(line: &str) -> Option<&str> {
     let (before, inside) = line.rsplit_once('(')?;
     let is_address = before.ends_with("gs") || before.ends_with("pm");
     is_address.then(|| inside.split(')').next())?
 }
 
-/// A text without what only a debugger reads: two thirds of it, and of the time in which it is assembled and linked.
+/// Returns a text without debug information, which is two thirds of it, and of the time in which it is assembled and
+/// linked.
 pub fn without_debug(text: &str) -> String {
     let mut is_debug = false;
     let mut is_code = |line: &str| {
@@ -196,20 +198,20 @@ pub fn without_debug(text: &str) -> String {
     lines.collect()
 }
 
-/// Whether a directive only tells a debugger or the linker of what it names, or holds text.
+/// Whether a directive only tells a debugger or the linker about a name, or holds text.
 fn names_nothing(line: &str) -> bool {
     const DIRECTIVES: [&str; 5] = [".asciz", ".ascii", ".size", ".type", ".section"];
     let word = line.split_whitespace().next();
     word.is_some_and(|word| DIRECTIVES.contains(&word))
 }
 
-/// Where the reader stands.
+/// The state of the reader.
 #[derive(Default)]
 struct Reader {
     program: Program,
     /// The function that is being read.
     function: Option<Function>,
-    /// Between `;APP` and `;NO_APP`: assembler from the source.
+    /// Whether the line is assembler from the source, between `;APP` and `;NO_APP`.
     in_source: bool,
 }
 
@@ -221,7 +223,8 @@ impl Reader {
             self.end_function();
             self.begin_section(&line);
         }
-        // Numbers of source files stand before their first use, which need not be the first in another order.
+        // Numbers of source files must be defined before their first use, which another order of functions may
+        // change. So they go to the head.
         if word == ".file" {
             return self.program.head.push(line.into_owned());
         }
@@ -253,7 +256,7 @@ impl Reader {
         }
     }
 
-    /// What had no name was no function.
+    /// A section without a named function is no function.
     fn end_function(&mut self) {
         let Some(function) = self.function.take() else { return };
         if function.name.is_empty() {
@@ -273,7 +276,7 @@ impl Reader {
     }
 }
 
-/// Labels that only debug information names.
+/// Labels that only debug information uses.
 const FOR_DEBUGGERS: [&str; 3] = [".Ltmp", ".Lfunc_begin", ".Lfunc_end"];
 
 fn parse_line(line: &str, in_source: bool) -> Line {
@@ -301,7 +304,7 @@ fn parse_line(line: &str, in_source: bool) -> Line {
 pub mod tests {
     use super::*;
 
-    /// The text of functions, as LLVM writes it.
+    /// Returns the text of functions as LLVM writes it.
     pub fn text(functions: &[(&str, &str)]) -> String {
         let function = |(name, code): &(&str, &str)| {
             let code: String = code.lines().map(|line| indented(line.trim())).collect();
@@ -324,7 +327,7 @@ pub mod tests {
         Program::parse(&text(functions))
     }
 
-    /// The code of a function, one line after the other.
+    /// Returns the code of a function, a line for each instruction or label.
     pub fn code(program: &Program, name: &str) -> String {
         let function = program
             .functions

@@ -1,7 +1,8 @@
-//! Holds the program that shares against the one that was tidied.
+//! Compares the program with shared code to the tidied program.
 //!
-//! All that is shared is put back where it is called from, by nothing but the text of the routines; what comes out must be the
-//! text that was tidied, instruction by instruction, but for branches that went round a jump and now go where it led, or by another jump. A difference fails the build.
+//! All shared code is put back where it is called from, using only the text of the routines. The result must be the
+//! tidied text, instruction by instruction. The only allowed difference is a branch that went around a jump and now
+//! goes to its destination, or by another jump. Any other difference fails the build.
 
 use std::collections::HashMap;
 
@@ -10,10 +11,10 @@ use anyhow::{Context, Result, bail, ensure};
 use super::text::{Function, Insn, Line, Program};
 use super::{branch, prologue, repeats, via};
 
-/// Routines that call routines: deeper than this means one that calls itself.
+/// Most depth of routines that call routines. A greater depth means a routine that calls itself.
 const DEEPEST: usize = 100;
 
-/// Fails if `after` is not `before`, but for what is shared.
+/// Fails if `after` differs from `before` in more than shared code.
 pub fn check(before: &Program, after: &Program) -> Result<()> {
     ensure!(
         before.head == after.head && before.rest == after.rest,
@@ -44,7 +45,7 @@ pub fn check(before: &Program, after: &Program) -> Result<()> {
     Ok(())
 }
 
-/// Whether the code is the same, but for branches that went round a jump.
+/// Whether the code is the same, except for branches that went around a jump.
 fn is_same(before: &[&Line], after: &[Line]) -> bool {
     let mut before = before;
     for line in after {
@@ -68,7 +69,7 @@ fn is_routine(name: &str) -> bool {
         .any(|prefix| name.starts_with(prefix))
 }
 
-/// The code of a function with all that it shares.
+/// Returns the code of a function with all shared code put back.
 fn put_back(
     function: &Function,
     routines: &HashMap<&str, &Function>,
@@ -92,7 +93,7 @@ fn put_back(
     Ok(whole)
 }
 
-/// The call or jump of which a routine is only the way.
+/// Returns the real call or jump where a routine consists of a jump only.
 fn straight(site: &Insn, routines: &HashMap<&str, &Function>) -> Result<Insn> {
     let routine =
         routines.get(site.args.as_str()).with_context(|| format!("{} is missing", site.args))?;
@@ -103,7 +104,8 @@ fn straight(site: &Insn, routines: &HashMap<&str, &Function>) -> Result<Insn> {
         ("call" | "jmp", [Line::Insn(jump)]) if jump.op == "jmp" => {
             let is_end = !is_routine(&jump.args) || routines.contains_key(jump.args.as_str());
             ensure!(is_end, "{} is missing", jump.args);
-            // The analysis of the stack knows the calls of what functions begin with by name.
+            // The analysis of the stack recognises calls of shared prologues by name, so they must not go through a
+            // jump.
             let is_odd = [via::NAME, prologue::NAME].iter().any(|odd| jump.args.starts_with(odd));
             ensure!(!is_odd, "{} leads to {}", site.args, jump.args);
             Ok(Insn { op: site.op.clone(), args: jump.args.clone() })
@@ -112,7 +114,7 @@ fn straight(site: &Insn, routines: &HashMap<&str, &Function>) -> Result<Insn> {
     }
 }
 
-/// What the call of a routine stands for.
+/// Adds the code that the call of a routine stands for.
 fn take_in(site: &Insn, mut routine: Vec<Line>, whole: &mut Vec<Line>) -> Result<()> {
     let ret = Line::Insn(Insn::new("ret"));
     match site.op.as_str() {
@@ -148,7 +150,7 @@ pub mod tests {
     use super::super::text::tests::program;
     use super::*;
 
-    /// The functions after a pass, which has to be equal to what was written.
+    /// Returns the functions after a pass. Checks that they are equal to the ones before it.
     pub fn checked(functions: &[(&str, &str)], pass: fn(&mut Program)) -> Program {
         let before = program(functions);
         let mut after = before.clone();

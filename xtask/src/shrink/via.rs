@@ -1,4 +1,4 @@
-//! Calls over a long way share their way.
+//! Lets calls over a long distance share a jump.
 //!
 //! ```text
 //!   call __mulsf3                       call __via_0      two bytes each, for it is near
@@ -8,9 +8,9 @@
 //!                                       jmp  __mulsf3
 //! ```
 //!
-//! A call or jump takes two bytes within 4 KB and four elsewhere. Where three or more near each other go to one far function, they go
-//! to a jump that stands between them: two cycles each, no stack. Hot functions keep their way, and so does what functions begin with, for it
-//! returns with more on the stack.
+//! A call or jump takes two bytes within 4 KB and four elsewhere. Where three or more near each other go to one far
+//! function, they go to a jump that stands between them. This costs two cycles each, and no stack. Calls in hot
+//! functions stay direct. So do calls of shared prologues, because these return with more on the stack.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -18,10 +18,10 @@ use super::hot::Heat;
 use super::text::{Function, Insn, Line, Program};
 use super::{heat, prologue};
 
-/// What the jumps are called.
+/// Beginning of the names of the jumps.
 pub const NAME: &str = "__via_";
 
-/// How far a short call reaches, bytes, with some room for the jumps themselves.
+/// How far a short call reaches, bytes, minus some room for the jumps themselves.
 const REACH: usize = 3_900;
 
 /// A call or jump.
@@ -29,11 +29,11 @@ const REACH: usize = 3_900;
 struct Site {
     function: usize,
     line: usize,
-    /// Where it stands at most, bytes.
+    /// Largest possible position, bytes.
     place: usize,
 }
 
-/// Shares the long ways of a program whose functions are in their order.
+/// Shares long calls. The functions must be in their final order.
 pub fn share(program: &mut Program) {
     let (starts, sites) = far(program);
     let mut added: Vec<(usize, Function)> = Vec::new();
@@ -59,12 +59,12 @@ pub fn share(program: &mut Program) {
             added.push((at, Function::new(&name, &[Insn::new(&format!("jmp {target}"))])));
         }
     }
-    // From behind, so that the places of those before stay.
+    // Inserted from the end, so that earlier positions stay valid.
     added.sort_by_key(|(at, _)| std::cmp::Reverse(*at));
     added.into_iter().for_each(|(at, function)| program.functions.insert(at, function));
 }
 
-/// Where functions begin, and the calls and jumps that go far, by where they go to.
+/// Returns where functions begin, and the calls and jumps over a long distance, by their destination.
 fn far(program: &Program) -> (Vec<usize>, BTreeMap<String, Vec<Site>>) {
     let size = |line: &Line| match line {
         Line::Insn(insn) => insn.size(),
@@ -90,7 +90,7 @@ fn far(program: &Program) -> (Vec<usize>, BTreeMap<String, Vec<Site>>) {
                 && !insn.args.starts_with(prologue::NAME)
                 && !is_hot
             {
-                // What is not here comes from a library, and stands behind it all.
+                // A function that is not here comes from a library, which stands behind all code.
                 let to = places.get(insn.args.as_str()).copied().unwrap_or(end);
                 if to.abs_diff(place) > REACH {
                     let site = Site { function, line, place };

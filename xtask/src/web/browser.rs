@@ -1,11 +1,12 @@
-//! Opens an address in the browser, by the system's own program. Where there is none, the address has been printed.
+//! Opens an address in the browser, by the system's own program. The address is also printed, in case there is no
+//! browser.
 
 use std::process::{Command, Stdio};
 
 /// Programs that open an address, by system.
 const PROGRAMS: [&[&str]; 3] = [&["xdg-open"], &["open"], &["cmd", "/c", "start"]];
 
-/// Opens it with the first program that there is.
+/// Opens an address with the first of the programs that exists.
 pub fn open(address: &str) {
     for words in PROGRAMS {
         let mut command = Command::new(words[0]);

@@ -1,7 +1,8 @@
-//! Compiles the module and gathers the files of the page in `target/page`, which is emptied before. (`target/web` is cargo's, of the profile.)
+//! Compiles the module and collects the files of the page in `target/page`, which is emptied first. (`target/web` is
+//! cargo's folder for the profile.)
 //!
-//! Nothing is bundled or changed: modules of the browser and an import map do what a bundler would. What is copied from packages of npm is
-//! [`VENDOR`], with their licences.
+//! Nothing is bundled or changed: the browser's modules and an import map do the work of a bundler. [`VENDOR`] lists
+//! the files that are copied from packages of npm, with their licences.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,10 +13,10 @@ use crate::npm;
 use crate::process::{host_cargo, output, root, run};
 use crate::setup::TARGET;
 
-/// Most bytes that the page may have, each file compressed by gzip.
+/// Most bytes of the page, with each file compressed by gzip.
 const CAP: u64 = 1_500_000;
 
-/// Files of packages, and where they go.
+/// Files of packages, and their names in the page.
 const VENDOR: [(&str, &str); 13] = [
     ("three/build/three.module.js", "three.module.js"),
     ("three/build/three.core.js", "three.core.js"),
@@ -32,7 +33,7 @@ const VENDOR: [(&str, &str); 13] = [
     ("docs/settings.schema.json", "../settings.schema.json"),
 ];
 
-/// Builds the page; the folder of its files.
+/// Builds the page; returns the folder of its files.
 pub fn page() -> Result<PathBuf> {
     let module = module()?;
     let packages = npm::install("web-packages", &root().join("web"))?.join("node_modules");
@@ -63,7 +64,7 @@ fn module() -> Result<PathBuf> {
     Ok(root().join("target").join(TARGET).join("web/kerf_web.wasm"))
 }
 
-/// Paths of this computer do not belong into what is published: flags that leave them out.
+/// Returns flags that leave paths of this computer out of what is published.
 fn remaps() -> String {
     let home = std::env::var_os("HOME").map(|home| PathBuf::from(home).join(".cargo"));
     let cargo = std::env::var_os("CARGO_HOME").map(PathBuf::from).or(home);
@@ -75,7 +76,7 @@ fn remaps() -> String {
     flags.join(" ")
 }
 
-/// What the page takes.
+/// The sizes of the page.
 struct Sizes {
     files: usize,
     plain: u64,
@@ -92,7 +93,7 @@ fn sizes(folder: &Path) -> Result<Sizes> {
     Ok(sizes)
 }
 
-/// The bytes of a file that a server sends compressed. Node does it, which npm brings.
+/// Returns the bytes that a server sends for a file, compressed. Node does the compression; npm comes with it.
 fn compressed(file: &Path) -> Result<u64> {
     let script =
         "console.log(require('zlib').gzipSync(require('fs').readFileSync(process.argv[1])).length)";
@@ -101,7 +102,7 @@ fn compressed(file: &Path) -> Result<u64> {
     text.trim().parse().with_context(|| format!("the size of {}", file.display()))
 }
 
-/// All files below a folder, in order.
+/// Returns all files below a folder, in order.
 pub fn files(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut entries: Vec<_> = fs::read_dir(folder)
         .with_context(|| folder.display().to_string())?

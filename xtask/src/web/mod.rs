@@ -1,13 +1,13 @@
 //! `cargo xtask web`: the firmware in a page, as a folder of static files.
 //!
-//! | module | for |
+//! | module | purpose |
 //! |---|---|
-//! | [`build`] | compiles the module, gathers the files, holds their size against the cap |
-//! | [`serve`] | a file server for one's own computer |
+//! | [`build`] | compiles the module, collects the files, compares their size with the cap |
+//! | [`serve`] | a file server for the own computer |
 //! | [`browser`] | finds a browser and opens the page |
 //! | [`tests`] | the page in headless Chromium: a stage of `cargo xtask test` |
 //!
-//! `docs/web.md` says what the page is and what of the machine is simulated.
+//! `docs/web.md` says what the page is and which parts of the machine are simulated.
 
 mod browser;
 mod build;
@@ -27,7 +27,7 @@ pub struct WebArgs {
     /// Serve the page on this computer and open the browser
     #[arg(long)]
     open: bool,
-    /// The TCP port that the page is served at; 0 takes one that is free
+    /// The TCP port that the page is served at; 0 chooses a free one
     #[arg(long, value_name = "PORT", default_value_t = 0)]
     port: u16,
     /// Run the tests of the page in headless Chromium
@@ -35,7 +35,7 @@ pub struct WebArgs {
     test: bool,
 }
 
-/// Builds the page, and does what is asked with it.
+/// Builds the page, and serves or tests it as the arguments say.
 pub fn run(args: &WebArgs) -> Result<()> {
     if args.test {
         return test();

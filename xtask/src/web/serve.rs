@@ -1,20 +1,21 @@
-//! A file server for one's own computer: GET of the files of one folder, over HTTP/1.1, a connection each.
+//! A file server for the own computer: GET of the files of one folder, over HTTP/1.1, with a connection for each
+//! request.
 //!
-//! It listens on the loopback address alone. A path that leads out of the folder, or to no file, is 404; a request that is no GET is 405. A
-//! browser that says nothing holds a thread of its own.
+//! It listens at the loopback address only. A path that leads out of the folder, or to no file, gives 404; a request
+//! other than GET gives 405. A browser that sends nothing blocks only a thread of its own.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::path::{Component, Path, PathBuf};
 
-/// Longest head of a request.
+/// Most bytes of the head of a request.
 const LONGEST: u64 = 16_384;
 
 /// Serves until the program ends.
 pub fn forever(listener: &TcpListener, folder: &Path) {
     for stream in listener.incoming().flatten() {
         let folder = folder.to_owned();
-        // Whoever has gone away needs no answer.
+        // A browser that has gone away needs no answer.
         std::thread::spawn(move || answer(stream, &folder).ok());
     }
 }
@@ -40,7 +41,7 @@ fn answer(mut stream: TcpStream, folder: &Path) -> std::io::Result<()> {
     stream.write_all(&body)
 }
 
-/// The file that a request is for, or the status that says why there is none.
+/// Returns the file that a request asks for, or the status of the error.
 fn wanted(request: &str, folder: &Path) -> Result<PathBuf, &'static str> {
     let mut words = request.split(' ');
     if words.next() != Some("GET") {

@@ -1,7 +1,8 @@
-//! Modules of the page in Node, by `tests/web/modules.mjs`, and the page in headless Chromium, driven by `tests/web/page.mjs`: what a visitor does, and
-//! where the motors end, held against the simulated chip.
+//! Tests the page's modules in Node, by `tests/web/modules.mjs`, and the page in headless Chromium, driven by
+//! `tests/web/page.mjs`: the actions of a visitor, and the end positions of the motors, compared with the simulated
+//! chip.
 //!
-//! The stage takes a minute. What it leaves are `target/web-tests/*.png`, pictures of the page.
+//! The stage takes a minute. It leaves pictures of the page, `target/web-tests/*.png`.
 
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
@@ -19,7 +20,7 @@ use crate::sim;
 /// Jobs whose last steps are compared.
 const COMPARED: [&str; 2] = ["square", "bracket"];
 
-/// Settings as lines, which the page has exported.
+/// The settings as lines, which the page has exported.
 const EXPORTED: &str = "exported.txt";
 
 /// Serves the page, and runs the tests.
@@ -33,17 +34,17 @@ pub fn run(page: &Path) -> Result<()> {
     let listener = TcpListener::bind("127.0.0.1:0").context("no port to serve at")?;
     let address = format!("http://{}/", listener.local_addr()?);
     let page = page.to_owned();
-    // It ends with this program.
+    // The server ends with this program.
     std::thread::spawn(move || serve::forever(&listener, &page));
     let mut node = Command::new("node");
     node.current_dir(&folder).arg(root().join("tests/web/page.mjs")).arg(address).args(reports);
     run_child(&mut node)?;
-    // The simulated chip takes the settings that the page has exported.
+    // The simulated chip must accept the settings that the page has exported.
     let set = [format!("@{}", folder.join(EXPORTED).display())];
     sim::report(&elf, &root().join("examples/square.gcode"), &set, &folder.join("exported.json"))
 }
 
-/// What the simulated chip makes of the jobs: `NAME.json` each.
+/// Runs the jobs on the simulated chip. Returns the reports, `NAME.json` each.
 fn reports(elf: &Path, folder: &Path) -> Result<Vec<PathBuf>> {
     let report = |name: &&str| {
         let file = folder.join(format!("{name}.json"));

@@ -1,13 +1,14 @@
-//! What holds for the chords of any arc.
+//! Checks that hold for the chords of any arc.
 
 use kerf::gcode::arc::Chords;
 use kerf::gcode::command::Arc;
 use kerf::units::{Length, PerAxis};
 
-/// An arc may have thousands of millions of chords: so many are looked at.
+/// Number of chords that are checked: an arc may have thousands of millions.
 const LOOKED_AT: u32 = 2_000;
 
-/// Walks along an arc: the ends of its chords lie on the circle or as far outside as they may, are as many as was said, and end at the end.
+/// Walks along an arc. Checks that the ends of its chords lie on the circle or outside it within the allowance, that
+/// their number is the announced one, and that the last chord ends at the end of the arc.
 pub fn check(start: &PerAxis<Length>, target: &PerAxis<Length>, arc: &Arc, tolerance: f32) {
     let chords = Chords::new(start, target, arc, tolerance);
     let total = chords.total();
@@ -29,7 +30,7 @@ pub fn check(start: &PerAxis<Length>, target: &PerAxis<Length>, arc: &Arc, toler
     assert!(last.0 < total || last.1 == *target, "{:?} is not the end {target:?}", last.1);
 }
 
-/// Between what radii the points lie: 2 um, or a millionth, are what floats may be wrong by.
+/// Returns the range of radii in which the points must lie. 2 um, or a millionth, are allowed for errors of floats.
 fn radii(start: &PerAxis<Length>, target: &PerAxis<Length>, arc: &Arc) -> (f64, f64) {
     let (from, to) = (radius(start, arc), radius(target, arc));
     let (inner, outer) = (from.min(to), from.max(to));
@@ -37,14 +38,15 @@ fn radii(start: &PerAxis<Length>, target: &PerAxis<Length>, arc: &Arc) -> (f64, 
     (inner - slack, outer + slack)
 }
 
-/// How far ends of chords lie outside of a circle, so that chords are on both sides of it: two thirds of what chords of this tolerance,
-/// or the shortest of 0.05 mm, or those of a seventh of a circle leave it by, or a little more.
+/// Returns how far the ends of chords may lie outside a circle, so that chords are on both sides of it. The result is
+/// a little more than two thirds of the distance between circle and chord, for chords of this tolerance, or of the
+/// shortest length, 0.05 mm, or of a seventh of a circle.
 fn outside(radius: f64, tolerance: f32) -> f64 {
     let units = f64::from(tolerance) * f64::from(Length::PER_MM);
     units.max(500.0 * 500.0 / 8.0 / radius).min(0.1 * radius)
 }
 
-/// Whether the whole circle can be told in lengths: of one that cannot, the rest is cut off.
+/// Whether the whole circle is within the range of lengths. Otherwise a part of it is cut off.
 fn is_within_reach(outer: f64, arc: &Arc) -> bool {
     let reach = f64::from(i32::MAX);
     arc.center.iter().all(|center| f64::from(center.0).abs() + outer <= reach)

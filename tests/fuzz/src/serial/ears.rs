@@ -1,27 +1,27 @@
-//! What the machine says.
+//! Reads what the machine sends.
 
 use kerf::hal::serial::{XOFF, XON};
 
-/// How a line begins that answers one.
+/// Beginnings of lines that are answers.
 const ANSWERS: [&[u8]; 3] = [b"{\"r\":{", b"{r:{", b"tinyg ["];
 
-/// How the result of probing begins.
+/// Beginnings of the result of probing.
 const PROBED: [&str; 2] = ["{\"r\":{\"prb\":", "{r:{prb:"];
 
-/// Hears, and counts the answers.
+/// Takes what the machine sends, and counts the answers.
 #[derive(Default)]
 pub struct Ears {
-    /// Lines that answer one.
+    /// Number of answers.
     pub answers: usize,
-    /// The last of them.
+    /// The last answer.
     pub last: Vec<u8>,
-    /// What is heard need not be text: the two ends may speak at different rates.
+    /// Whether bytes need not be text, because the two ends may use different rates.
     pub deaf: bool,
     partial: Vec<u8>,
 }
 
 impl Ears {
-    /// Takes what was heard.
+    /// Takes bytes from the machine.
     pub fn hear(&mut self, bytes: &[u8]) {
         for byte in bytes {
             if matches!(*byte, XON | XOFF) {
@@ -46,7 +46,7 @@ impl Ears {
         let line = std::mem::take(&mut self.partial);
         let text = String::from_utf8_lossy(&line);
         assert!(self.deaf || !line.starts_with(b"{") || line.ends_with(b"}"), "says {text}");
-        // What probing tells by itself: it has no length and no slots.
+        // The unsolicited result of probing has no length and no slots.
         let unasked =
             PROBED.iter().any(|probed| text.starts_with(probed)) && text.contains("[1,0,0");
         if !unasked && ANSWERS.iter().any(|answer| line.starts_with(answer)) {

@@ -1,4 +1,4 @@
-//! Which bytes make a line that is to be answered, worked out anew.
+//! Determines which bytes make a line that must be answered, independently of the firmware.
 
 use kerf::realtime;
 use kerf::tasks::lines::LINE_MAX;
@@ -6,26 +6,26 @@ use kerf::tasks::lines::LINE_MAX;
 /// What a byte ends.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum End {
-    /// A line that holds nothing, or blanks.
+    /// A line that is empty or has only blanks.
     Empty,
-    /// A line.
+    /// A line with content.
     Line,
 }
 
 /// Follows the bytes that are sent.
 #[derive(Default)]
 pub struct Lines {
-    /// The sender was in text mode at the last line's end.
+    /// Whether the sender was in text mode at the end of the last line.
     pub is_text: bool,
     first: Option<u8>,
-    /// There is more than one byte that is no blank.
+    /// Whether the line has more than one byte that is not blank.
     more: bool,
     len: usize,
     returned: bool,
 }
 
 impl Lines {
-    /// Takes a byte; what it ends, if it ends something.
+    /// Takes a byte. Returns what it ends; `None` if it ends nothing.
     pub fn take(&mut self, byte: u8) -> Option<End> {
         if realtime::bit(byte) != 0 {
             return None;
@@ -36,7 +36,7 @@ impl Lines {
             b'\n' | b'\r' => Some(self.end()),
             b' ' | b'\t' if self.first.is_none() => None,
             _ => {
-                // A question mark is a line of its own, with an end or without.
+                // A question mark at the beginning is a line of its own, with or without a line end.
                 let asked = self.first == Some(b'?') && !matches!(byte, b' ' | b'\t');
                 let ended = (asked && self.len <= LINE_MAX).then(|| self.end());
                 self.more |= self.first.is_some() && !matches!(byte, b' ' | b'\t');

@@ -9,38 +9,38 @@ use super::lines::{End, Lines};
 
 /// Bits a second.
 const BAUD: u32 = 115_200;
-/// Events (bytes, steps, milliseconds) that an input may take.
+/// Most events (bytes, steps, milliseconds) that an input may take.
 const EVENTS_MAX: u32 = 100_000;
-/// How long a machine may be silent, or stand still, that has something to do and waits for no spindle.
+/// Longest time that a machine with work left may be silent or stand still, unless it waits for the spindle, ms.
 const PATIENCE_MS: u64 = 2_000;
-/// Time between two looks.
+/// Time between two checks, ms.
 const LOOK_MS: u64 = 20;
-/// The longest answer has left in this time.
+/// Time in which the longest answer has been sent, ms.
 const LAST_MS: u64 = 300;
-/// A thread waits so long for the spindle, which says nothing here.
+/// Time that a thread waits for the spindle, which gives no pulses here, ms.
 const SPINDLE_MS: u64 = 7_000;
-/// What a thread is called.
+/// The codes of threads.
 const THREADS: [&[u8]; 3] = [b"g32", b"g33", b"g76"];
-/// Settings after which the machine may say nothing, or say it at another rate, or says what it hears, or passes for
-/// another.
+/// Settings after which the machine may send nothing, or send at another rate, or echo what it hears, or present
+/// itself as another machine.
 const MUTING: [&[u8]; 7] = [b"jv", b"tv", b"baud", b"ee0", b"ee1", b"eet", b"dia"];
 
 /// The job takes too long to wait for its end.
 struct TooLong;
 
-/// A machine, and what it has said.
+/// A machine, and what it has sent.
 pub struct Session {
     machine: Machine,
     ears: Ears,
     events: u32,
-    /// Some lines may not be answered.
+    /// Whether some lines may stay unanswered.
     mute: bool,
-    /// Lines may wait for the spindle.
+    /// Whether lines may wait for the spindle.
     turns: bool,
 }
 
 impl Session {
-    /// Boots a machine that is going to be sent `text`.
+    /// Boots a machine that will be sent `text`.
     pub fn begin(text: &[u8]) -> Self {
         let machine = Machine::boot(BAUD).expect("one machine in each thread");
         let mut session = Self {
@@ -50,11 +50,11 @@ impl Session {
             mute: names_any(&MUTING, text),
             turns: names_any(&THREADS, text),
         };
-        // Greeted in both dialects.
+        // The greeting comes in both dialects.
         session.ears.deaf = true;
         let greeted = session.run(LAST_MS, |ears| ears.answers == 1);
         assert!(matches!(greeted, Ok(true)), "no greeting");
-        // A line of JSON decides for TinyG's, whose answers are counted.
+        // A line of JSON settles TinyG's dialect, whose answers are counted.
         session.machine.send(b"{fv:n}\n");
         let decided = session.run(LAST_MS, |ears| ears.answers == 2);
         assert!(matches!(decided, Ok(true)), "no answer");
@@ -63,14 +63,14 @@ impl Session {
         session
     }
 
-    /// Sends `text` and checks what comes of it.
+    /// Sends `text` and checks the answers.
     pub fn hold(mut self, text: &[u8], all_at_once: bool) {
         let sent = if all_at_once { self.flood(text) } else { self.converse(text) };
-        // One that takes too long has been looked at for as long as it may.
+        // An input that takes too long has been checked for as long as allowed.
         let _ = sent.and_then(|expected| self.end(expected));
     }
 
-    /// Sends all at once. How many answers are to be expected at least, and at most.
+    /// Sends all at once. Returns the least and the most number of answers to expect.
     fn flood(&mut self, text: &[u8]) -> Result<(usize, usize), TooLong> {
         let mut lines = Lines::default();
         let text = [text, b"\n"].concat();
@@ -81,7 +81,7 @@ impl Session {
         Ok((least, ends.len()))
     }
 
-    /// Sends line after line, each when the one before has been answered.
+    /// Sends each line when the line before it has been answered. Returns as [`Session::flood`].
     fn converse(&mut self, text: &[u8]) -> Result<(usize, usize), TooLong> {
         let (mut lines, mut expected) = (Lines::default(), 0);
         let text = [text, b"\n"].concat();
@@ -113,7 +113,7 @@ impl Session {
         Ok(())
     }
 
-    /// Waits for rest, and checks that everything was answered and that anything would be.
+    /// Waits for rest. Checks that everything was answered, and that a further line would be.
     fn end(&mut self, (least, most): (usize, usize)) -> Result<(), TooLong> {
         self.rest()?;
         if self.mute {
@@ -129,7 +129,7 @@ impl Session {
         Ok(())
     }
 
-    /// Waits until all that was sent has arrived, been carried out and been answered.
+    /// Waits until all that was sent has arrived, been executed and been answered.
     fn rest(&mut self) -> Result<(), TooLong> {
         let (mut idle, mut still) = (0, 0);
         let enough = if self.turns { SPINDLE_MS } else { LAST_MS };
@@ -150,14 +150,14 @@ impl Session {
         if self.turns { SPINDLE_MS } else { PATIENCE_MS }
     }
 
-    /// Cycle start, should a program have stopped.
+    /// Sends a cycle start in case a program has stopped.
     fn go_on(&self) {
         if !stepper::running() {
             self.machine.send(b"~");
         }
     }
 
-    /// Runs until `done`, for `ms` at most. Whether it came to that.
+    /// Runs until `done`, for at most `ms`. Returns whether `done` became true.
     fn run(&mut self, ms: u64, done: impl Fn(&Ears) -> bool) -> Result<bool, TooLong> {
         let Self { machine, ears, events, .. } = self;
         let came = machine.run_until(ms, || {

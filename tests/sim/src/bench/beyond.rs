@@ -9,18 +9,18 @@ use super::workload::{Bed, How, PER_MM};
 use crate::host::{Host, LINES_IN_FLIGHT};
 use crate::machine::Machine;
 
-/// What is asked for, steps/s.
+/// The step rate that is asked for, steps/s.
 const ASKED: f64 = 200_000.0;
-/// For a rate well below that, s.
+/// Time allowed for the move, s: enough for a rate well below [`ASKED`].
 const PATIENCE_S: f64 = 120.0;
 
-/// How many of three things are so: the end is exact, the rate is clamped, the sender is told.
+/// Counts how many of three facts hold: the end is exact, the rate is clamped, the sender is told of it.
 pub fn twice(bed: &Bed) -> Result<Figure> {
     let mut machine = bed.machine()?;
     let mut host = Host::new(LINES_IN_FLIGHT);
     host.boot(&mut machine, 1_000)?;
     let told = |value: &Value| ["er", "msg"].iter().any(|key| value.get(key).is_some());
-    // Either when the limits are set beyond what can be, or when the move comes.
+    // The firmware may warn when the limits are set too high, or only when the move comes.
     let mut warned = false;
     for line in bed.settings(How::default()) {
         warned |= told(&host.ask(&mut machine, &line, 1_000)?.body);

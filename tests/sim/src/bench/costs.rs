@@ -1,4 +1,4 @@
-//! What the firmware's parts cost.
+//! What the firmware's parts cost in CPU time.
 
 use anyhow::{Result, ensure};
 
@@ -10,29 +10,30 @@ use crate::machine::Machine;
 use crate::report::Report;
 use crate::stopwatch::{Cost, Stopwatch};
 
-/// USART2_UDRE, the software interrupt that exec runs in.
+/// USART2_UDRE: the vector of the software interrupt that exec runs in.
 const EXEC_VECTOR: u8 = 52;
 /// Called once for each segment that exec has prepared.
 const SEGMENT_READY: &str = "kerf::hal::imp::stepper::go";
-/// Queues a block and plans again.
+/// Queues a block and plans the queue again.
 const QUEUE_PUSH: &str = "<kerf::motion::queue::BlockQueue>::push_line";
 
-/// The short moves: how many, how long (mm), at what feed (mm/min). 4,000 a second would do.
+/// The short moves: their number, their length (mm) and their feed (mm/min). At that feed motion uses up 4,000 moves
+/// a second.
 const SHORT: (u32, f64, f64) = (3_000, 0.05, 12_000.0);
-/// Short moves taken in a second on a fast line.
+/// Short moves that the firmware accepts in a second on a fast line.
 pub fn lines(bed: &Bed) -> Result<Figure> {
     let how = How { baud: FAST_BAUD, acceleration: NO_LIMIT, ..How::default() };
     let (_, report) = bed.run(&short_moves(), how)?;
     Ok(lines_per_second(&report).into())
 }
 
-/// Short moves taken in a second on a fast line, in grbl's dialect.
+/// Short moves that the firmware accepts in a second on a fast line, in grbl's dialect.
 pub fn lines_grbl(bed: &Bed) -> Result<Figure> {
     let how = How { baud: FAST_BAUD, acceleration: NO_LIMIT, ..How::default() };
     spirals::lines_grbl(bed, &short_moves(), how)
 }
 
-/// Short moves taken in a second on a fast line, under a jerk limit.
+/// Short moves that the firmware accepts in a second on a fast line, under a jerk limit.
 pub fn lines_jerk(bed: &Bed) -> Result<Figure> {
     let how =
         How { baud: FAST_BAUD, acceleration: NO_LIMIT, jerk: Some(USUAL_JERK), ..How::default() };
@@ -40,7 +41,7 @@ pub fn lines_jerk(bed: &Bed) -> Result<Figure> {
     Ok(lines_per_second(&report).into())
 }
 
-/// The longest time in which no tick comes in outside the step interrupt, cycles.
+/// The longest time in which no tick is served outside the step interrupt, cycles.
 pub fn interrupts_off(bed: &Bed) -> Result<Figure> {
     let machines = [jitter::run(bed, 1_000)?, spiral_on_fast_line(bed, Vec::new())?.0];
     let windows = machines.iter().map(|m| (m.meters().window_outside(), m));
@@ -51,7 +52,7 @@ pub fn interrupts_off(bed: &Bed) -> Result<Figure> {
     }))
 }
 
-/// Cycles of exec for one segment, with all that it needs of new blocks.
+/// Cycles that exec takes for one segment, with all work on new blocks that falls into it.
 pub fn segment(bed: &Bed) -> Result<Figure> {
     let laps = bed.laps(EXEC_VECTOR, SEGMENT_READY)?;
     let (machine, _) = spiral_on_fast_line(bed, vec![laps])?;
@@ -60,7 +61,7 @@ pub fn segment(bed: &Bed) -> Result<Figure> {
     Ok(Figure { value: cost.mean(), note })
 }
 
-/// Cycles of exec for one segment under a jerk limit, on short moves and on arcs.
+/// Cycles that exec takes for one segment under a jerk limit, on short moves and on arcs.
 pub fn segment_jerk(bed: &Bed) -> Result<Figure> {
     let jobs = [spiral(0.1), arcs(), braid(0.33, 3_000.0)];
     let costs = jerk_costs(bed, &[USUAL_JERK], &jobs)?;
@@ -69,7 +70,7 @@ pub fn segment_jerk(bed: &Bed) -> Result<Figure> {
     Ok(Figure { value: cycles / count as f64, note: format!("{count} segments") })
 }
 
-/// The longest that exec takes for a segment under any jerk limit.
+/// The longest time that exec takes for a segment under any of three jerk limits, cycles.
 pub fn segment_jerk_worst(bed: &Bed) -> Result<Figure> {
     let jobs = [arcs(), braid(0.33, 3_000.0)];
     let costs = jerk_costs(bed, &[500.0, USUAL_JERK, 50_000.0], &jobs)?;
@@ -78,7 +79,7 @@ pub fn segment_jerk_worst(bed: &Bed) -> Result<Figure> {
     Ok(Figure { value: worst as f64, note: format!("{count} segments") })
 }
 
-/// What exec takes for segments of these jobs under each of these jerk limits.
+/// Measures what exec takes for the segments of each job under each jerk limit.
 fn jerk_costs(bed: &Bed, jerks: &[f64], jobs: &[String]) -> Result<Vec<Cost>> {
     let runs = jerks.iter().flat_map(|jerk| jobs.iter().map(move |job| (jerk, job)));
     runs.map(|(jerk, job)| {
@@ -91,10 +92,10 @@ fn jerk_costs(bed: &Bed, jerks: &[f64], jobs: &[String]) -> Result<Vec<Cost>> {
     .collect()
 }
 
-/// Cycles of queuing a block with all replanning, at worst.
+/// Cycles of queuing a block with all replanning: the worst case.
 pub fn replan(bed: &Bed) -> Result<Figure> {
     let (curve, _) = spiral_on_fast_line(bed, vec![bed.calls(QUEUE_PUSH)?])?;
-    // With a low jerk limit it takes all of the queue to stop: each new block changes every other.
+    // With a low jerk limit the whole queue is needed to stop, so that each new block changes every other block.
     let how = How { baud: FAST_BAUD, jerk: Some(LOW_JERK), ..How::default() };
     let (line, _) =
         bed.try_run(&straight(1_000, 0.1, 6_000.0), how, vec![bed.calls(QUEUE_PUSH)?])?;

@@ -1,4 +1,4 @@
-//! The rows of `pico-cnc`, whose chip is emulated. Their targets are what its users may expect of such a chip.
+//! The rows of `pico-cnc`, whose chip is emulated. The targets are what users may expect of a chip like the RP2040.
 
 use std::path::{Path, PathBuf};
 
@@ -15,13 +15,13 @@ use crate::job::{Options, lines_of};
 use crate::machine::USB;
 use crate::runs::Runs;
 
-/// Cycles in a microsecond.
+/// Cycles of the CPU in a microsecond.
 const PER_US: f64 = 128.0;
 /// The exception that exec runs in: SWI_IRQ_1.
 const EXEC: usize = 16 + 27;
 const NONE: [&str; 3] = ["-"; 3];
 
-/// A row with a target that is its floor as well.
+/// A row whose floor is its target.
 const fn row(
     name: &'static str,
     what: &'static str,
@@ -111,12 +111,12 @@ pub const ROWS: [Row<PicoBed>; 11] = [
     },
 ];
 
-/// The row of this name.
+/// Returns the row of this name.
 pub fn named(name: &str) -> Option<&'static Row<PicoBed>> {
     ROWS.iter().find(|row| row.name == name)
 }
 
-/// The image, and that of the board with six motors in the same folder.
+/// The image of `pico-cnc`. The image of the board with six motors lies in the same folder.
 pub struct PicoBed {
     elf: PathBuf,
 }
@@ -127,7 +127,7 @@ impl PicoBed {
         PicoBed { elf: path.to_path_buf() }
     }
 
-    /// A board that has greeted, with settings.
+    /// Returns a board that has greeted and has these settings.
     fn board(&self, board: &'static Board, settings: &[String]) -> Result<(Emulated, Host)> {
         let elf = self.elf.with_file_name(format!("{}.elf", board.name));
         let (mut board, mut host) = (Emulated::load(&elf, board)?, Host::new(LINES_IN_FLIGHT));
@@ -139,7 +139,7 @@ impl PicoBed {
     }
 }
 
-/// Sends a line that must be taken.
+/// Sends a line; an error if the firmware refuses the line.
 fn ask(board: &mut Emulated, host: &mut Host, line: &str) -> Result<()> {
     let response = host.ask(board, line, 5_000)?;
     ensure!(response.is_ok(), "{line} is answered by {}", response.raw);
@@ -150,7 +150,7 @@ fn fast() -> Vec<String> {
     FAST.map(str::to_owned).to_vec()
 }
 
-/// Edges of steps in 5 ms of the cruise of a move.
+/// Records the edges of steps in 5 ms of the cruise of a move.
 fn cruise(bed: &PicoBed, board: &'static Board, more: &[&str], line: &str) -> Result<Recorded> {
     let settings: Vec<_> = fast().into_iter().chain(more.iter().map(|s| s.to_string())).collect();
     let (mut board, mut host) = bed.board(board, &settings)?;
@@ -159,13 +159,13 @@ fn cruise(bed: &PicoBed, board: &'static Board, more: &[&str], line: &str) -> Re
     board.record_for_ms(5)
 }
 
-/// The lowest rate of the motors that move, as many as are wanted.
+/// Returns the lowest step rate of the motors that move. An error unless exactly `motors` motors move.
 fn rate(recorded: &Recorded, motors: usize) -> Result<Figure> {
     let moving = recorded.times.iter().filter(|times| times.len() > 1);
     let rates: Vec<_> = moving.map(|times| evenness(times).0).collect();
     ensure!(rates.len() == motors, "{} motors move", rates.len());
     let lowest = rates.into_iter().fold(f64::INFINITY, f64::min);
-    // By 10: what the slope of so few steps tells.
+    // Rounded to 10 steps/s, the resolution of a slope over so few steps.
     Ok(Figure { value: (lowest / 10.0).round() * 10.0, note: String::new() })
 }
 
@@ -177,13 +177,13 @@ fn four(bed: &PicoBed) -> Result<Figure> {
     rate(&cruise(bed, &PICO_CNC, &[], "g0 x100 y100 z100 a100")?, 4)
 }
 
-/// X, A, and two motors each of Y and Z.
+/// Six motors: X, A, and two motors each of Y and Z.
 fn six(bed: &PicoBed) -> Result<Figure> {
     let more = ["{5ma:1,5tr:1.25,6ma:2,6tr:1.25}"];
     rate(&cruise(bed, &PICO_CNC6, &more, "g1 f46875 x60 y60 z60 a60")?, 6)
 }
 
-/// Four motors, each at a rate of its own.
+/// Four motors, each at its own rate.
 const UNLIKE: &str = "g0 x100 y87.3 z-61.8 a29";
 
 fn leading(bed: &PicoBed) -> Result<Figure> {
@@ -197,10 +197,11 @@ fn minor(bed: &PicoBed) -> Result<Figure> {
     Ok(recorded.times.iter().map(|times| evenness(times).2).fold(0.0, f64::max).into())
 }
 
-/// Lines that are taken in a second, of moves that are too short to be a limit. Each must be taken, and be made.
+/// Lines that are accepted in a second. The moves are too short for motion to limit the rate. Each line must be
+/// accepted and each move made.
 fn lines(bed: &PicoBed) -> Result<Figure> {
     const LINES: usize = 2_000;
-    /// Steps of 0.05 mm.
+    /// Steps of a move of 0.05 mm.
     const STEPS: i64 = 64;
     let (mut board, mut host) = bed.board(&PICO_CNC, &fast())?;
     ask(&mut board, &mut host, "g1f40000")?;
@@ -226,7 +227,7 @@ fn lines(bed: &PicoBed) -> Result<Figure> {
     Ok(Figure { value, note: format!("thread mode takes {busy:.0} % of the CPU") })
 }
 
-/// A board that has just begun a spiral of 2,000 moves of 0.1 mm at 6,000 mm/min.
+/// Returns a board that has just begun a spiral of 2,000 moves of 0.1 mm at 6,000 mm/min.
 fn begun(bed: &PicoBed, jerk: Option<f64>) -> Result<Emulated> {
     let (mut board, _) = bed.board(&PICO_CNC, &settings(How { jerk, ..How::default() }, true))?;
     board.send_to(USB, spiral(0.1).as_bytes());
@@ -237,7 +238,7 @@ fn begun(bed: &PicoBed, jerk: Option<f64>) -> Result<Emulated> {
     Ok(board)
 }
 
-/// How long the steps of that take, s.
+/// How long the spiral of [`begun`] takes from its first step to its last, s.
 fn seconds(bed: &PicoBed, jerk: Option<f64>) -> Result<f64> {
     let mut board = begun(bed, jerk)?;
     let start = board.cycle();
@@ -255,7 +256,7 @@ fn tenth_jerk(bed: &PicoBed) -> Result<Figure> {
     Ok((seconds(bed, Some(USUAL_JERK))? / seconds(bed, None)?).into())
 }
 
-/// By the cycles of its handler, without those that interrupt it. A move of 0.1 mm is a slice of a millisecond.
+/// Cycles of exec's handler, without the handlers that interrupt it. A move of 0.1 mm is a slice of one millisecond.
 fn exec(bed: &PicoBed) -> Result<Figure> {
     let mut board = begun(bed, None)?;
     board.run_for_ms(500)?;
@@ -274,9 +275,10 @@ fn pauses_usual(bed: &PicoBed) -> Result<Figure> {
     late(bed, Some(USUAL_JERK))
 }
 
-/// Segments that came late in the jobs. They must end on their exact steps.
+/// Counts the segments that come late in all jobs. A job without late segments must end on its exact steps.
 ///
-/// Every other job has holds and overrides; under the other limit those are left alone that have them here. The emulator takes a minute for them.
+/// Holds and overrides come in every other job: without a jerk limit in one half of the jobs, under a jerk limit in
+/// the other half. The emulator takes a minute for all jobs.
 fn late(bed: &PicoBed, jerk: Option<f64>) -> Result<Figure> {
     let (mut sum, mut note) = (0, String::new());
     for (seed, (name, text)) in (1..).zip(&pauses::jobs()) {

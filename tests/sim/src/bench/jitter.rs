@@ -1,4 +1,4 @@
-//! How evenly the steps come at cruise: X at 20,000 steps/s with Y at 7,400 in one move.
+//! How evenly the steps come at cruise, when X makes 20,000 steps/s and Y 7,400 in one move.
 
 use std::fmt::Write;
 
@@ -11,34 +11,34 @@ use crate::machine::Machine;
 /// Steps a second of the dominant motor and of the minor one.
 const DOMINANT: f64 = 20_000.0;
 const MINOR: f64 = 7_400.0;
-/// The way of X, mm, for some 2 s of cruise.
+/// Length of the move along X, mm: about 2 s of cruise.
 const WAY: f64 = 650.0;
-/// A block of many, mm.
+/// Length of one block in a row of blocks, mm.
 const BLOCK: f64 = 5.0;
-/// The part of it that counts, s: all of it cruise.
+/// The middle part of the move that counts, s. All of it is cruise.
 const COUNTED_S: f64 = 1.0;
-/// Lines that take longer than the move.
+/// Number of lines behind the move, which take longer to send than the move lasts.
 const LINES: u32 = 3_000;
 
-/// Peak to peak of the dominant motor's interval, cycles; nothing on the line.
+/// Peak-to-peak jitter of the dominant motor's step interval, cycles, while the serial line is quiet.
 pub fn quiet(bed: &Bed) -> Result<Figure> {
     let machine = run(bed, 0)?;
     Ok(in_cycles(&machine, peak_to_peak(&machine, 0)))
 }
 
-/// Peak to peak of the dominant motor's interval, cycles, while lines stream in and answers out.
+/// Peak-to-peak jitter of the dominant motor's step interval, cycles, while lines stream in and answers stream out.
 pub fn busy(bed: &Bed) -> Result<Figure> {
     let machine = run(bed, LINES)?;
     Ok(in_cycles(&machine, peak_to_peak(&machine, 0)))
 }
 
-/// Peak to peak of the minor motor's interval, us, while lines stream in.
+/// Peak-to-peak jitter of the minor motor's step interval, us, while lines stream in.
 pub fn minor(bed: &Bed) -> Result<Figure> {
     let machine = run(bed, LINES)?;
     Ok((machine.seconds(peak_to_peak(&machine, 1)) * 1e6).into())
 }
 
-/// Jitter over the ends of blocks: lines of 5 mm in a row, of X alone and with Y, while the serial line is quiet.
+/// Jitter across the ends of blocks: lines of 5 mm in a row, of X alone and with Y, while the serial line is quiet.
 pub fn boundaries(bed: &Bed) -> Result<Figure> {
     let (mut worst, mut note) = (0, Vec::new());
     for (name, minor) in [("alone", 0.0), ("with Y", MINOR / DOMINANT)] {
@@ -59,7 +59,7 @@ fn in_cycles(machine: &Machine, cycles: u64) -> Figure {
     Figure { value: cycles as f64, note: format!("{:.2} us", machine.seconds(cycles) * 1e6) }
 }
 
-/// The machine after the move with so many lines behind it.
+/// Runs the move with this many lines behind it, and returns the machine.
 pub fn run(bed: &Bed, lines: u32) -> Result<Machine> {
     let y = WAY * MINOR / DOMINANT;
     let feed = DOMINANT / PER_MM * 60.0 * WAY.hypot(y) / WAY;
@@ -67,7 +67,7 @@ pub fn run(bed: &Bed, lines: u32) -> Result<Machine> {
     Ok(bed.run(&job, How { log: true, ..How::default() })?.0)
 }
 
-/// Longest less shortest interval in the middle of the move.
+/// Returns the longest step interval minus the shortest in the middle of the move.
 fn peak_to_peak(machine: &Machine, motor: u8) -> u64 {
     let steps = machine.recorder().steps_of(motor);
     let half = (COUNTED_S / 2.0 * f64::from(machine.board().clock_hz)) as u64;

@@ -12,39 +12,39 @@ use super::workload::{
 use crate::host::{Host, LINES_IN_FLIGHT};
 use crate::machine::Machine;
 
-/// Feed of lone moves, mm/min: more than they reach.
+/// Feed of lone moves, mm/min: higher than the moves can reach.
 const FEED: f64 = 30_000.0;
-/// Velocity that holds stop from, mm/s.
+/// Velocity at which a hold begins, mm/s.
 const HELD: f64 = 50.0;
-/// Holds come at so many phases of segments.
+/// Number of holds, each at another phase of a segment.
 const PHASES: u64 = 8;
-/// Four times as fine steps, for the acceleration of X and Y to be told from them.
+/// Four times finer steps, which show the acceleration of X and Y well enough.
 const FINE: [&str; 2] = ["{1:{tr:5}}", "{2:{tr:5}}"];
 const FINE_PER_MM: f64 = 320.0;
-/// The time over which acceleration is taken, s.
+/// The time over which the acceleration is averaged, s.
 const WINDOW_S: f64 = 0.010;
 
-/// A lone move of 0.1 mm, over the shortest time within the limits.
+/// Time of a lone move of 0.1 mm, over the shortest time within the limits.
 pub fn lone_tenth(bed: &Bed) -> Result<Figure> {
     lone(bed, 0.1)
 }
 
-/// A lone move of 1 mm.
+/// Time of a lone move of 1 mm, over the shortest time within the limits.
 pub fn lone_one(bed: &Bed) -> Result<Figure> {
     lone(bed, 1.0)
 }
 
-/// A lone move of 10 mm.
+/// Time of a lone move of 10 mm, over the shortest time within the limits.
 pub fn lone_ten(bed: &Bed) -> Result<Figure> {
     lone(bed, 10.0)
 }
 
-/// A lone move of 100 mm.
+/// Time of a lone move of 100 mm, over the shortest time within the limits.
 pub fn lone_hundred(bed: &Bed) -> Result<Figure> {
     lone(bed, 100.0)
 }
 
-/// Its time is that of the step timer, which runs from rest to rest.
+/// Takes the time of the move from the step timer, which runs from rest to rest.
 fn lone(bed: &Bed, mm: f64) -> Result<Figure> {
     let how = How { log: true, jerk: Some(USUAL_JERK), ..How::default() };
     let (machine, _) = bed.run(&format!("G1 X{mm} F{FEED}\n"), how)?;
@@ -55,7 +55,7 @@ fn lone(bed: &Bed, mm: f64) -> Result<Figure> {
     Ok(Figure { value: seconds / best, note: format!("{:.1} ms", seconds * 1e3) })
 }
 
-/// From `!` to the first step of a slower segment, ms at most.
+/// Time from `!` to the first step of a slower segment, ms; the longest of all holds.
 pub fn hold_begins(bed: &Bed) -> Result<Figure> {
     let all = holds(bed)?;
     let value = all.iter().map(|h| h.begins).fold(0.0, f64::max) * 1e3;
@@ -63,17 +63,18 @@ pub fn hold_begins(bed: &Bed) -> Result<Figure> {
     Ok(Figure { value, note })
 }
 
-/// From there to rest, over the shortest time within the limits, at most.
+/// Time from the first step of a slower segment to rest, over the shortest time within the limits; the longest of all
+/// holds.
 pub fn hold_stops(bed: &Bed) -> Result<Figure> {
     let all = holds(bed)?;
     let seconds = all.iter().map(|h| h.stops).fold(0.0, f64::max);
-    // From rest to HELD and back to rest without a cruise takes two ramps.
+    // Two ramps lead from rest to `HELD` and back to rest without a cruise.
     let jerk = USUAL_JERK * PER_JERK;
     let ramp = HELD / ACCELERATION + ACCELERATION / jerk;
     Ok(Figure { value: seconds / ramp, note: format!("{:.1} ms", seconds * 1e3) })
 }
 
-/// A hold, s.
+/// The two times of a hold, s.
 struct Hold {
     begins: f64,
     stops: f64,
@@ -83,7 +84,7 @@ fn holds(bed: &Bed) -> Result<Vec<Hold>> {
     (0..PHASES).map(|phase| hold(bed, 800_000 + phase * 5_137)).collect()
 }
 
-/// A hold so many us after a long move was sent.
+/// Sends a long move, and `!` so many us later.
 fn hold(bed: &Bed, us: u64) -> Result<Hold> {
     let mut machine = bed.machine()?;
     let mut host = Host::new(LINES_IN_FLIGHT);
@@ -105,8 +106,9 @@ fn hold(bed: &Bed, us: u64) -> Result<Hold> {
     Ok(Hold { begins: machine.seconds(slower - said), stops: machine.seconds(rest - slower) })
 }
 
-/// When the velocity begins to fall. A jerk limit has it fall by less than pulses can show for some milliseconds; so that is when a ramp
-/// under the limit must have begun which is as far behind the old velocity as the motor is a little later.
+/// Returns the cycle at which the velocity begins to fall. Under a jerk limit the velocity falls for some
+/// milliseconds by less than pulses can show. So the function looks for the step that is `BEHIND` step intervals
+/// late, and goes back by the time that a ramp under the limit takes to fall that far behind the old velocity.
 fn first_slower(machine: &Machine, said: u64) -> Option<u64> {
     const BEHIND: u64 = 2;
     let steps = machine.recorder().steps_of(0);
@@ -120,7 +122,7 @@ fn first_slower(machine: &Machine, said: u64) -> Option<u64> {
     Some(behind - (ramp * f64::from(machine.board().clock_hz)) as u64)
 }
 
-/// Acceleration of X and Y on arcs, 99th percentile, over the limit.
+/// Acceleration of X and Y on arcs: the 99th percentile, over the limit.
 pub fn arcs_acceleration(bed: &Bed) -> Result<Figure> {
     let how = How { log: true, more: &FINE, ..How::default() };
     let (machine, _) = bed.run(&small_arcs(), how)?;
@@ -131,7 +133,7 @@ pub fn arcs_acceleration(bed: &Bed) -> Result<Figure> {
     Ok(Figure { value: percentile / ACCELERATION, note })
 }
 
-/// The size of a motor's acceleration all the time, by positions a window apart.
+/// Returns the magnitude of a motor's acceleration throughout the job, from positions that are `WINDOW_S` apart.
 fn accelerations(machine: &Machine, motor: u8) -> Vec<f64> {
     let places = Places::of(machine, motor, FINE_PER_MM);
     let Some(span) = places.span() else { return Vec::new() };
@@ -139,14 +141,15 @@ fn accelerations(machine: &Machine, motor: u8) -> Vec<f64> {
     places.every(WINDOW_S, span).windows(3).map(change).collect()
 }
 
-/// By how much the velocity changes from 4 ms to the next on a spiral of moves of 0.1 mm, 99th percentile, mm/s: 2 within the acceleration.
+/// Change of velocity from one slice of 4 ms to the next on a spiral of moves of 0.1 mm: the 99th percentile, mm/s. A
+/// change of 2 mm/s is within the acceleration limit.
 pub fn velocity_jumps(bed: &Bed) -> Result<Figure> {
     const SLICE_S: f64 = 0.004;
     let how = How { log: true, more: &FINE, baud: FAST_BAUD, ..How::default() };
     let (machine, _) = bed.run(&spiral(0.1), how)?;
     let all = [0, 1].map(|motor| Places::of(&machine, motor, FINE_PER_MM));
     let (first, last) = all[0].span().context("nothing has moved")?;
-    // To the middle of the ends, where both move.
+    // The first and the last 0.1 s are left out, so that both motors move all the time.
     let [x, y] = all.map(|places| places.every(SLICE_S, (first + 0.1, last - 0.1)));
     let way = |n: usize| (x[n + 1] - x[n]).hypot(y[n + 1] - y[n]);
     let velocities: Vec<f64> = (0..x.len() - 1).map(|n| way(n) / SLICE_S).collect();

@@ -1,8 +1,8 @@
 //! What the firmware achieves, as one table beside other firmwares' figures.
 //!
-//! [`ROWS`] says what is measured, what others reach, what Kerf aims at and what it must not fall below;
-//! [`Bed`] is the firmware on its board with settings like theirs. `kerf-sim bench` prints the table, and
-//! the tests hold every row to its floor. All is counted in cycles and exactly repeatable.
+//! [`ROWS`] says what is measured, what others reach, what Kerf aims at and what Kerf must not fall below. [`Bed`] is
+//! the firmware on its board, with settings like those of the other firmwares. `kerf-sim bench` prints the table, and
+//! the tests hold every row to its floor. All figures are counted in cycles and exactly repeatable.
 
 mod beyond;
 mod costs;
@@ -28,7 +28,7 @@ pub use workload::Bed;
 
 use anyhow::{Result, ensure};
 
-/// Which way is up.
+/// Which direction is better.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Better {
     /// Higher is better.
@@ -47,12 +47,12 @@ impl Better {
     }
 }
 
-/// A figure.
+/// A measured figure.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Figure {
-    /// In the unit of its row.
+    /// The value, in the unit of its row.
     pub value: f64,
-    /// What else is to be said of it.
+    /// A remark on the value; may be empty.
     pub note: String,
 }
 
@@ -64,28 +64,29 @@ impl From<f64> for Figure {
 
 /// A row of the table.
 pub struct Row<B = Bed> {
-    /// What it is asked for by.
+    /// The name that selects the row.
     pub name: &'static str,
     /// What is measured.
     pub what: &'static str,
-    /// In what.
+    /// The unit of the value.
     pub unit: &'static str,
     /// Decimals shown.
     pub decimals: usize,
-    /// Which way is up.
+    /// Which direction is better.
     pub better: Better,
     /// What grbl-Mega, TinyG and Teacup reach.
     pub peers: [&'static str; 3],
-    /// What Kerf aims at.
+    /// The value that Kerf aims at.
     pub target: Option<f64>,
-    /// What it must not fall below, or rise above: raised when the firmware has become better.
+    /// The value that Kerf must not fall below, or must not rise above if lower is better. It is tightened when the
+    /// firmware has become better.
     pub floor: Option<f64>,
-    /// Measures it.
+    /// Measures the value.
     pub measure: fn(&B) -> Result<Figure>,
 }
 
 impl<B> Row<B> {
-    /// Measures the row, prints its figure, and insists on its floor, if it has one.
+    /// Measures the row and prints its figure. An error if the figure misses the floor of the row.
     pub fn keep_to_floor(&self, bed: &B) -> Result<()> {
         let figure = (self.measure)(bed)?;
         let said = format!("{}: {} {} ({})", self.what, figure.value, self.unit, figure.note);
@@ -96,7 +97,7 @@ impl<B> Row<B> {
     }
 }
 
-/// The row of this name.
+/// Returns the row of this name.
 pub fn row(name: &str) -> Option<&'static Row> {
     ROWS.iter().find(|row| row.name == name)
 }

@@ -1,6 +1,6 @@
-//! Pauses in jobs that ask much of exec, under several jerk limits and without one.
+//! Pauses in jobs that demand much of exec, under several jerk limits and without a jerk limit.
 //!
-//! `examples/bracket.gcode` is too long for this; `tests/sim/tests/jobs.rs` runs it, and fails on a pause too.
+//! `examples/bracket.gcode` is too long for this table. `tests/sim/tests/jobs.rs` runs it, and fails on a pause too.
 
 use anyhow::{Result, ensure};
 
@@ -11,27 +11,27 @@ const SPIRAL: &str = include_str!("../../../../examples/spiral.gcode");
 const SQUARE: &str = include_str!("../../../../examples/square.gcode");
 const ENGRAVING: &str = include_str!("../../../../examples/engraving.gcode");
 
-/// Without a jerk limit.
+/// Counts the pauses without a jerk limit.
 pub fn none(bed: &Bed) -> Result<Figure> {
     pauses(bed, None, &[])
 }
 
-/// With little jerk.
+/// Counts the pauses under a low jerk limit.
 pub fn low(bed: &Bed) -> Result<Figure> {
     pauses(bed, Some(500.0), &[])
 }
 
-/// With a usual jerk limit.
+/// Counts the pauses under a usual jerk limit.
 pub fn usual(bed: &Bed) -> Result<Figure> {
     pauses(bed, Some(5_000.0), &[("engraving", ENGRAVING)])
 }
 
-/// With much jerk.
+/// Counts the pauses under a high jerk limit.
 pub fn high(bed: &Bed) -> Result<Figure> {
     pauses(bed, Some(50_000.0), &[])
 }
 
-/// The jobs that take seconds.
+/// The jobs that take seconds, not minutes.
 pub(super) fn jobs() -> [(&'static str, String); 6] {
     [
         ("arcs", arcs()),
@@ -43,7 +43,8 @@ pub(super) fn jobs() -> [(&'static str, String); 6] {
     ]
 }
 
-/// The pauses of all jobs, those of `long` left alone, the others with holds and overrides too.
+/// Counts the pauses of all jobs. The jobs of `long` run once, undisturbed. Each other job runs undisturbed and again
+/// with holds and overrides.
 fn pauses(bed: &Bed, jerk: Option<f64>, long: &[(&str, &str)]) -> Result<Figure> {
     let (mut sum, mut worst, mut seed) = (0, String::from("none"), 0);
     let mut most = 0;

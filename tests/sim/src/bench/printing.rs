@@ -1,5 +1,6 @@
-//! What a printer does: moves of 0.2 mm along a spiral that climbs, X, Y, Z and the extruder, at 3,600 mm/min under a jerk limit, in the dialect of printing hosts
-//! on the board `ramps14`. From the first step to the last, over the ideal of unlimited look-ahead with trapezoids.
+//! What a printer does: moves of 0.2 mm along a spiral that climbs, with X, Y, Z and the extruder, at 3,600 mm/min
+//! under a jerk limit, in the dialect of printing hosts on the board `ramps14`. The figure is the time from the first
+//! step to the last, over the ideal of unlimited look-ahead with trapezoids.
 
 use std::collections::VecDeque;
 use std::fmt::Write;
@@ -13,17 +14,17 @@ use super::workload::{ACCELERATION, Bed, How, USUAL_JERK};
 use crate::host::{Host, LINES_IN_FLIGHT};
 use crate::machine::Machine;
 
-/// mm/min.
+/// Feed, mm/min.
 const FEED: f64 = 3_600.0;
 const CHORD: f64 = 0.2;
-/// Lines that wait for their answers.
+/// Lines that are sent and not yet answered, at most.
 const WINDOW: usize = 4;
-/// No step for so long is the end of the job, ms.
+/// The job has ended when no step has come for this long, ms.
 const REST_MS: u64 = 500;
-/// Settings are in EEPROM after this, ms.
+/// Time after which the settings are in EEPROM, ms.
 const KEEPS_MS: u64 = 4_000;
 
-/// Lines as they are in a file.
+/// Moves of 0.2 mm of a printing host, without line numbers.
 pub fn plain(bed: &Bed) -> Result<Figure> {
     over_ideal(bed, false, &["{dia:16}"])
 }
@@ -67,7 +68,7 @@ fn over_ideal(bed: &Bed, numbered: bool, more: &'static [&'static str]) -> Resul
     Ok(Figure { value: moves / ideal, note })
 }
 
-/// The spiral of the others, with its climb and 0.0083 mm of filament in each move.
+/// The spiral of the other rows, which also climbs and extrudes 0.0083 mm of filament in each move.
 fn job(numbered: bool) -> Vec<String> {
     let mut lines: Vec<_> = ["M302 P1", "M83"].map(String::from).into();
     lines.push(format!("G1 F{FEED}"));
@@ -86,7 +87,7 @@ fn job(numbered: bool) -> Vec<String> {
     lines
 }
 
-/// How long the job's steps and its answers take, seconds.
+/// Sends the job. Returns how long its steps take and how long its answers take, s.
 fn send(machine: &mut Machine, lines: &[String]) -> Result<(f64, f64)> {
     let (mut next, mut flying, mut answered) = (0, VecDeque::new(), 0);
     let (begun, mut ended) = (machine.cycle(), 0);

@@ -1,5 +1,5 @@
-//! The highest step rate that is held: the mean cruise rate of every motor within 1 % of the command, and
-//! the end exact to the step.
+//! The highest step rate that is held: the mean cruise rate of every motor is within 1 % of the command, and the end
+//! is exact to the step.
 
 use anyhow::Result;
 
@@ -7,16 +7,16 @@ use super::Figure;
 use super::workload::{ACCELERATION, Bed, How, PER_MM, PER_MM_Z, USUAL_JERK};
 use crate::machine::Machine;
 
-/// Tolerance of the mean rate.
+/// Relative tolerance of the mean rate.
 const WITHIN: f64 = 0.01;
-/// Time of cruise in a move, and the part of it that counts, s.
+/// Time of cruise in a move, and the part of the cruise that counts, s.
 const CRUISE_S: f64 = 0.5;
 const COUNTED_S: f64 = 0.3;
-/// The rate tried first, the factor up, and where it ends.
+/// The rate that is tried first, the factor from one rate to the next, and the rate at which the search ends.
 const FIRST: f64 = 20_000.0;
 const UP: f64 = 1.15;
 const LAST: f64 = 300_000.0;
-/// Halvings of the gap between held and not held.
+/// How often the gap between a rate that is held and one that is not is halved.
 const REFINEMENTS: u32 = 5;
 
 /// One motor.
@@ -53,12 +53,12 @@ fn highest(bed: &Bed, motors: usize) -> Result<Figure> {
     search(FIRST, REFINEMENTS, |rate| held_at(bed, motors, rate, None))
 }
 
-/// Fewer moves than without a jerk limit: the search begins near its end.
+/// Searches from `first`, near the expected rate, because moves under a jerk limit take longer to simulate.
 fn highest_jerk(bed: &Bed, motors: usize, first: f64) -> Result<Figure> {
     search(first, REFINEMENTS - 1, |rate| held_at(bed, motors, rate, Some(USUAL_JERK)))
 }
 
-/// The highest rate that is held, upwards from `first`.
+/// Searches the highest rate that is held, upwards from `first`.
 fn search(
     first: f64,
     refinements: u32,
@@ -79,7 +79,7 @@ fn search(
     Ok(held.round().into())
 }
 
-/// The lowest mean rate of the motors in a move at `rate`, if that was held.
+/// Returns the lowest mean rate of the motors in a move at `rate`; `None` if the rate is not held.
 fn held_at(bed: &Bed, motors: usize, rate: f64, jerk: Option<f64>) -> Result<Option<f64>> {
     let how = How { log: true, jerk, ..How::default() };
     // Under a jerk limit the acceleration along the path is that of the slowest axis, and builds up.
@@ -93,25 +93,25 @@ fn held_at(bed: &Bed, motors: usize, rate: f64, jerk: Option<f64>) -> Result<Opt
     Ok(held.then(|| means.into_iter().fold(f64::MAX, f64::min).min(rate)))
 }
 
-/// A move of this many motors, all at `rate` steps/s, long enough for cruise at `ACCELERATION`.
+/// A move of this many motors, all at `rate` steps/s, long enough for a cruise at [`ACCELERATION`].
 pub fn long_move(motors: usize, rate: f64) -> String {
     move_of(motors, rate, 1.0)
 }
 
-/// Such a move with ramps `times` as long.
+/// As [`long_move`], with ramps `times` as long.
 fn move_of(motors: usize, rate: f64, times: f64) -> String {
     let velocity = rate / PER_MM;
-    // The slowest axis sets the pace of an acceleration along the path.
+    // The slowest axis limits the acceleration along the path.
     let mm = (times * velocity * velocity / ACCELERATION + CRUISE_S * velocity).round();
     let z = mm * PER_MM / PER_MM_Z;
     let path = [mm, mm.hypot(mm), (2.0 * mm * mm + z * z).sqrt()];
-    // A rotary axis has no part in the feed of a move of linear ones.
+    // The feed of a move that has linear axes does not include its rotary axes.
     let feed = velocity * 60.0 * path[motors.min(3) - 1] / mm;
     let words = [format!("X{mm}"), format!("Y{mm}"), format!("Z{z}"), format!("A{mm}")];
     format!("G1 {} F{feed:.3}\n", words[..motors].join(" "))
 }
 
-/// Mean step rate of a motor in the middle of its steps' time.
+/// Returns the mean step rate of a motor in the middle of its move.
 pub fn mean_rate(machine: &Machine, motor: u8) -> f64 {
     let steps = machine.recorder().steps_of(motor);
     let (Some(first), Some(last)) = (steps.first(), steps.last()) else { return 0.0 };

@@ -1,9 +1,9 @@
-//! The rows of the table: what others reach, what Kerf aims at, what it must keep to.
+//! The rows of the table: what others reach, what Kerf aims at, and the floor of each row.
 //!
-//! The others' figures were measured on the same simulated CPU, built from their published sources, with
-//! the same settings and job geometry: 80 steps/mm (Z 400), 500 mm/s2, junction deviation 0.01 mm, rate
-//! limits out of the way, 115,200 baud. TinyG's are published aims for its own, faster chip: an
-//! ATxmega192 at 32 MHz. Floors are raised when the firmware has become better.
+//! The figures of the others were measured on the same simulated CPU. They were built from their published sources,
+//! with the same settings and job geometry: 80 steps/mm (Z 400), 500 mm/s2, junction deviation 0.01 mm, rate limits
+//! out of the way, 115,200 baud. The figures of TinyG are published aims for its own, faster chip, an ATxmega192 at
+//! 32 MHz. Floors are raised when the firmware has become better.
 
 use super::Better::{Higher, Lower};
 use super::{Row, beyond, costs, jitter, limits, pauses, printing, rates, spirals};
@@ -108,7 +108,7 @@ pub const ROWS: [Row; 49] = [
         better: Lower,
         peers: ["52", "-", "63"],
         target: Some(13.0),
-        // A tick, and the longest time interrupts are off: now and then that meets the tick behind a new segment.
+        // A tick, plus the longest time with interrupts off, which now and then meets the tick behind a new segment.
         floor: Some(13.0),
         measure: jitter::minor,
     },
@@ -342,7 +342,7 @@ pub const ROWS: [Row; 49] = [
         better: Lower,
         peers: ["8, 116 in ISRs", "-", "186, 622 in ISRs"],
         target: Some(64.0),
-        // Handlers of serial ports call the step interrupt's half-way, in place of nesting.
+        // Handlers of serial ports call the step interrupt in their middle, instead of being interrupted by it.
         floor: Some(42.0),
         measure: costs::interrupts_off,
     },
@@ -365,7 +365,7 @@ pub const ROWS: [Row; 49] = [
         better: Lower,
         peers: NONE,
         target: Some(8_000.0),
-        // A third of it are scans of what is ahead.
+        // A third of this time goes into scans of the moves ahead.
         floor: Some(8_000.0),
         measure: costs::segment_jerk,
     },
@@ -377,7 +377,7 @@ pub const ROWS: [Row; 49] = [
         better: Lower,
         peers: NONE,
         target: Some(24_000.0),
-        // A scan that tries three velocities, and a ramp that is laid out.
+        // The worst case is a scan that tries three velocities, and the layout of a ramp.
         floor: Some(24_000.0),
         measure: costs::segment_jerk_worst,
     },
@@ -499,7 +499,7 @@ pub const ROWS: [Row; 49] = [
         better: Lower,
         peers: NONE,
         target: Some(10.0),
-        // Three segments that wait, the one that runs, and what exec is at.
+        // Three segments that wait, the one that runs, and the one that exec prepares.
         floor: Some(10.0),
         measure: limits::hold_begins,
     },

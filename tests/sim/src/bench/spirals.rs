@@ -1,5 +1,5 @@
-//! Jobs of 2,000 short moves along a spiral at 6,000 mm/min: time from the first step to the last, over
-//! the ideal. The ideal is unlimited look-ahead with trapezoids: way / v + v / a.
+//! Jobs of 2,000 short moves along a spiral at 6,000 mm/min: the time from the first step to the last, over the
+//! ideal. The ideal is unlimited look-ahead with trapezoids: path length / v + v / a.
 
 use std::collections::VecDeque;
 use std::fmt::Write;
@@ -13,20 +13,20 @@ use crate::machine::{AUX, Machine};
 use crate::report::Report;
 
 const MOVES: u32 = 2_000;
-/// mm/min.
+/// Feed, mm/min.
 const FEED: f64 = 6_000.0;
-/// The feed of [`curve`]: 910 moves a second would do.
+/// The feed of [`curve`], mm/min. At that feed motion uses up 910 moves a second.
 const CURVE_FEED: f64 = 18_000.0;
-/// Where the spiral begins, mm from its centre: wide enough for no corner to limit the feed.
+/// Radius at which the spiral begins, mm: wide enough that no corner limits the feed.
 const RADIUS: f64 = 30.0;
-/// Radial distance of two turns, mm.
+/// Radial distance between two turns, mm.
 const PITCH: f64 = 1.0;
 
-/// Characters that a sender of grbl's has in flight, as most do.
+/// Characters that a sender for grbl keeps in flight. Most senders use this number.
 const GRBL_BYTES: usize = 128;
-/// No step for so long is the end of the job, ms.
+/// The job has ended when no step has come for this long, ms.
 const GRBL_REST_MS: u64 = 500;
-/// Settings are in EEPROM after this, ms.
+/// Time after which the settings are in EEPROM, ms.
 const KEEPS_MS: u64 = 4_000;
 
 /// Moves of 0.1 mm at the usual speed of the line.
@@ -42,11 +42,11 @@ pub fn tenth_grbl(bed: &Bed) -> Result<Figure> {
     Ok(Figure { value: sent.moves / ideal(0.1), note: format!("{lines:.0} lines/s") })
 }
 
-/// Lines of a job that are taken in a second in grbl's dialect on a fast line.
+/// Lines of a job that the firmware accepts in a second, in grbl's dialect on a fast line.
 pub fn lines_grbl(bed: &Bed, job: &str, how: How) -> Result<Figure> {
     let baud = how.baud;
     let mut machine = grbl_machine(bed, how)?;
-    // TinyG's dialect on the other port has the rate of this one, which then decides for grbl's.
+    // The `{baud}` setting is sent in TinyG's dialect over the other port. It sets the rate of this port.
     machine.send_to(AUX, format!("{{baud:{baud}}}\n").as_bytes());
     machine.run_for_ms(100)?;
     machine.set_baud(baud);
@@ -58,13 +58,13 @@ pub fn lines_grbl(bed: &Bed, job: &str, how: How) -> Result<Figure> {
     Ok((job.lines().count() as f64 / sent.answers).into())
 }
 
-/// How long the answers to a job took, and its steps, seconds.
+/// How long the answers to a job take and how long its steps take, s.
 struct Sent {
     answers: f64,
     moves: f64,
 }
 
-/// Sends a job as a sender that counts characters does.
+/// Sends a job as a sender that counts characters.
 fn send_grbl(machine: &mut Machine, job: &str) -> Result<Sent> {
     let (count, mut lines, mut flying) = (job.lines().count(), job.lines(), VecDeque::new());
     let (mut answered, mut tail) = (0, String::new());
@@ -99,7 +99,7 @@ fn send_grbl(machine: &mut Machine, job: &str) -> Result<Sent> {
     })
 }
 
-/// A machine with the settings of the others that speaks grbl's dialect, and has greeted.
+/// Returns a machine with the usual settings that speaks grbl's dialect and has greeted.
 fn grbl_machine(bed: &Bed, how: How) -> Result<Machine> {
     let mut machine = bed.machine()?;
     let mut host = Host::new(LINES_IN_FLIGHT);
@@ -146,19 +146,20 @@ pub fn tenth_terse(bed: &Bed) -> Result<Figure> {
     over_ideal(bed, 0.1, How { more: &["{js:0}"], ..How::default() })
 }
 
-/// Moves of 0.1 mm under a jerk limit, on a fast line. The ideal is that without the limit.
+/// Moves of 0.1 mm under a jerk limit, on a fast line. The ideal is the time without the limit.
 pub fn tenth_smooth(bed: &Bed) -> Result<Figure> {
     over_ideal(bed, 0.1, How { jerk: Some(USUAL_JERK), ..fast() })
 }
 
-/// Moves in a second on [`curve`].
+/// Moves made in a second on [`curve`].
 pub fn curve_lines(bed: &Bed) -> Result<Figure> {
     let how = How { acceleration: NO_LIMIT, ..fast() };
     let (_, report) = bed.run(&curve(), how)?;
     Ok(lines_per_second(&report).into())
 }
 
-/// How far the queue reaches over moves of 0.1 mm, mm: so many are answered while a slow move before them runs.
+/// How far the queue reaches over moves of 0.1 mm, mm. The moves that are answered while a slow move before them runs
+/// are counted.
 pub fn look_ahead(bed: &Bed) -> Result<Figure> {
     let mut machine = bed.machine()?;
     let mut host = Host::new(LINES_IN_FLIGHT);
@@ -170,12 +171,12 @@ pub fn look_ahead(bed: &Bed) -> Result<Figure> {
     let job = spiral(0.1);
     job.lines().enumerate().for_each(|(n, line)| host.queue(n, line));
     host.run_for_ms(&mut machine, 3_000)?;
-    // The first line sets the feed.
+    // The first answer belongs to the line that sets the feed.
     let moves = host.take_answered().len().saturating_sub(1);
     Ok(Figure { value: 0.1 * moves as f64, note: format!("{moves} moves") })
 }
 
-/// Cycles awake for each move of 0.1 mm on a fast line, from the first step to the last.
+/// Cycles that the CPU is awake for each move of 0.1 mm on a fast line, from the first step to the last.
 pub fn cycles_per_line(bed: &Bed) -> Result<Figure> {
     let (machine, report) = bed.run(&spiral(0.1), fast())?;
     let awake = report.cpu_load.unwrap_or(1.0);
@@ -184,17 +185,17 @@ pub fn cycles_per_line(bed: &Bed) -> Result<Figure> {
     Ok(Figure { value, note: format!("awake {:.0} %", 100.0 * awake) })
 }
 
-/// Moves of 0.1 mm under a jerk limit, over the same without.
+/// Time of moves of 0.1 mm under a jerk limit, over the time without the limit.
 pub fn tenth_jerk(bed: &Bed) -> Result<Figure> {
     over_no_jerk_limit(bed, 0.1)
 }
 
-/// Moves of 0.2 mm under a jerk limit.
+/// Time of moves of 0.2 mm under a jerk limit, over the time without the limit.
 pub fn fifth_jerk(bed: &Bed) -> Result<Figure> {
     over_no_jerk_limit(bed, 0.2)
 }
 
-/// Moves of 0.5 mm under a jerk limit.
+/// Time of moves of 0.5 mm under a jerk limit, over the time without the limit.
 pub fn half_jerk(bed: &Bed) -> Result<Figure> {
     over_no_jerk_limit(bed, 0.5)
 }
@@ -224,22 +225,22 @@ pub fn ideal(chord: f64) -> f64 {
     f64::from(MOVES) * chord / velocity + velocity / ACCELERATION
 }
 
-/// Lines that were answered in a second.
+/// Lines that are answered in a second.
 pub fn lines_per_second(report: &Report) -> f64 {
     report.acknowledged as f64 / report.seconds_to_answer
 }
 
-/// The job. It begins where the machine stands, at 0.
+/// The spiral at the usual feed. It begins where the machine stands, at 0.
 pub fn spiral(chord: f64) -> String {
     spiral_at(chord, FEED)
 }
 
-/// Moves of 0.33 mm on a curve on which no two of them lie on a line, faster than the CPU can plan them.
+/// Moves of 0.33 mm along a curve, faster than the CPU can plan them. No two moves lie on one line.
 pub fn curve() -> String {
     spiral_at(0.33, CURVE_FEED)
 }
 
-/// The job at another feed, mm/min.
+/// The spiral at another feed, mm/min.
 fn spiral_at(chord: f64, feed: f64) -> String {
     let mut job = format!("G1 F{feed}\n");
     let mut angle = 0.0f64;
@@ -252,7 +253,7 @@ fn spiral_at(chord: f64, feed: f64) -> String {
     job
 }
 
-/// The angle of one chord on, by bisection.
+/// Finds, by bisection, the angle that is one chord further along the spiral.
 fn step(angle: f64, from: (f64, f64), chord: f64) -> f64 {
     let (mut low, mut high) = (0.0, 2.0 * chord / RADIUS);
     for _ in 0..40 {

@@ -6,7 +6,7 @@ use anyhow::Result;
 
 use super::{Bed, Figure, Row};
 
-/// What is to be known of the figures.
+/// What the reader must know about the figures.
 const FOOTER: &str = "
 grbl-Mega 1.1g and Teacup (2023): built from their published sources and measured on the same simulated
 CPU with interrupt, UART and timer models of their own, with the same settings (80 steps/mm, Z 400; 500 mm/s2; junction deviation 0.01 mm), at 115,200 baud.
@@ -17,14 +17,15 @@ look-ahead with trapezoids, way / v + v / a. Kerf runs with a jerk limit out of 
 but for the rows that name one: 5,000 million mm/min3 unless they say another. The floor is what the tests insist on; * marks targets that are not reached.
 ";
 
-/// Measures the rows and prints each as it is there, and the footer. True when all was measured.
+/// Measures the rows, prints each as soon as it is measured, and then the footer. Returns true when every row was
+/// measured.
 pub fn print(bed: &Bed, rows: &[&Row], out: &mut impl Write) -> Result<bool> {
     let complete = print_rows(bed, rows, out)?;
     write!(out, "{FOOTER}")?;
     Ok(complete)
 }
 
-/// As [`print`], of any board, without the footer.
+/// As [`print`], for the rows of any board, without the footer.
 pub fn print_rows<B>(bed: &B, rows: &[&Row<B>], out: &mut impl Write) -> Result<bool> {
     line(out, &["what", "grbl-Mega", "TinyG", "Teacup", "Kerf", "target", "floor", "unit"], "")?;
     writeln!(out, "{}", "-".repeat(146))?;

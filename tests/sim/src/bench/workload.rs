@@ -1,4 +1,4 @@
-//! The firmware on its board, set up as the others were, and jobs for it.
+//! The firmware on its board with the settings of the other firmwares, and jobs for it.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -20,20 +20,20 @@ pub const PER_MM: f64 = 80.0;
 pub const PER_MM_Z: f64 = 400.0;
 /// Acceleration, mm/s2.
 pub const ACCELERATION: f64 = 500.0;
-/// An acceleration that is no limit to short moves, mm/s2; with more than that there would be a jerk limit.
+/// An acceleration that does not limit short moves, mm/s2. Above it there would be a jerk limit.
 pub const NO_LIMIT: f64 = 4_500.0;
-/// The usual speed of the line, and a fast one.
+/// The usual speed of the serial line, and a fast one, baud.
 pub const USUAL_BAUD: u32 = 115_200;
 /// See [`USUAL_BAUD`].
 pub const FAST_BAUD: u32 = 500_000;
 
-/// After so long a job is left alone.
+/// Time during which holds and overrides come, ms. After that the job runs undisturbed.
 const DISTURBED_MS: u64 = 120_000;
 
-/// Most lines in flight: as many as the firmware keeps, so that the line is never idle.
+/// Most lines in flight: as many as the firmware stores, so that the line is never idle.
 const IN_FLIGHT: usize = 2 * LINES_IN_FLIGHT;
 
-/// Bytes that the firmware's receive ring holds: more than these might be lost while the planner is busy.
+/// Bytes that the firmware's receive ring holds. More bytes might be lost while the planner is busy.
 const RING: usize = 254;
 
 /// 80 and 400 steps/mm; velocity and jerk limits out of the way.
@@ -47,15 +47,16 @@ const SETTINGS: [&str; 8] = [
     "{z:{vm:2000000,fr:2000000,jd:0.01}}",
     "{a:{am:1,vm:2000000,fr:2000000,jd:0.01}}",
 ];
-/// TinyG's jerk limit, with which it takes all of the queue to stop, and one that is usual, millions of mm/min3.
+/// Two jerk limits, millions of mm/min3: that of TinyG, under which the whole queue is needed to stop, and a usual
+/// one.
 pub const LOW_JERK: f64 = 20.0;
 /// See [`LOW_JERK`].
 pub const USUAL_JERK: f64 = 5_000.0;
-/// Millions of mm/min3 in a mm/s3.
+/// mm/s3 in a million mm/min3.
 pub const PER_JERK: f64 = 1e6 / 216e3;
-/// 500 mm/s2 towards the centre of a corner; reports off.
+/// Centripetal acceleration of 500 mm/s2 in corners; reports off.
 const MORE: [&str; 2] = ["{ja:1800000}", "{sv:0,qv:0}"];
-/// So much jerk, in millions of mm/min3, that ramps are trapezoids.
+/// A jerk limit so high that ramps are trapezoids, millions of mm/min3.
 const NO_JERK_LIMIT: f64 = 1_000_000.0;
 
 /// The firmware and the board under it.
@@ -63,24 +64,24 @@ pub struct Bed {
     path: PathBuf,
     image: Image,
     board: &'static Board,
-    /// Whether there is an acceleration limit to be set.
+    /// Whether the firmware has a setting for acceleration.
     has_acceleration: bool,
 }
 
-/// How a job differs from the others.
+/// What differs from one job to another.
 #[derive(Clone, Copy)]
 pub struct How {
-    /// Speed of the line.
+    /// Speed of the serial line, baud.
     pub baud: u32,
     /// Acceleration, mm/s2.
     pub acceleration: f64,
     /// Jerk limit, millions of mm/min3.
     pub jerk: Option<f64>,
-    /// Every step is kept.
+    /// Whether the times of all steps are logged.
     pub log: bool,
-    /// More settings.
+    /// More settings, sent after the usual ones.
     pub more: &'static [&'static str],
-    /// Holds and overrides come in between, as of this seed.
+    /// Seed of the holds and overrides that come during the job; `None` for none.
     pub disturbed: Option<u64>,
 }
 
@@ -114,12 +115,12 @@ impl Bed {
         Self::new(&self.path.with_file_name(format!("{}.elf", board.name)), board)
     }
 
-    /// A machine as it leaves the factory.
+    /// Returns a machine in factory state.
     pub fn machine(&self) -> Result<Machine> {
         Machine::new(self.image.clone(), self.board)
     }
 
-    /// What makes the firmware comparable.
+    /// Returns the settings that make this firmware comparable with the others.
     pub fn settings(&self, how: How) -> Vec<String> {
         settings(how, self.has_acceleration)
     }
@@ -138,14 +139,14 @@ impl Bed {
         self.image.function(name).with_context(|| format!("the image has no function {name}"))
     }
 
-    /// Runs a job that must go well.
+    /// Runs a job; an error if anything goes wrong.
     pub fn run(&self, job: &str, how: How) -> Result<(Machine, Report)> {
         let (machine, report) = self.try_run(job, how, Vec::new())?;
         ensure!(report.ok, "{}", report.problems.join("; "));
         Ok((machine, report))
     }
 
-    /// Runs a job under stopwatches, however it goes.
+    /// Runs a job under stopwatches, and returns its report however it goes.
     pub fn try_run(
         &self,
         job: &str,
@@ -169,7 +170,7 @@ impl Bed {
     }
 }
 
-/// What makes a firmware comparable that has a setting for acceleration, or has none.
+/// Returns the settings that make a firmware comparable, whether or not it has a setting for acceleration.
 pub fn settings(how: How, has_acceleration: bool) -> Vec<String> {
     let mut all: Vec<String> = SETTINGS.iter().chain(&MORE).map(|s| s.to_string()).collect();
     let jerk = how.jerk.unwrap_or(NO_JERK_LIMIT);
@@ -182,7 +183,7 @@ pub fn settings(how: How, has_acceleration: bool) -> Vec<String> {
     all
 }
 
-/// Holds that are resumed, and overrides of feed and traverse, at random times.
+/// Returns holds that are resumed, and overrides of feed and traverse, at random times.
 pub fn disturbances(seed: u64) -> Vec<(u64, u8)> {
     const OVERRIDES: [u8; 8] = [0x90, 0x91, 0x92, 0x93, 0x94, 0x95, 0x96, 0x97];
     let mut random = Random::new(seed);
@@ -200,7 +201,7 @@ pub fn disturbances(seed: u64) -> Vec<(u64, u8)> {
     all
 }
 
-/// A straight way of `mm` in `count` equal moves at `feed` mm/min.
+/// A straight path of `mm` in `count` equal moves at `feed` mm/min.
 pub fn straight(count: u32, mm: f64, feed: f64) -> String {
     let mut job = format!("G1 F{feed}\n");
     for n in 1..=count {
@@ -209,7 +210,7 @@ pub fn straight(count: u32, mm: f64, feed: f64) -> String {
     job
 }
 
-/// Lines that ask for nothing, to keep the line busy, long and short.
+/// Long and short lines that move nothing, which keep the serial line busy.
 pub fn chatter(lines: u32) -> String {
     let line = |n| match n % 3 {
         0 => format!("N{n} G21 G90 (of no consequence)\n"),
@@ -219,20 +220,20 @@ pub fn chatter(lines: u32) -> String {
     (1..=lines).map(line).collect()
 }
 
-/// Arcs one behind the other, whose radius grows from 0.4 mm to 18, then a helix.
+/// A chain of arcs whose radius grows from 0.4 mm to 18 mm, then a helix.
 pub fn arcs() -> String {
     let (mut job, [x, y]) = half_circles(44, 1.095);
     let _ = writeln!(job, "G2 X{x:.4} Y{y:.4} Z-2 I6 J0 P3\nG0 Z0\nG0 X0 Y0");
     job
 }
 
-/// Arcs one behind the other, whose radius grows from 0.4 mm to 5.
+/// A chain of arcs whose radius grows from 0.4 mm to 5 mm.
 pub fn small_arcs() -> String {
     half_circles(50, 1.053).0
 }
 
-/// Half circles one behind the other, two to the left and one to the right, each `growth` times as large as the one
-/// before it; and where they end.
+/// A chain of half circles, two to the left and one to the right, each `growth` times as large as the half circle
+/// before it. Returns the job and the point where it ends.
 fn half_circles(count: u32, growth: f64) -> (String, [f64; 2]) {
     let mut job = String::from("G17 G64 G1 F5400\n");
     let (mut x, mut y, mut radius) = (0.0f64, 0.0f64, 0.4f64);
@@ -259,7 +260,7 @@ pub fn braid(mm: f64, feed: f64) -> String {
     job + "G0 X0 Y0\n"
 }
 
-/// Squares within squares, their corners rounded with 1.2 mm.
+/// Squares within squares, with corners of 1.2 mm radius.
 pub fn pocket() -> String {
     const R: f64 = 1.2;
     let mut job = String::from("G17 G64 G1 F3300\n");

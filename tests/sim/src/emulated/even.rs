@@ -1,6 +1,7 @@
 //! How evenly motors step at a million steps a second.
 
-/// How a motor steps: how many steps a second, by how much two gaps between steps differ, and how far a step is from where even ones are, us.
+/// Returns how a motor steps: its rate in steps/s, the longest gap between steps minus the shortest in cycles, and
+/// the largest deviation of a step from an even sequence, us.
 pub fn evenness(times: &[u64]) -> (f64, u64, f64) {
     let gaps = || times.windows(2).map(|pair| pair[1] - pair[0]);
     let spread = gaps().max().unwrap_or(0) - gaps().min().unwrap_or(0);

@@ -15,7 +15,7 @@ use crate::runs::Runs;
 pub struct Report {
     /// What is wrong.
     pub problems: Vec<String>,
-    /// Segments that came late, by the firmware's own count.
+    /// Segments that came late, as the firmware itself counts them.
     pub late: u64,
     lines: usize,
     motors: Vec<Motor>,
@@ -31,8 +31,8 @@ struct Motor {
     highest_hz: Option<f64>,
 }
 
-/// Boots the board, sends settings and a job, and says how it went. `progress` gets the lines answered so far. USB has no speed to change, and
-/// no waveforms are written.
+/// Boots the board, sends settings and a job, and says how it went. `progress` gets the number of lines answered so
+/// far. USB has no line speed to change, and no waveforms are written.
 pub fn run(
     board: &mut Emulated,
     lines: &Lines,
@@ -76,7 +76,7 @@ pub fn run(
     Ok(report)
 }
 
-/// Sends all lines; those that are refused are problems.
+/// Sends all lines; each refused line is a problem.
 fn stream(
     board: &mut Emulated,
     host: &mut Host,
@@ -109,7 +109,7 @@ fn stream(
     }
 }
 
-/// What the firmware has counted itself.
+/// Asks the firmware for its own count of late segments; `None` if it does not answer.
 fn late_segments(board: &mut Emulated, host: &mut Host) -> Option<u64> {
     host.ask(board, "{stv:n}", BOOT_MS).ok()?.body.get("stv")?.as_u64()
 }
@@ -165,7 +165,7 @@ impl Display for Report {
     }
 }
 
-/// Refuses what cannot be asked of an emulated board.
+/// Refuses the options that an emulated board does not support.
 pub fn check(options: &[(&str, bool)]) -> Result<()> {
     for (name, given) in options {
         if *given {

@@ -1,7 +1,8 @@
-//! A board whose chip is emulated by a program in JavaScript: the RP2040, by rp2040js with what it lacks (`tests/rp2040/emulator`).
+//! A board whose chip is emulated by a program in JavaScript: the RP2040, by rp2040js with additions
+//! (`tests/rp2040/emulator`).
 //!
-//! The program answers a request by a line of JSON each: see its `bridge.mjs`. What is sent and driven here is gathered, and goes along with the
-//! next request to run.
+//! The program answers each request, a line of JSON, with a line of JSON: see its `bridge.mjs`. What is sent and
+//! driven here is collected, and goes out with the next request to run.
 
 pub mod even;
 pub mod job;
@@ -16,10 +17,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::runs::Runs;
 
-/// Where the program lies once `cargo xtask` has put it there: beside the folder of the images.
+/// Path of the program where `cargo xtask` has put it, beside the folder of the images.
 const PROGRAM: &str = "rp2040-emulator/bridge.mjs";
 
-/// A request.
+/// A request to the emulator.
 #[derive(Serialize, Default, Debug)]
 struct Request {
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -50,30 +51,30 @@ struct Request {
     line: bool,
 }
 
-/// A board that is powered up.
+/// The board that is to be powered up.
 #[derive(Serialize, Debug)]
 struct PowerUp {
-    /// What is in its flash.
+    /// The ELF file for its flash.
     elf: PathBuf,
-    /// The pins of each motor, step and direction.
+    /// The step pin and the direction pin of each motor.
     motors: Vec<(u8, u8)>,
 }
 
-/// What the program at the other end of USB does.
+/// The state of the program at the other end of USB.
 #[derive(Serialize, Clone, Copy, Debug)]
 pub struct Talks {
-    /// It has the port open.
+    /// Whether it has the port open.
     pub open: bool,
-    /// It takes what comes.
+    /// Whether it reads what comes.
     pub reads: bool,
 }
 
-/// Lines that the emulator has: two of UARTs, and USB.
+/// Number of lines that the emulator has: two UARTs, and USB.
 const LINES: usize = 3;
-/// What listens to the drivers of a board on UART1.
+/// The line at which the drivers of a board listen: UART1.
 pub const DRIVERS: usize = 1;
 
-/// The line of a board's port.
+/// Returns the emulator's line of a board's port.
 fn line(board: &Board, port: usize) -> usize {
     match board.serial.get(port).map(|serial| serial.usart) {
         Some(Usart::Usb) => 2,
@@ -82,37 +83,37 @@ fn line(board: &Board, port: usize) -> usize {
     }
 }
 
-/// A switch at a pin, closed while a motor is at or beyond a step; or open there.
+/// A switch at a pin, closed while a motor is at or beyond a step; or open there if it `opens`.
 #[derive(Serialize, Clone, Copy, Debug)]
 pub struct Near {
-    /// Its pin.
+    /// Pin of the switch.
     pub gpio: u8,
     /// The motor, from 0.
     pub motor: usize,
-    /// The step.
+    /// Step from which on the switch is worked.
     pub step: i64,
-    /// Beyond is above.
+    /// Whether "beyond" means above the step.
     pub above: bool,
-    /// So many steps back it lets go.
+    /// Hysteresis: the switch lets go this many steps back.
     pub back: u32,
-    /// It opens there.
+    /// Whether the switch opens there instead of closing.
     pub opens: bool,
 }
 
-/// A TMC2209 on the line of drivers, its motor, and the stop that this is held up at.
+/// A TMC2209 on the line of drivers, its motor, and the hard stop that blocks the motor.
 #[derive(Serialize, Clone, Copy, Debug)]
 pub struct Driver {
-    /// Its address.
+    /// Address of the driver.
     pub address: u8,
     /// The motor, from 0.
     pub motor: usize,
-    /// The pin that its DIAG is at.
+    /// The pin that the driver's DIAG output leads to.
     pub gpio: u8,
-    /// Where the stop is, full steps.
+    /// Position of the stop, full steps.
     pub stop: i64,
-    /// The motor comes to it from below.
+    /// Whether the motor comes to the stop from below.
     pub above: bool,
-    /// It has power.
+    /// Whether the driver has power.
     pub powered: bool,
 }
 
@@ -125,7 +126,7 @@ struct Sensors {
     pulses: u32,
 }
 
-/// How the board stands after a request.
+/// The state of the board after a request.
 #[derive(Deserialize, Clone, Default, Debug)]
 struct Answer {
     #[serde(default)]
@@ -160,10 +161,10 @@ struct Answer {
     recorded: Option<Recorded>,
 }
 
-/// Edges of steps.
+/// Recorded edges of steps.
 #[derive(Deserialize, Clone, Default, Debug)]
 pub struct Recorded {
-    /// The cycles at which each motor's steps rise.
+    /// The cycles at which each motor's step pulses rise.
     #[serde(default)]
     pub times: Vec<Vec<u64>>,
     /// The shortest pulse, cycles.
@@ -171,10 +172,10 @@ pub struct Recorded {
     pub shortest: Option<f64>,
 }
 
-/// The board.
+/// An emulated board.
 pub struct Emulated {
     board: &'static Board,
-    /// Always there, but for the end.
+    /// The emulator process; `None` only while the board is dropped.
     process: Option<Process>,
     request: Request,
     answer: Answer,
@@ -186,14 +187,14 @@ pub fn is_emulated(board: &Board) -> bool {
     board.motors[0].step.port == Port::Gpio
 }
 
-/// Where the emulator of an image lies.
+/// Returns the path of the emulator that belongs to an image.
 fn program(elf: &Path) -> PathBuf {
     let folder = elf.parent().and_then(Path::parent).unwrap_or(Path::new("."));
     folder.join(PROGRAM)
 }
 
 impl Emulated {
-    /// A board that has just been powered up.
+    /// Powers a board up with this image.
     pub fn load(elf: &Path, board: &'static Board) -> Result<Self> {
         ensure!(is_emulated(board), "the board {} is simulated, not emulated", board.name);
         let program = program(elf);
@@ -215,12 +216,12 @@ impl Emulated {
         Ok(board)
     }
 
-    /// What it is.
+    /// Returns the description of the board.
     pub fn board(&self) -> &'static Board {
         self.board
     }
 
-    /// Sends the request, and takes the answer.
+    /// Sends the request that was collected, and takes the answer.
     fn run(&mut self, until: u64, line: bool) -> Result<()> {
         (self.request.until, self.request.line) = (until, line);
         let request = serde_json::to_string(&std::mem::take(&mut self.request))?;
@@ -246,67 +247,67 @@ impl Emulated {
         self.request.send.push((line(self.board, port), hex));
     }
 
-    /// Takes what it has said on a port.
+    /// Takes the bytes that the board has sent on a port.
     pub fn receive_from(&mut self, port: usize) -> Vec<u8> {
         self.receive_line(line(self.board, port))
     }
 
-    /// As [`Emulated::receive_from`], of a line that may be no port's.
+    /// As [`Emulated::receive_from`], for a line that need not belong to a port.
     pub fn receive_line(&mut self, line: usize) -> Vec<u8> {
         std::mem::take(&mut self.heard[line])
     }
 
-    /// The program at the other end of USB goes on like this.
+    /// Sets what the program at the other end of USB does from now on.
     pub fn session(&mut self, talks: Talks) {
         self.request.usb = Some(talks);
     }
 
-    /// The supply fails, and is there again.
+    /// Cuts the supply and restores it.
     pub fn cut_power(&mut self) {
         self.request.cut = true;
     }
 
-    /// The CPU gets stuck, with interrupts off.
+    /// Makes the CPU hang with interrupts off.
     pub fn stick(&mut self) {
         self.request.stick = true;
     }
 
-    /// A cell turns out to be borrowed twice, in a file of that name: a panic.
+    /// Makes the firmware panic: a cell is borrowed twice, in a file of this name.
     pub fn panic(&mut self, file: &str) {
         self.request.panic = Some(file.to_string());
     }
 
-    /// Its reset button is pressed.
+    /// Presses the reset button.
     pub fn reset(&mut self) {
         self.request.reset = true;
     }
 
-    /// What a channel of the converter reads from now on, of 4,095.
+    /// Sets the reading of a channel of the converter, 0 to 4,095.
     pub fn sense(&mut self, channel: u8, value: u16) {
         self.request.sense.push((channel, value));
     }
 
-    /// Drives an input.
+    /// Drives an input pin.
     pub fn drive(&mut self, pin: Pin, high: bool) {
         self.request.drive.push((pin.bit, high));
     }
 
-    /// Puts switches where motors work them.
+    /// Puts switches at pins, which the motors work.
     pub fn wire(&mut self, switches: &[Near]) {
         self.request.wire = Some(switches.to_vec());
     }
 
-    /// Puts drivers on their line, with their registers as after power-up.
+    /// Puts drivers on their line, with their registers in the state after power-up.
     pub fn drivers(&mut self, drivers: &[Driver]) {
         self.request.drivers = Some(drivers.to_vec());
     }
 
-    /// Where the motors of those drivers are, full steps from where they were put.
+    /// Positions of the drivers' motors, full steps from where they were put.
     pub fn rotors(&self) -> &[f64] {
         &self.answer.rotors
     }
 
-    /// Puts a spindle at the pins of its sensors, with so many marks; it stands still.
+    /// Puts a spindle with this many marks at the pins of its sensors. The spindle stands still.
     pub fn fit_spindle(&mut self, pulses: u32) -> Result<()> {
         let encoder =
             self.board.encoder.context("the board has no pins for a spindle's sensors")?;
@@ -315,12 +316,12 @@ impl Emulated {
         Ok(())
     }
 
-    /// The spindle turns so fast from now on, turns a minute.
+    /// Sets the speed of the spindle, turns a minute.
     pub fn turn_spindle(&mut self, rpm: f64) {
         self.request.turn = Some(rpm);
     }
 
-    /// The edges of steps in the next milliseconds.
+    /// Records the edges of steps in the next milliseconds.
     pub fn record_for_ms(&mut self, ms: u64) -> Result<Recorded> {
         self.request.record = Some(true);
         self.run_for_ms(ms)?;
@@ -329,17 +330,17 @@ impl Emulated {
         Ok(self.answer.recorded.take().unwrap_or_default())
     }
 
-    /// Steps up minus steps down of each motor; a low direction pin is up.
+    /// Steps up minus steps down of each motor. A low direction pin means up.
     pub fn steps(&self) -> [i64; MOTORS] {
         std::array::from_fn(|m| self.answer.steps.get(m).copied().unwrap_or(0))
     }
 
-    /// As [`Emulated::steps`], of a board with any number of motors.
+    /// As [`Emulated::steps`], for a board with any number of motors.
     pub fn positions(&self) -> &[i64] {
         &self.answer.steps
     }
 
-    /// All steps of each motor.
+    /// Steps of each motor in both directions together.
     pub fn totals(&self) -> [u64; MOTORS] {
         std::array::from_fn(|m| self.answer.totals.get(m).copied().unwrap_or(0))
     }
@@ -355,7 +356,7 @@ impl Emulated {
         self.answer.levels >> pin.bit & 1 != 0
     }
 
-    /// What part of its period a pin that pulses is high.
+    /// Duty cycle of a pin that pulses: the share of its period in which it is high.
     pub fn share(&self, pin: Pin) -> f64 {
         let found = self.answer.shares.iter().find(|(gpio, _)| *gpio == pin.bit);
         found.map_or(f64::from(u8::from(self.is_high(pin))), |(_, share)| *share)
@@ -366,17 +367,18 @@ impl Emulated {
         self.answer.asleep
     }
 
-    /// Cycles of an exception's handler without those that interrupt it; 0 is thread mode, 16 the first interrupt.
+    /// Cycles of an exception's handler, without the handlers that interrupt it. Exception 0 is thread mode, 16 the
+    /// first interrupt.
     pub fn spent(&self, exception: usize) -> f64 {
         self.answer.spent.get(exception).copied().unwrap_or(0.0)
     }
 
-    /// Bytes for USB that the board has not taken yet.
+    /// Bytes sent over USB that the board has not taken yet.
     pub fn waiting(&self) -> usize {
         self.answer.waiting
     }
 
-    /// Resets by the watchdog.
+    /// Number of resets by the watchdog.
     pub fn resets(&self) -> u64 {
         self.answer.resets
     }
@@ -384,7 +386,7 @@ impl Emulated {
 
 impl Drop for Emulated {
     fn drop(&mut self) {
-        // One that has failed is not kept.
+        // The process of a board that has failed is not kept for another board.
         if let Some(process) = self.process.take().filter(|_| self.answer.fault.is_none()) {
             process.keep();
         }
@@ -429,7 +431,7 @@ impl Runs for Emulated {
     }
 }
 
-/// Bytes of hexadecimal digits.
+/// Decodes hexadecimal digits to bytes.
 fn bytes(hex: &str) -> Vec<u8> {
     let digits = |at: usize| u8::from_str_radix(hex.get(at..at + 2)?, 16).ok();
     (0..hex.len()).step_by(2).filter_map(digits).collect()

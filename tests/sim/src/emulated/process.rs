@@ -1,7 +1,7 @@
 //! The processes that boards are emulated in.
 //!
-//! Node compiles the emulator while it runs: the first second of a board takes three times as long as later ones. So a process whose board is not wanted any
-//! more is kept, for the next board.
+//! Node compiles the emulator while it runs, so the first second of a board takes three times as long as later
+//! seconds. Therefore a process is kept when its board is no longer wanted, and serves the next board.
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::PathBuf;
@@ -10,21 +10,21 @@ use std::sync::{Mutex, PoisonError};
 
 use anyhow::{Context, Result, ensure};
 
-/// Those that have no board. They end with this program, which closes their input.
+/// Processes that have no board. They end with this program, because that closes their input.
 static IDLE: Mutex<Vec<Process>> = Mutex::new(Vec::new());
 
-/// A process that answers requests, a line each.
+/// A process that answers requests, one line each.
 pub struct Process {
     program: PathBuf,
     child: Child,
     input: ChildStdin,
     output: BufReader<ChildStdout>,
-    /// The last request has been answered.
+    /// Whether the last request has been answered.
     is_sound: bool,
 }
 
 impl Process {
-    /// One that runs this program and has no board, or the board of somebody who has gone.
+    /// Returns a process that runs this program: an idle one, which may still hold its former board, or a new one.
     pub fn take(program: PathBuf) -> Result<Self> {
         let mut idle = IDLE.lock().unwrap_or_else(PoisonError::into_inner);
         match idle.iter().position(|process| process.program == program) {
@@ -46,14 +46,14 @@ impl Process {
         Ok(Self { program, child, input, output, is_sound: true })
     }
 
-    /// Keeps it for another board, if it answers still.
+    /// Keeps the process for another board, if it still answers.
     pub fn keep(self) {
         if self.is_sound {
             IDLE.lock().unwrap_or_else(PoisonError::into_inner).push(self);
         }
     }
 
-    /// Sends a request, and takes its answer.
+    /// Sends a request and returns its answer.
     pub fn ask(&mut self, request: &str) -> Result<String> {
         self.is_sound = false;
         writeln!(self.input, "{request}").context("the emulator has ended")?;
@@ -68,7 +68,7 @@ impl Process {
 
 impl Drop for Process {
     fn drop(&mut self) {
-        // It has nothing to put away.
+        // The process has no state worth saving.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }

@@ -43,14 +43,14 @@ fn motor_of(group: &Value) -> Option<MotorSetup> {
     let axis = if besides == 0 { drives } else { 0 };
     let moves = axis < AXES;
     Some(MotorSetup {
-        // One that moves no axis counts as the last one's, and makes no steps.
+        // A motor that moves no axis is assigned to the last axis, with a travel of 0, and so makes no steps.
         axis: axis.min(AXES - 1),
         besides,
         step_angle: number("sa")?,
         travel: if moves { number("tr")? } else { Decimal::whole(0) },
         microsteps: u32::try_from(whole("mi")?).ok()?,
         inverted: whole("po")? != 0,
-        // Not every firmware has it.
+        // Not every firmware has this setting.
         active_low: whole("sp").unwrap_or(0) != 0,
     })
 }

@@ -1,4 +1,4 @@
-//! Looking after a job: is the firmware alive, does it get on, is it at rest?
+//! Watches a job: whether the firmware is alive, whether it makes progress, and whether the machine is at rest.
 
 use anyhow::{Result, bail};
 
@@ -11,9 +11,9 @@ pub const POLL: usize = usize::MAX - 1;
 
 /// Silence after which the firmware is asked for a sign of life.
 const SILENCE_MS: u64 = 2_000;
-/// Silence after which it is taken for dead.
+/// Silence after which the firmware is considered dead.
 const DEAD_MS: u64 = 30_000;
-/// Time without progress, beyond the longest dwell, after which it is taken for stuck.
+/// Time without progress, beyond the longest dwell, after which the firmware is considered stuck.
 const STUCK_MS: u64 = 60_000;
 /// Time without a step after which motion has ended.
 const STILL_MS: u64 = 200;
@@ -32,7 +32,7 @@ impl Watch {
         Watch { patience_ms: STUCK_MS + longest_dwell_ms, polled_at: None }
     }
 
-    /// Called now and then while lines are unanswered.
+    /// Checks for life and progress. It is called now and then while lines are unanswered.
     pub fn check(&mut self, machine: &mut impl Runs, host: &mut Host, progress: u64) -> Result<()> {
         let now = machine.cycle();
         let moved = machine.last_step().unwrap_or(0);
@@ -56,7 +56,7 @@ impl Watch {
         Ok(())
     }
 
-    /// Waits until nothing moves and the firmware says so too.
+    /// Waits until nothing moves and the firmware also reports that nothing moves.
     pub fn settle(&mut self, machine: &mut impl Runs, host: &mut Host) -> Result<()> {
         let began = machine.cycle();
         loop {

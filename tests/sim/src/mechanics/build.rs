@@ -5,22 +5,22 @@ use kerf::boards::{Board, MOTORS, Pin};
 use super::line::Bounce;
 use crate::oracle::{Setup, UNITS};
 
-/// A machine around the chip. Lengths are in millimetres from the lower hard end of an axis.
+/// A machine around the chip. Lengths are in millimetres. Positions count from the lower hard end of an axis.
 #[derive(Clone, Debug)]
 pub struct Build {
-    /// X, Y, Z and A.
+    /// The axes X, Y, Z and A.
     pub axes: [Axis; MOTORS],
-    /// The height of a plate under the tool of Z, which closes the probe's contact.
+    /// Height of a plate under the tool on Z, which closes the probe's contact. `None` without a plate.
     pub plate: Option<f64>,
     /// How the probe, the door and the emergency stop are wired.
     pub probe: Wiring,
-    /// See `probe`; `None` where there is none.
+    /// How the door's switch is wired; `None` without a door.
     pub door: Option<Wiring>,
-    /// See `probe`; `None` where there is none.
+    /// How the emergency stop is wired; `None` without one.
     pub stop: Option<Wiring>,
     /// The spindle.
     pub spindle: Spindle,
-    /// Where the times of bounces come from.
+    /// Seed of the random times of bounces.
     pub seed: u64,
 }
 
@@ -29,13 +29,14 @@ pub struct Build {
 pub struct Axis {
     /// The motor that moves it, counted from 0.
     pub motor: usize,
-    /// A second one that moves it as far with each step, as on a CoreXY machine; and whether a low direction pin of that moves it down.
+    /// A second motor that moves the axis as far with each step, as on a CoreXY machine, and whether a low direction
+    /// pin of this motor moves the axis down.
     pub second: Option<(usize, bool)>,
     /// Steps in a millimetre, of both motors together.
     pub steps_per_mm: f64,
-    /// Whether a low direction pin moves it down.
+    /// Whether a low direction pin of `motor` moves the axis down.
     pub reversed: bool,
-    /// Between the hard ends, at which the motor loses its steps; infinite if there are none.
+    /// Distance between the hard ends, at which the motor loses steps; infinite without hard ends.
     pub travel: f64,
     /// Where the carriage stands at power-up.
     pub start: f64,
@@ -48,15 +49,15 @@ pub struct Axis {
 /// A switch that a carriage works.
 #[derive(Clone, Copy, Debug)]
 pub struct Switch {
-    /// Worked from here on outwards.
+    /// The position from which on, outwards, the switch is worked.
     pub at: f64,
-    /// How far back the carriage must be for it to let go.
+    /// How far back the carriage must move for the switch to let go.
     pub hysteresis: f64,
     /// How it is wired.
     pub wiring: Wiring,
 }
 
-/// How a switch is wired: to ground in any case, with a pull-up.
+/// How a switch is wired. Its contact always leads to ground, and its pin has a pull-up.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Wiring {
     /// Low when worked. Several on one pin are in parallel.
@@ -65,48 +66,49 @@ pub enum Wiring {
     NormallyClosed,
 }
 
-/// A spindle: the board's outputs switch it.
+/// A spindle, which the board's outputs switch.
 #[derive(Clone, Copy, Debug)]
 pub struct Spindle {
     /// Turns a minute at full drive.
     pub rpm: f64,
-    /// Seconds to 63 % of the way to another speed.
+    /// Time constant: after so many seconds the speed has come 63 % of the way to a new speed.
     pub time_constant: f64,
-    /// The pin that drives it by its pulses' width; without one it turns at full drive.
+    /// The pin that sets the speed by its pulse width; without it the spindle turns at full drive.
     pub pwm: Option<Pin>,
-    /// The pin that sees a pulse a turn, high for a hundredth of a turn.
+    /// The pin that gets a pulse each turn, high for a hundredth of the turn.
     pub index: Option<Pin>,
-    /// What its motor can do: turns a minute in a second; infinite if it is as strong as it need be.
+    /// Most acceleration that the motor can give, turns a minute in a second; infinite for an ideal motor.
     pub torque: f64,
     /// Its encoder.
     pub sensors: Option<Sensors>,
 }
 
-/// Sensors that pull their pins low while marks pass. Angles are in turns.
+/// Sensors that pull their pins low while marks pass them. Angles are in turns.
 #[derive(Clone, Copy, Debug)]
 pub struct Sensors {
-    /// Sees a mark in a turn, at angle 0.
+    /// Sees one mark in a turn, at angle 0.
     pub index: Pin,
-    /// Sees so many; `None` if there is no such sensor, and no second one.
+    /// Sees `per_turn` marks; `None` if there is no such sensor, and then no second one.
     pub sync: Option<Pin>,
-    /// Sees the same marks half of their width behind it.
+    /// Sees the same marks, half of a mark's width later.
     pub second: Option<Pin>,
-    /// See `sync`.
+    /// Marks in a turn of the sync sensor.
     pub per_turn: u32,
-    /// How wide the mark of the index is.
+    /// Width of the index mark.
     pub index_width: f64,
-    /// How wide the other marks are: a share of the way from one to the next.
+    /// Width of the other marks, as a share of the distance from one mark to the next.
     pub width: f64,
-    /// Where the first of them is.
+    /// Angle of the first of the other marks.
     pub phase: f64,
-    /// Edges come late by up to so many cycles.
+    /// Edges come late by a random time below this, cycles.
     pub jitter: u64,
-    /// What edges do behind them.
+    /// How the sensors bounce after an edge.
     pub bounce: Option<Bounce>,
 }
 
 impl Sensors {
-    /// Those of a board, with so many marks, the index half way between two of them.
+    /// The sensors of a board, with this many sync marks a turn and the index mark half way between two of them.
+    /// `None` if the board has no encoder pins.
     pub fn of(board: &Board, per_turn: u32) -> Option<Sensors> {
         let encoder = board.encoder?;
         Some(Sensors {
@@ -123,16 +125,16 @@ impl Sensors {
     }
 }
 
-/// S that is the whole width of the spindle's pulses, by default.
+/// The S word that gives the full width of the spindle's pulses, by default.
 const FULL_DRIVE: f64 = 24_000.0;
 
 impl Build {
-    /// A machine without ends and switches, with a spindle that turns as fast as S says by the default settings, and has an encoder of so many pulses a turn.
-    /// `None` if the board has no pins for that.
+    /// A machine without hard ends and switches. By the default settings its spindle turns as fast as S says, and it
+    /// has an encoder of this many pulses a turn. `None` if the board has no pins for an encoder.
     pub fn lathe(board: &Board, pulses: u32) -> Option<Build> {
         let mut build = Build::of(board);
         for axis in &mut build.axes {
-            // The pins of the sensors are theirs alone.
+            // The sensors' pins must not be shared with switches.
             (axis.min, axis.max) = (None, None);
             (axis.travel, axis.start) = (f64::INFINITY, 0.0);
         }
@@ -142,8 +144,8 @@ impl Build {
         Some(build)
     }
 
-    /// A machine of 200 by 200 by 100 mm that stands in the middle, with switches at both ends of X, Y and Z, and
-    /// motors as the firmware's defaults have them.
+    /// A machine of 200 by 200 by 100 mm that stands in the middle of its travel, with switches at both ends of X, Y
+    /// and Z, and with motors as in the firmware's defaults.
     pub fn of(_: &Board) -> Build {
         Build {
             axes: [linear(0, 200.0), linear(1, 200.0), linear(2, 100.0), rotary(3)],
@@ -163,7 +165,8 @@ impl Build {
         }
     }
 
-    /// A printer of 200 by 200 by 200 mm whose motors are as the firmware has them, not far from its lower ends, with switches there.
+    /// A printer of 200 by 200 by 200 mm that stands near its lower ends. It has switches there, and its motors match
+    /// the firmware's settings.
     pub fn printer(board: &Board, setup: &Setup) -> Build {
         const START: [f64; 3] = [20.0, 15.0, 5.0];
         let mut build = Build::of(board);
@@ -178,7 +181,8 @@ impl Build {
         build
     }
 
-    /// This machine with X and Y driven by the sum and the difference of two motors of so many steps in a millimetre.
+    /// This machine as a CoreXY: the sum and the difference of two motors with this many steps per millimetre drive X
+    /// and Y.
     pub fn core_xy(mut self, steps_per_mm: f64) -> Build {
         for (axis, reversed) in self.axes.iter_mut().zip([false, true]) {
             (axis.motor, axis.second, axis.steps_per_mm) =
@@ -195,7 +199,7 @@ impl Build {
     }
 }
 
-/// How far from a hard end its switch is.
+/// Distance of a switch from its hard end, mm.
 const BEFORE_END: f64 = 2.0;
 
 fn linear(motor: usize, travel: f64) -> Axis {

@@ -2,37 +2,38 @@
 
 use super::build::{Axis, Switch};
 
-/// Where it is, and what it works. In steps from the lower hard end.
+/// The position of a carriage and the switches that it works. Positions are in steps from the lower hard end.
 pub struct Carriage {
     motor: usize,
     reversed: bool,
     second: Option<(usize, bool)>,
     steps_per_mm: f64,
-    /// `None` without ends.
+    /// The position of the upper hard end; `None` without hard ends.
     travel: Option<i64>,
     steps: i64,
     lost: u64,
-    /// From where on the switch at each end is worked, and from where on no longer.
+    /// For the switch at each end: the position from which on it is worked, and the position from which on it lets
+    /// go.
     min: Option<(i64, i64)>,
     max: Option<(i64, i64)>,
-    /// Whether they are.
+    /// Whether the switches at the lower and the upper end are worked.
     ends: [bool; 2],
 }
 
 impl Axis {
-    /// A position in steps from the lower hard end.
+    /// Converts a position to steps from the lower hard end.
     pub(super) fn steps(&self, position: f64) -> i64 {
         steps(position, self.steps_per_mm)
     }
 }
 
-/// A length in steps.
+/// Converts a length to steps.
 fn steps(length: f64, steps_per_mm: f64) -> i64 {
     (length * steps_per_mm).round() as i64
 }
 
 impl Carriage {
-    /// At its start.
+    /// A carriage at its start.
     pub fn new(axis: &Axis) -> Self {
         let place = |switch: &Switch, sign: f64| {
             (axis.steps(switch.at), axis.steps(switch.at + sign * switch.hysteresis))
@@ -53,32 +54,32 @@ impl Carriage {
         carriage
     }
 
-    /// Millimetres from the lower hard end.
+    /// Returns the position in millimetres from the lower hard end.
     pub fn position(&self) -> f64 {
         self.steps as f64 / self.steps_per_mm
     }
 
-    /// Steps from the lower hard end.
+    /// Returns the position in steps from the lower hard end.
     pub fn steps(&self) -> i64 {
         self.steps
     }
 
-    /// A place in steps from the lower hard end.
+    /// Converts a position to steps from the lower hard end.
     pub fn steps_at(&self, position: f64) -> i64 {
         steps(position, self.steps_per_mm)
     }
 
-    /// Steps lost at hard ends.
+    /// Steps that were lost at hard ends.
     pub fn lost(&self) -> u64 {
         self.lost
     }
 
-    /// Whether the switches at its lower and its upper end are worked.
+    /// Whether the switches at the lower and the upper end are worked.
     pub fn ends(&self) -> [bool; 2] {
         self.ends
     }
 
-    /// A motor steps.
+    /// Takes a step of a motor.
     pub fn step(&mut self, motor: usize, positive: bool) {
         let reversed = match self.second {
             _ if motor == self.motor => self.reversed,

@@ -1,8 +1,10 @@
-//! The sensors of a spindle: from its angle to edges on two pins, with what may be wrong with them.
+//! The sensors of a spindle: they turn its angle into edges on pins, and can be made to fail.
 //!
-//! The marks of sync may be seen by a second sensor half of their width behind the first: where an edge of the first finds that one says which way the spindle turns.
+//! Each sensor pulls its pin low while a mark passes it. Marks are evenly spaced, and the spindle may turn either
+//! way.
 //!
-//! Each pulls its pin low while a mark passes it. Marks are the same way apart; the spindle may turn either way.
+//! A second sensor may see the sync marks, half of a mark's width behind the first. Its level at an edge of the first
+//! sensor tells which way the spindle turns.
 
 use std::collections::VecDeque;
 
@@ -13,24 +15,24 @@ use super::random::Random;
 
 const NEVER: u64 = u64::MAX;
 
-/// A sensor and its marks.
+/// One sensor with its marks.
 struct Line {
     pin: Pin,
     /// Marks in a turn.
     marks: f64,
-    /// Where the first is, and how wide each, in turns.
+    /// Angle of the first mark, and width of each mark, in turns.
     first: f64,
     width: f64,
-    /// The level by the edges that are planned.
+    /// The level after all planned edges.
     high: bool,
-    /// Edges to come, in their order.
+    /// The edges to come, in the order of time.
     edges: VecDeque<(u64, bool)>,
-    /// Pulses until one is left out.
+    /// Number of pulses until one is left out.
     miss: Option<u64>,
 }
 
 impl Line {
-    /// The edges on the way from one angle to another, as angles and levels, in their order.
+    /// Returns the edges on the way from one angle to another, as angles and levels, in the order in which they come.
     fn crossed(&self, from: f64, to: f64) -> Vec<(f64, bool)> {
         let (low, high) = (from.min(to), from.max(to));
         let marks = ((low - self.first) * self.marks).floor() as i64 - 1
@@ -52,14 +54,14 @@ impl Line {
     }
 }
 
-/// The sensors: index, sync, and the second one of sync.
+/// The sensors of a spindle: index, sync, and the second one of sync.
 pub struct Encoder {
     build: Sensors,
     lines: Vec<Line>,
 }
 
 impl Encoder {
-    /// With the index at angle 0.
+    /// Sensors with the index mark at angle 0.
     pub fn new(build: Sensors) -> Self {
         let line = |pin, marks: f64, first, width| {
             let (high, edges, miss) = (true, VecDeque::new(), None);
@@ -74,14 +76,14 @@ impl Encoder {
         Encoder { build, lines }
     }
 
-    /// Leaves out a pulse: the next but so many. Of the index if `index`, else of sync.
+    /// Leaves out one pulse after `after` further pulses: of the index sensor if `index`, else of the sync sensor.
     pub fn miss(&mut self, index: bool, after: u64) {
         if let Some(line) = self.lines.get_mut(usize::from(!index)) {
             line.miss = Some(after);
         }
     }
 
-    /// A pulse too many, of so many cycles. False if the sensor sees a mark at that time, so that it is none.
+    /// Adds a false pulse of so many cycles. Returns false, and adds nothing, if the sensor sees a mark at that time.
     pub fn add(&mut self, index: bool, at: u64, cycles: u64) -> bool {
         let Some(line) = self.lines.get_mut(usize::from(!index)) else { return false };
         let before = line.edges.iter().take_while(|(edge, _)| *edge <= at).last();
@@ -98,7 +100,8 @@ impl Encoder {
         is_free
     }
 
-    /// The spindle turns from one angle to another, in turns, in this time; plans the edges on the way.
+    /// Plans the edges that come while the spindle turns from one angle to another, in turns, between the cycles
+    /// `began` and `ended`.
     pub fn turn(&mut self, from: f64, to: f64, began: u64, ended: u64, random: &mut Random) {
         let jitter = self.build.jitter;
         for line in &mut self.lines {
@@ -131,13 +134,13 @@ impl Encoder {
         }
     }
 
-    /// When a pin changes next.
+    /// Cycle at which a pin changes next.
     pub fn due(&self) -> u64 {
         let next = self.lines.iter().filter_map(|line| line.edges.front());
         next.map(|(at, _)| *at).min().unwrap_or(NEVER)
     }
 
-    /// Notes the pins that have changed by `now`. Whether a pulse of the index has begun.
+    /// Adds the pins that have changed by `now` to `changed`. Returns whether an index pulse has begun.
     pub fn advance(&mut self, now: u64, changed: &mut Vec<(Pin, bool)>) -> bool {
         let mut begun = false;
         for (n, line) in self.lines.iter_mut().enumerate() {
@@ -145,7 +148,7 @@ impl Encoder {
                 && at <= now
             {
                 line.edges.pop_front();
-                // The last of them comes out first.
+                // The machine takes pins from the end of the list, so later changes go to the front.
                 changed.insert(0, (line.pin, high));
                 begun |= n == 0 && !high;
             }

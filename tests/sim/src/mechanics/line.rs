@@ -1,4 +1,4 @@
-//! A wire from contacts to a pin, with what may be wrong with it.
+//! A wire from contacts to a pin, which can be made to fail.
 
 use std::collections::VecDeque;
 
@@ -9,12 +9,12 @@ use super::random::Random;
 
 const NEVER: u64 = u64::MAX;
 
-/// A contact that bounces whenever it changes.
+/// How a contact bounces whenever it changes.
 #[derive(Clone, Copy, Debug)]
 pub struct Bounce {
-    /// How often it opens and closes again.
+    /// How often the contact opens and closes again.
     pub times: u32,
-    /// For how long, cycles.
+    /// Time within which it bounces, cycles.
     pub cycles: u64,
 }
 
@@ -22,19 +22,19 @@ pub struct Bounce {
 pub struct Line {
     pin: Pin,
     wiring: Wiring,
-    /// Which inputs' contacts on it are worked, as bits.
+    /// The inputs whose contacts on this wire are worked, as bits.
     worked: u16,
-    /// Whether it is worked, after bounces so far.
+    /// Whether the wire is worked now, bounces included.
     active: bool,
-    /// Changes to come, in their order.
+    /// The changes to come, in the order of time.
     flips: VecDeque<(u64, bool)>,
-    /// From when to when it is disturbed.
+    /// The disturbances, each with its first cycle and its end.
     noise: Vec<(u64, u64)>,
     bounce: Option<Bounce>,
     stuck: Option<bool>,
-    /// The level that was told last.
+    /// The level that was reported last.
     told: Option<bool>,
-    /// When that was asked last.
+    /// Cycle of the latest call of `advance`.
     now: u64,
 }
 
@@ -70,22 +70,23 @@ impl Line {
         self.worked & 1 << input != 0
     }
 
-    /// From now on it bounces, or no longer.
+    /// Sets how the contacts bounce from now on; `None` ends the bouncing.
     pub fn set_bounce(&mut self, bounce: Option<Bounce>) {
         self.bounce = bounce;
     }
 
-    /// From now on it looks worked, or not, whatever happens; `None` mends it.
+    /// Makes the wire look worked or not worked from now on, whatever happens; `None` mends it.
     pub fn set_stuck(&mut self, stuck: Option<bool>) {
         self.stuck = stuck;
     }
 
-    /// Inverts the level for a time.
+    /// Inverts the level from cycle `from` on for so many cycles.
     pub fn disturb(&mut self, from: u64, cycles: u64) {
         self.noise.push((from, from + cycles));
     }
 
-    /// A contact changes. The first edge is at once; bounces follow at random times and end as it is.
+    /// Works the contact of an input or lets it go. The first edge comes at once. Bounces follow at random times, and
+    /// the last one ends in the new state.
     pub fn work(&mut self, input: usize, worked: bool, now: u64, random: &mut Random) {
         let before = self.worked != 0;
         self.worked = self.worked & !(1 << input) | u16::from(worked) << input;
@@ -104,12 +105,12 @@ impl Line {
         self.flips.extend(bounces);
     }
 
-    /// When it has bounced for the last time.
+    /// Cycle of the last bounce.
     pub fn settles(&self) -> u64 {
         self.flips.back().map_or(self.now, |(at, _)| *at)
     }
 
-    /// When its level may change next.
+    /// Cycle at which the level may change next.
     pub fn due(&self) -> u64 {
         let flip = self.flips.front().map_or(NEVER, |(at, _)| *at);
         let edges = self.noise.iter().map(|(from, to)| if *from > self.now { *from } else { *to });
@@ -117,7 +118,7 @@ impl Line {
         edges.fold(flip, u64::min).min(told)
     }
 
-    /// What is so by `now`: the new level, if it is another.
+    /// Goes on to cycle `now`. Returns the new level if the level has changed.
     pub fn advance(&mut self, now: u64) -> Option<bool> {
         while let Some((at, active)) = self.flips.front().copied()
             && at <= now

@@ -1,11 +1,11 @@
 //! A machine around the chip: carriages, switches, a plate to probe, a spindle, a door, an emergency stop.
 //!
-//! It counts the step pulses, so it knows where each carriage is, and works the switches there; a pin changes in the
-//! cycle of the pulse that brings the carriage to its switch. [`Build`] says how the machine is made, and
-//! [`Mechanics`] can be tampered with while it runs: switches that bounce or stick, noise on a wire, index pulses
-//! that are missing. (Errors of the serial line are [`Wire`](crate::Wire)'s.)
+//! It counts the step pulses, so it knows where each carriage is, and works the switches there. A pin changes in the
+//! cycle of the pulse that brings the carriage to its switch. [`Build`] says how the machine is made. [`Mechanics`]
+//! can be tampered with while it runs: switches that bounce or stick, noise on a wire, missing index pulses. (Errors
+//! of the serial line belong to [`Wire`](crate::Wire).)
 //!
-//! Nothing here happens at each cycle: `due` says when there is something to do. Inputs are numbered as in
+//! Nothing here runs in each cycle: `due` says when the next event comes. Inputs are numbered as in
 //! [`kerf::boards::inputs`].
 
 mod build;
@@ -28,24 +28,24 @@ use carriage::Carriage;
 use line::Line;
 use spindle::Spindle;
 
-/// A machine in motion.
+/// The state of a machine.
 pub struct Mechanics {
     carriages: [Carriage; MOTORS],
     plate: Option<i64>,
-    /// How much the plate rises along X and along Y.
+    /// Slope of the plate: its rise per millimetre along X and along Y.
     tilt: [f64; 2],
     lines: Vec<Line>,
-    /// The line of each input.
+    /// Index of each input's line; `None` for an input that is not wired.
     line_of: [Option<usize>; inputs::COUNT],
     spindle: Spindle,
     index: Option<Pin>,
     random: Random,
-    /// When pulses of the encoder's index began, and where each carriage was, in steps.
+    /// The cycles at which index pulses of the encoder began, each with the position of every carriage, in steps.
     indexed: Vec<(u64, [i64; MOTORS])>,
 }
 
 impl Mechanics {
-    /// A machine built so, on the pins of a board.
+    /// Builds a machine on the pins of a board.
     pub fn new(build: &Build, board: &Board) -> Self {
         let mut mechanics = Mechanics {
             carriages: build.axes.each_ref().map(Carriage::new),
@@ -89,7 +89,7 @@ impl Mechanics {
         self.carriages[axis].lost()
     }
 
-    /// Whether the contact of an input is worked, whatever its wire says.
+    /// Whether the contact of an input is worked, whatever the level of its wire.
     pub fn is_worked(&self, input: usize) -> bool {
         self.line_of[input].is_some_and(|line| self.lines[line].is_worked(input))
     }
@@ -104,28 +104,29 @@ impl Mechanics {
         self.spindle.turns()
     }
 
-    /// Drives the spindle by pulses that are high for a part of their period: a timer's waveform is not simulated edge
-    /// by edge, see [`Machine::pulses`](crate::Machine::pulses).
+    /// Drives the spindle by pulses that are high for `share` of their period. A timer's waveform is not simulated
+    /// edge by edge, see [`Machine::pulses`](crate::Machine::pulses).
     pub fn drive_spindle(&mut self, share: f64, now: u64) {
         self.spindle.drive_by(share, now);
     }
 
-    /// Leaves every so many index pulses out.
+    /// Leaves out one in every so many index pulses.
     pub fn miss_index_every(&mut self, pulses: Option<u64>) {
         self.spindle.miss_every(pulses);
     }
 
-    /// Whatever drives it, the spindle turns so fast from now on, turns a minute.
+    /// Makes the spindle turn at this speed from now on, turns a minute, whatever drives it.
     pub fn force_spindle(&mut self, rpm: f64, now: u64) {
         self.spindle.force(rpm, now);
     }
 
-    /// The spindle is driven to another speed from now on.
+    /// Drives the spindle to another speed from now on, turns a minute.
     pub fn drive_spindle_to(&mut self, rpm: f64, now: u64) {
         self.spindle.drive_to(rpm, now);
     }
 
-    /// A cut slows the spindle down by so many turns a minute in a second from now on, and by `swing` more and less so often in a second.
+    /// Loads the spindle with a cut from now on. The cut takes `load` turns a minute in a second from its speed, plus
+    /// and minus `swing` at a frequency of `hertz`.
     pub fn load_spindle(&mut self, load: f64, swing: f64, hertz: f64, now: u64) {
         self.spindle.set_load(load, swing, hertz, now);
     }
@@ -135,19 +136,20 @@ impl Mechanics {
         self.spindle.encoder()
     }
 
-    /// When pulses of the encoder's index began, and where each carriage was, in steps.
+    /// The cycles at which index pulses of the encoder began, each with the position of every carriage, in steps.
     pub fn indexed(&self) -> &[(u64, [i64; MOTORS])] {
         &self.indexed
     }
 
-    /// Works the contact of an input by hand, or lets it go: the door, the emergency stop, any other.
+    /// Works the contact of an input by hand, or lets it go: for example the door or the emergency stop.
     pub fn work(&mut self, input: usize, worked: bool, now: u64) {
         if let Some(line) = self.line_of[input] {
             self.lines[line].work(input, worked, now, &mut self.random);
         }
     }
 
-    /// Closes the contact of an input by hand, or opens it: what that means is its wiring's.
+    /// Closes the contact of an input by hand, or opens it. The wiring decides whether a closed contact counts as
+    /// worked.
     pub fn close(&mut self, input: usize, closed: bool, now: u64) {
         let opens = self.line_of[input].is_some_and(|line| self.lines[line].opens());
         self.work(input, closed != opens, now);
@@ -160,22 +162,22 @@ impl Mechanics {
         self.work_contacts(2, before, now);
     }
 
-    /// Tilts the plate: it rises by so much in a millimetre along X and along Y, from where their lower hard ends are.
+    /// Tilts the plate: its rise per millimetre along X and along Y, counted from the lower hard ends of these axes.
     pub fn tilt_plate(&mut self, tilt: [f64; 2]) {
         self.tilt = tilt;
     }
 
-    /// From now on the contacts on the wire of an input bounce.
+    /// Sets how the contacts on the wire of an input bounce from now on; `None` ends the bouncing.
     pub fn bounce(&mut self, input: usize, bounce: Option<Bounce>) {
         self.with(input, |line| line.set_bounce(bounce));
     }
 
-    /// When the contacts on the wire of an input have bounced for the last time.
+    /// Cycle at which the contacts on the wire of an input bounce for the last time.
     pub fn settles(&self, input: usize) -> u64 {
         self.line_of[input].map_or(0, |line| self.lines[line].settles())
     }
 
-    /// From now on the wire of an input looks worked, or not, whatever happens; `None` mends it.
+    /// Makes the wire of an input look worked or not worked from now on, whatever happens; `None` mends it.
     pub fn stick(&mut self, input: usize, worked: Option<bool>) {
         self.with(input, |line| line.set_stuck(worked));
     }
@@ -191,7 +193,7 @@ impl Mechanics {
         }
     }
 
-    /// A motor has made a step.
+    /// Takes a step of a motor.
     pub(crate) fn step(&mut self, motor: usize, positive: bool, now: u64) {
         for axis in 0..MOTORS {
             let before = self.contacts(axis);
@@ -200,7 +202,7 @@ impl Mechanics {
         }
     }
 
-    /// What the carriage of an axis works: the switches at its lower and upper end, and the probe.
+    /// Returns which contacts the carriage of an axis works: the switches at its lower and upper end, and the probe.
     fn contacts(&self, axis: usize) -> [bool; 3] {
         let [min, max] = self.carriages[axis].ends();
         [min, max, self.touches()]
@@ -216,14 +218,14 @@ impl Mechanics {
     fn work_contacts(&mut self, axis: usize, before: [bool; 3], now: u64) {
         let inputs = [2 * axis, 2 * axis + 1, inputs::PROBE];
         for ((input, worked), before) in inputs.into_iter().zip(self.contacts(axis)).zip(before) {
-            // What is worked by hand stays so.
+            // A contact that was worked by hand keeps its state.
             if worked != before {
                 self.work(input, worked, now);
             }
         }
     }
 
-    /// What the firmware does with the spindle.
+    /// Takes a change of a pin that drives the spindle.
     pub(crate) fn spindle(&mut self, pin: SpindlePin, high: bool, now: u64) {
         match pin {
             SpindlePin::Enable => self.spindle.enable(high, now),
@@ -232,12 +234,12 @@ impl Mechanics {
         }
     }
 
-    /// When there is something to do.
+    /// Cycle of the next event.
     pub(crate) fn due(&self) -> u64 {
         self.lines.iter().map(Line::due).fold(self.spindle.due(), u64::min)
     }
 
-    /// Does what is due by `now`: notes the pins that change.
+    /// Handles all events that are due by `now`, and adds the pins that change to `changed`.
     pub(crate) fn advance(&mut self, now: u64, changed: &mut Vec<(Pin, bool)>) {
         for line in &mut self.lines {
             if let Some(high) = line.advance(now) {

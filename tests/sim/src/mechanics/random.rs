@@ -1,10 +1,10 @@
-//! Numbers that look random and are the same in each run.
+//! Pseudo-random numbers, the same in each run.
 
 /// A generator (splitmix64).
 pub struct Random(u64);
 
 impl Random {
-    /// Its numbers follow from `seed`.
+    /// A generator whose numbers all follow from `seed`.
     pub fn new(seed: u64) -> Self {
         Random(seed)
     }
@@ -16,7 +16,7 @@ impl Random {
         z ^ z >> 31
     }
 
-    /// A number below `end`, which is not 0.
+    /// Returns a number below `end`, which must not be 0.
     pub fn below(&mut self, end: u64) -> u64 {
         self.next() % end
     }

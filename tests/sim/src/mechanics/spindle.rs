@@ -1,28 +1,29 @@
-//! A spindle that takes its time.
+//! A spindle that takes time to change its speed.
 //!
-//! Its speed approaches what it is driven to exponentially, which also averages a pulse-width drive. Turns are
-//! counted each millisecond; an index pulse is at its place between two of these as if the speed did not change
-//! there.
+//! Its speed approaches the speed that it is driven to exponentially, which also averages a pulse-width drive. Turns
+//! are counted each millisecond. An index pulse within a millisecond is placed as if the speed were constant during
+//! it.
 
 use super::encoder::Encoder;
 use super::random::Random;
 use crate::mechanics::build::Spindle as Build;
 
 const NEVER: u64 = u64::MAX;
-/// Turns a minute that are a standstill.
+/// Speed below which the spindle stands still, turns a minute.
 const STANDSTILL: f64 = 0.5;
-/// The part of a turn that an index pulse lasts.
+/// Length of an index pulse, as a share of a turn.
 const PULSE: f64 = 0.01;
 
-/// The edges of an encoder come so much later than the spindle turns, s: all of them, so that nobody can tell.
+/// Delay of the encoder's edges behind the angle of the spindle, s. All edges have the same delay, so the firmware
+/// cannot notice it.
 const LATE_S: f64 = 0.001;
 
-/// What drives it.
+/// How the spindle is driven.
 #[derive(Clone, Copy, Default)]
 struct Drive {
     enabled: bool,
     reversed: bool,
-    /// The part of its time that it is driven.
+    /// Duty cycle of the drive.
     share: f64,
 }
 
@@ -35,21 +36,21 @@ pub struct Spindle {
     rpm: f64,
     turns: f64,
     at: u64,
-    /// Index pulses that are left out: every so many, and how many there were.
+    /// Every how many index pulses one is left out, and the number of index pulses so far.
     missed_every: Option<u64>,
     pulses: u64,
     /// Edges of the index pin to come.
     edges: Vec<(u64, bool)>,
     encoder: Option<Encoder>,
     random: Random,
-    /// What a cut takes of its speed: turns a minute in a second.
+    /// Loss of speed to a cut, turns a minute in a second.
     load: f64,
-    /// How much that swings, and how often in a second.
+    /// Amplitude and frequency (Hz) of the swing of that loss.
     swing: (f64, f64),
 }
 
 impl Spindle {
-    /// At rest.
+    /// A spindle at rest.
     pub fn new(build: Build, clock_hz: u32) -> Self {
         Spindle {
             build,
@@ -68,7 +69,7 @@ impl Spindle {
         }
     }
 
-    /// Its speed at `now`, turns a minute; negative counter-clockwise.
+    /// Returns the speed at `now`, turns a minute; negative counter-clockwise.
     pub fn rpm(&self, now: u64) -> f64 {
         let seconds = now.saturating_sub(self.at) as f64 / self.clock_hz;
         let target = self.target();
@@ -83,7 +84,7 @@ impl Spindle {
         target + (self.rpm - target) * (-seconds / self.build.time_constant).exp()
     }
 
-    /// Whether what it does depends on more than its drive.
+    /// Whether the speed depends on more than the drive: on a limited torque or a cut.
     fn is_weak(&self) -> bool {
         self.build.torque.is_finite() || self.load != 0.0 || self.swing.0 != 0.0
     }
@@ -93,13 +94,14 @@ impl Spindle {
         self.encoder.as_mut()
     }
 
-    /// A cut takes so many turns a minute in a second from now on, which swings by `swing` so often in a second.
+    /// Sets the load of a cut from now on: `load` turns a minute in a second, plus and minus `swing` at a frequency
+    /// of `hertz`.
     pub fn set_load(&mut self, load: f64, swing: f64, hertz: f64, now: u64) {
         self.pass(now);
         (self.load, self.swing) = (load, (swing, hertz));
     }
 
-    /// Whatever drives it, from now on it turns so fast and is driven to that.
+    /// Makes the spindle turn at this speed from now on, and drives it to this speed, whatever its drive was.
     pub fn force(&mut self, rpm: f64, now: u64) {
         self.pass(now);
         self.rpm = rpm;
@@ -108,7 +110,7 @@ impl Spindle {
         self.drive = Drive { enabled: rpm != 0.0, reversed: rpm < 0.0, share: 1.0 };
     }
 
-    /// Is driven to another speed from now on.
+    /// Drives the spindle to another speed from now on.
     pub fn drive_to(&mut self, rpm: f64, now: u64) {
         self.pass(now);
         self.build.rpm = rpm.abs();
@@ -120,7 +122,7 @@ impl Spindle {
         self.turns
     }
 
-    /// Leaves every so many index pulses out.
+    /// Leaves out one in every so many index pulses.
     pub fn miss_every(&mut self, pulses: Option<u64>) {
         self.missed_every = pulses;
     }
@@ -137,7 +139,7 @@ impl Spindle {
         self.drive.enabled = on;
     }
 
-    /// Turns its drive round.
+    /// Reverses the drive.
     pub fn reverse(&mut self, reversed: bool, now: u64) {
         self.pass(now);
         self.drive.reversed = reversed;
@@ -148,13 +150,13 @@ impl Spindle {
         self.drive_by(f64::from(u8::from(high)), now);
     }
 
-    /// The pulse-width drive is high for a part of its period from now on.
+    /// Sets the duty cycle of the pulse-width drive from now on.
     pub fn drive_by(&mut self, share: f64, now: u64) {
         self.pass(now);
         self.drive.share = share;
     }
 
-    /// When it wants to be looked at next.
+    /// Cycle at which `advance` must be called next.
     pub fn due(&self) -> u64 {
         if self.build.index.is_none() && self.encoder.is_none() {
             return NEVER;
@@ -165,7 +167,7 @@ impl Spindle {
         edge.min(if turns { self.at + (self.clock_hz / 1000.0) as u64 } else { NEVER })
     }
 
-    /// What the index pin does at `now`.
+    /// Goes on to `now`. Returns the new level of the index pin if it changes.
     pub fn advance(&mut self, now: u64) -> Option<bool> {
         if now >= self.at + (self.clock_hz / 1000.0) as u64 {
             self.pass(now);
@@ -174,7 +176,7 @@ impl Spindle {
         self.edges.drain(..due).next_back().map(|(_, high)| high)
     }
 
-    /// Goes on to `now`, and plans the index pulses of the millisecond behind it.
+    /// Goes on to `now`, and plans the index pulses of the millisecond that has passed.
     fn pass(&mut self, now: u64) {
         let rpm = self.rpm(now);
         let cycles = now.saturating_sub(self.at) as f64;

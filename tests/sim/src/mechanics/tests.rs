@@ -4,7 +4,7 @@ use super::*;
 
 const MS: u64 = 16_000;
 
-/// The levels that pins have, and when they changed.
+/// The changes of pins: when each came, and the new level.
 struct Pins(Vec<(u64, Pin, bool)>);
 
 impl Pins {

@@ -1,4 +1,4 @@
-//! Exact decimals and the rounding to whole units and steps.
+//! Exact decimals, and the rounding to whole units and steps.
 
 /// A decimal number, `digits` / 10^`places`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -8,12 +8,12 @@ pub struct Decimal {
 }
 
 impl Decimal {
-    /// A whole number.
+    /// Converts a whole number.
     pub const fn whole(n: i128) -> Self {
         Decimal { digits: n, places: 0 }
     }
 
-    /// Reads `-12.5`, `.5`, `5.` and the like, up to 18 digits.
+    /// Parses `-12.5`, `.5`, `5.` and the like, up to 18 digits. `None` for other text.
     pub fn parse(text: &str) -> Option<Self> {
         let (negative, rest) = match text.strip_prefix('-') {
             Some(rest) => (true, rest),
@@ -29,29 +29,29 @@ impl Decimal {
         Some(Decimal { digits, places: fraction.len() as u32 })
     }
 
-    /// This times `factor`, rounded to a whole number.
+    /// Multiplies by `factor` and rounds to a whole number.
     pub fn scaled(self, factor: i128) -> i64 {
         divide(self.digits * factor, 10i128.pow(self.places)) as i64
     }
 
-    /// The number if it is whole.
+    /// Returns the number if it is whole, else `None`.
     pub fn as_whole(self) -> Option<i64> {
         let one = 10i128.pow(self.places);
         (self.digits % one == 0).then_some((self.digits / one) as i64)
     }
 
-    /// Ten times the number, without what is left after that: 28.3 is 283.
+    /// Returns ten times the number, with further decimals cut off: 28.3 gives 283.
     pub fn tenths(self) -> i64 {
         (self.digits * 10 / 10i128.pow(self.places)) as i64
     }
 
-    /// Numerator and denominator.
+    /// Returns numerator and denominator.
     pub fn ratio(self) -> (i128, i128) {
         (self.digits, 10i128.pow(self.places))
     }
 }
 
-/// Quotient rounded to the nearest whole number, halves away from zero.
+/// Divides and rounds to the nearest whole number, halves away from zero.
 pub fn divide(a: i128, b: i128) -> i128 {
     let (a, b) = if b < 0 { (-a, -b) } else { (a, b) };
     let half = b / 2 + b % 2;

@@ -1,17 +1,17 @@
-//! Splitting a line of G-code into words.
+//! Splits a line of G-code into words.
 
 use super::exact::Decimal;
 
 /// A letter with its number.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Word {
-    /// Upper case.
+    /// The letter, in upper case.
     pub letter: char,
-    /// What follows it.
+    /// The number that follows the letter.
     pub value: Decimal,
 }
 
-/// The words of a line; none for a line that is blank, deleted, a comment, or no G-code at all.
+/// Returns the words of a line. A line that is blank, deleted, a comment, or no G-code at all has none.
 pub fn split(line: &str) -> Result<Vec<Word>, String> {
     let text = code_of(line);
     let mut words = Vec::new();
@@ -30,7 +30,7 @@ pub fn split(line: &str) -> Result<Vec<Word>, String> {
     Ok(words)
 }
 
-/// A line without comments and blanks, in upper case.
+/// Returns a line without comments and blanks, in upper case.
 fn code_of(line: &str) -> String {
     let line = line.trim();
     let line = match line.strip_prefix('{') {
@@ -57,7 +57,7 @@ fn code_of(line: &str) -> String {
     code
 }
 
-/// The G-code inside `{"gc":"..."}`.
+/// Returns the G-code inside `{"gc":"..."}`; `None` for other lines.
 fn gc_of(line: &str) -> Option<String> {
     let value: serde_json::Value = serde_json::from_str(line).ok()?;
     Some(value.get("gc")?.as_str()?.to_string())

@@ -1,30 +1,30 @@
-//! What steps tell of motion on one side of a gap.
+//! What the steps tell about motion on one side of a gap.
 
 use kerf::boards::MOTORS;
 
 use super::{SIGHT_S, Scale};
 use crate::recorder::Step;
 
-/// Steps that decide which motor leads.
+/// Number of steps that decide which motor leads.
 const LEADERS: usize = 16;
 /// Axes of a position.
 const AXES: usize = 6;
-/// The nearest velocity is that of this time, and the one it is held against that of the time behind it, s.
+/// The velocity nearest to the gap is averaged over this time, s.
 const NEAR_S: f64 = 0.001;
-/// See [`NEAR_S`].
+/// The velocity before that, which it is compared with, is averaged over this time, s.
 const FAR_S: f64 = 0.002;
 
 /// One side of a gap.
 pub struct Side {
     /// Velocity of the path, mm/s.
     pub velocity: f64,
-    /// After how many seconds towards the gap the velocity would be zero if it went on changing as it does.
+    /// Time towards the gap after which the velocity would be zero if it went on changing at its present rate, s.
     pub rest: f64,
 }
 
 impl Side {
-    /// From the steps on that side, the nearest first; of the motor that is known to lead, or else of the one that
-    /// steps most. `None` without steps enough.
+    /// Evaluates the steps on one side, the nearest first. `motor` is the motor that is known to lead; if it is
+    /// `None`, the motor that steps most is taken. Returns `None` if there are too few steps.
     pub fn of<'a>(
         scale: &Scale,
         motor: Option<u8>,
@@ -42,7 +42,7 @@ impl Side {
     }
 }
 
-/// See [`Side::rest`]; from the times of steps, of which `near` make the nearest velocity.
+/// Computes [`Side::rest`] from the times of steps. The first `near` of them make the nearest velocity.
 fn rest(times: &[f64], near: usize) -> f64 {
     let behind = |(n, t): (usize, &f64)| n >= near + 2 && *t >= times[near] + FAR_S;
     let far = times.iter().enumerate().position(behind).unwrap_or(times.len() - 1);
@@ -63,13 +63,13 @@ fn leader<'a>(steps: impl Iterator<Item = &'a Step>) -> Option<u8> {
     Some(motor as u8)
 }
 
-/// Length of the way that these steps make, mm; degrees if only rotary axes move.
+/// Returns the length of the path that these steps make, mm; degrees if only rotary axes move.
 fn path<'a>(scale: &Scale, steps: impl Iterator<Item = &'a Step>) -> f64 {
     let (mut linear, mut rotary) = ([0.0; AXES], [0.0; AXES]);
     let mut mover: [Option<u8>; AXES] = [None; AXES];
     for step in steps {
         let travel = scale.motors[usize::from(step.motor)];
-        // An axis with two motors moves once.
+        // An axis with two motors counts once.
         if *mover[travel.axis].get_or_insert(step.motor) != step.motor {
             continue;
         }

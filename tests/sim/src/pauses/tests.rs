@@ -11,7 +11,7 @@ fn meter(ends: &[(usize, i64)]) -> Meter {
     Meter::new(Scale { clock_hz: HZ, motors, ends })
 }
 
-/// Steps of X and Y along a path: where it is at a time, s, in mm.
+/// Makes the steps of X and Y along a path, which gives the position in mm at a time in s.
 fn walk(meter: &mut Meter, seconds: f64, path: impl Fn(f64) -> [f64; 2]) {
     let mut at = path(0.0).map(|mm| (mm * PER_MM).round());
     let tick = 100;
@@ -26,7 +26,7 @@ fn walk(meter: &mut Meter, seconds: f64, path: impl Fn(f64) -> [f64; 2]) {
     }
 }
 
-/// Time without the pauses that begin at `starts`, each this long.
+/// The time without the pauses that begin at `starts`, each `long` seconds.
 fn with_pauses(t: f64, starts: &[f64], long: f64) -> f64 {
     t - starts.iter().map(|s| (t - s).clamp(0.0, long)).sum::<f64>()
 }
@@ -70,7 +70,7 @@ fn a_pause_in_a_ramp_is_found() {
     assert!((pauses[0].velocity - 50.0).abs() < 3.0, "{pauses:?}");
 }
 
-/// From 100 mm/s to rest and up again, at a place that is no whole step, in slices of constant velocity.
+/// From 100 mm/s to rest and up again, at a place between two whole steps, in slices of constant velocity.
 #[test]
 fn a_stop_that_is_planned_is_none() {
     for acceleration in [200.0, 1_000.0, 5_000.0, 20_000.0] {
@@ -123,7 +123,7 @@ fn the_line_of_a_pause_is_named() {
     }
 }
 
-/// Steps at 40 mm/s and the timer, which stops for so long after the step at `stop`.
+/// Steps at 40 mm/s, with a timer that stops for `long` after the step at `stop`.
 fn starve(stop: usize, long: u64) -> Found {
     let mut meter = meter(&[]);
     let mut cycle = 0;

@@ -13,29 +13,29 @@ const WIDTH: u32 = 1_100;
 const PATH_HEIGHT: u32 = 640;
 const CURVE_HEIGHT: u32 = 220;
 const THREADS_HEIGHT: u32 = 300;
-/// What the scale of errors shows at least, micrometres to each side.
+/// Least range of the scale of errors, micrometres to each side.
 const THREAD_SCALE: f64 = 10.0;
-/// Each so many of the samples of a thread is drawn.
+/// Only every so many samples of a thread are drawn.
 const THREAD_EVERY: usize = 4;
 const MARGIN: u32 = 12;
 const LABELS_BELOW: u32 = 38;
 const LABELS_LEFT: u32 = 76;
-/// Width of the scale of colours.
+/// Width of the colour scale.
 const SCALE: u32 = 110;
-/// Steps of the scale: as many as can be told apart.
+/// Steps of the colour scale: as many as can be told apart.
 const COLOURS: usize = 16;
-/// Columns of a curve; more samples become the highest and lowest of a column.
+/// Columns of a curve. If there are more samples, each column shows its highest and its lowest.
 const COLUMNS: usize = 1_000;
-/// What a path may be simplified by, of its size.
+/// How far a simplified path may be off, as a share of its size.
 const SIMPLER: f64 = 1.0 / 2_000.0;
 const FONT: (&str, u32) = ("sans-serif", 13);
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
-/// Draws all panels; the curves for `span` only, in s, if that is given.
+/// Draws all panels. `span`, in s, limits the curves to that time.
 ///
-/// Below them, if there are any, `threads`: pass by pass where along Z and how far off, mm. At the end, if there are any, `heat`: temperatures of each
-/// heater in degrees, over seconds from the start.
+/// `threads` go below them: for each pass, the positions along Z and the errors there, mm. `heat` comes last: the
+/// temperatures of each heater in degrees, over seconds from the start. Both may be empty.
 pub fn draw(
     motion: &Motion,
     span: Option<Range<f64>>,
@@ -47,7 +47,7 @@ pub fn draw(
     Ok(svg)
 }
 
-/// Corners of a curve.
+/// Points of a curve.
 pub type Points = Vec<(f64, f64)>;
 
 type Drawn = Result<(), Box<dyn std::error::Error>>;
@@ -92,7 +92,7 @@ fn panels(
     Ok(())
 }
 
-/// How hot each heater is over time: the first in red, others in blue.
+/// Draws the temperature of each heater over time: the first heater in red, others in blue.
 fn temperature(area: &Area<'_>, heaters: &[Points]) -> Drawn {
     let all = || heaters.iter().flatten();
     let time = extent(all().map(|point| point.0));
@@ -114,7 +114,7 @@ fn temperature(area: &Area<'_>, heaters: &[Points]) -> Drawn {
     Ok(())
 }
 
-/// How far off a thread is over its length, in micrometres.
+/// Draws the error of a thread over its length, in micrometres.
 fn thread_errors(area: &Area<'_>, passes: &[Points]) -> Drawn {
     let all = || passes.iter().flatten();
     let along = extent(all().map(|point| point.0));
@@ -137,7 +137,7 @@ fn thread_errors(area: &Area<'_>, passes: &[Points]) -> Drawn {
     Ok(())
 }
 
-/// The path in the plane of X and Y, or Z and X, to scale.
+/// Draws the path in the plane of X and Y, or Z and X, to scale.
 fn path(area: &Area<'_>, motion: &Motion, fastest: f64) -> Drawn {
     let (x, y) = frame(area, &motion.path);
     let tolerance = (x.end - x.start) * SIMPLER;
@@ -156,7 +156,7 @@ fn path(area: &Area<'_>, motion: &Motion, fastest: f64) -> Drawn {
     Ok(())
 }
 
-/// Ranges that hold all points, with a little around, at the same scale both ways.
+/// Returns ranges that hold all points with a little margin, at the same scale both ways.
 fn frame(area: &Area<'_>, points: &[(f64, f64)]) -> (Range<f64>, Range<f64>) {
     let (width, height) = area.dim_in_pixel();
     let inner = |size: u32, labels: u32| f64::from(size - 2 * MARGIN - labels);
@@ -171,13 +171,13 @@ fn frame(area: &Area<'_>, points: &[(f64, f64)]) -> (Range<f64>, Range<f64>) {
     (around(xs, width), around(ys, height))
 }
 
-/// Lowest to highest; a little apart, even if all are the same.
+/// Returns the range from the lowest to the highest value, never empty.
 fn extent(values: impl Iterator<Item = f64>) -> Range<f64> {
     let (low, high) = values.fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(v), h.max(v)));
     if low > high { -1.0..1.0 } else { low..high.max(low + 1e-3) }
 }
 
-/// The path in pieces of one colour, each joined to the next.
+/// Cuts the path into pieces of one colour, each joined to the next.
 fn pieces(motion: &Motion, fastest: f64) -> Vec<(RGBColor, Vec<(f64, f64)>)> {
     let step =
         |velocity: f64| (velocity / fastest * (COLOURS - 1) as f64).round().max(0.0) as usize;
@@ -195,7 +195,7 @@ fn pieces(motion: &Motion, fastest: f64) -> Vec<(RGBColor, Vec<(f64, f64)>)> {
     pieces.into_iter().map(|(step, points)| (colour(step), points)).collect()
 }
 
-/// From blue, slow, over green to red, fast.
+/// Returns the colour of a step: from blue for slow, over green, to red for fast.
 fn colour(step: usize) -> RGBColor {
     let share = step as f64 / (COLOURS - 1) as f64;
     let (r, g, b) = HSLColor(0.66 * (1.0 - share), 0.85, 0.42).to_backend_color().rgb;
@@ -217,7 +217,7 @@ fn colour_scale(area: &Area<'_>, fastest: f64) -> Drawn {
     Ok(())
 }
 
-/// A quantity over time.
+/// Draws a quantity over time.
 fn curve(area: &Area<'_>, values: &[f64], name: &str, span: &Range<f64>) -> Drawn {
     let shown = columns(values, span);
     let range = extent(shown.iter().map(|p| p.1).chain([0.0]));
@@ -235,7 +235,7 @@ fn curve(area: &Area<'_>, values: &[f64], name: &str, span: &Range<f64>) -> Draw
     Ok(())
 }
 
-/// The samples of a span, or the lowest and highest of each column if they are many.
+/// Returns the samples of a span. If they are many, returns the lowest and the highest of each column.
 fn columns(values: &[f64], span: &Range<f64>) -> Vec<(f64, f64)> {
     let index = |time: f64| ((time / SAMPLE_S).max(0.0) as usize).min(values.len());
     let (from, to) = (index(span.start), index(span.end));
@@ -253,7 +253,7 @@ fn columns(values: &[f64], span: &Range<f64>) -> Vec<(f64, f64)> {
     samples.chunks(samples.len().div_ceil(COLUMNS)).flat_map(column).collect()
 }
 
-/// The corners that a line needs to stay within `tolerance` (Douglas and Peucker).
+/// Returns the corners that a line needs to stay within `tolerance` (Douglas and Peucker).
 fn simplified(points: &[(f64, f64)], tolerance: f64) -> Vec<(f64, f64)> {
     let Some(last) = points.len().checked_sub(1) else { return Vec::new() };
     let mut keep = vec![false; points.len()];
@@ -270,7 +270,7 @@ fn simplified(points: &[(f64, f64)], tolerance: f64) -> Vec<(f64, f64)> {
     points.iter().zip(keep).filter(|(_, keep)| *keep).map(|(point, _)| *point).collect()
 }
 
-/// Of a point from the stretch between two others.
+/// Distance of a point from the segment between two other points.
 fn distance(p: (f64, f64), a: (f64, f64), b: (f64, f64)) -> f64 {
     let (dx, dy) = (b.0 - a.0, b.1 - a.1);
     let square = dx * dx + dy * dy;

@@ -1,7 +1,7 @@
-//! A picture of a job, made from the steps that the firmware emitted and not from what it planned: the
-//! path, coloured by speed, and velocity, acceleration and jerk along the path over time.
+//! A picture of a job, made from the steps that the firmware emitted and not from what it planned. It shows the path,
+//! coloured by speed, and velocity, acceleration and jerk along the path over time.
 //!
-//! [`track`] turns steps into positions, [`smooth`] fits local cubics to the way they make, [`chart`]
+//! [`track`] turns steps into positions, [`smooth`] fits local cubics to the distance along the path, [`chart`]
 //! draws. Distances are in millimetres; in degrees when only rotary axes move.
 
 mod chart;
@@ -21,16 +21,16 @@ use crate::oracle::Setup;
 use crate::thermal::{BED, HOT_END, Sample};
 use crate::threads::Threads;
 
-/// X, Y and Z among the axes.
+/// Indices of X and Y among the axes.
 const X: usize = 0;
 const Y: usize = 1;
 const Z: usize = 2;
 
-/// Width of the window that a cubic is fitted to, ms, unless asked otherwise: some ten segments of the
-/// firmware, so that their steps in velocity do not show.
+/// Default width of the window that a cubic is fitted to, ms. It covers some ten segments of the firmware, so that
+/// their steps in velocity do not show.
 pub const WINDOW_MS: u32 = 60;
 
-/// How to draw.
+/// How to draw a picture.
 #[derive(Clone, Debug)]
 pub struct Look {
     /// The time that the curves show, s from the first step; all of it if `None`.
@@ -48,9 +48,9 @@ impl Default for Look {
 /// The job as it was carried out, sampled each millisecond.
 #[derive(Clone, Default, Debug)]
 pub struct Motion {
-    /// Where the tool is in the plane of X and Y; of a machine without Y, of Z and X.
+    /// Positions of the tool in the plane of X and Y; on a machine without Y, in the plane of Z and X.
     pub path: Vec<(f64, f64)>,
-    /// The names of these two axes.
+    /// The names of the plane's axes.
     pub plane: [char; 2],
     /// Units a second, along the path.
     pub velocity: Vec<f64>,
@@ -61,7 +61,7 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// Of the steps that the machine's recorder has kept.
+    /// The motion that the logged steps of the machine's recorder make.
     pub fn of(machine: &Machine, setup: &Setup, window_ms: u32) -> Motion {
         let positions = track::positions(machine, setup);
         let curves = smooth::derivatives(&track::way(&positions), window_ms, track::SAMPLE_S);
@@ -74,7 +74,7 @@ impl Motion {
     }
 }
 
-/// The temperatures of each heater over time, if there are heaters.
+/// Returns the temperatures of each heater over time; empty if there are no heaters.
 fn temperatures(machine: &Machine) -> Vec<chart::Points> {
     let Some(thermal) = machine.thermal() else { return Vec::new() };
     let of = |heater: usize| {
@@ -84,9 +84,10 @@ fn temperatures(machine: &Machine) -> Vec<chart::Points> {
     [HOT_END, BED].map(of).to_vec()
 }
 
-/// Draws the steps that were kept into an SVG file. An error says that it cannot be written.
+/// Draws the logged steps into an SVG file. An error says that the file cannot be written.
 ///
-/// Of threads it shows the error over their length as well, each pass in a colour of its own; of heaters their temperatures.
+/// The picture also shows the error of threads over their length, each pass in its own colour, and the temperatures
+/// of heaters.
 pub fn write(
     path: &Path,
     machine: &Machine,

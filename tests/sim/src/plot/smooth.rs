@@ -1,8 +1,8 @@
-//! Derivatives of a sampled way: at every sample a cubic is fitted to a window around it, by least
-//! squares (Savitzky and Golay). Noise of a step or two does not show; what is shorter than half a window
-//! is rounded off.
+//! Derivatives of a sampled distance. At every sample a cubic is fitted to a window around it, by least squares
+//! (Savitzky and Golay). Noise of a step or two does not show; details shorter than half a window are rounded off.
 
-/// First, second and third derivative at each sample. Outside the samples the way is level.
+/// Returns the first, second and third derivative at each sample. Outside the samples the distance is taken as
+/// constant.
 pub fn derivatives(way: &[f64], window_ms: u32, sample_s: f64) -> [Vec<f64>; 3] {
     let half = ((f64::from(window_ms) / 2000.0 / sample_s) as i32).max(2);
     let fit = Fit::new(half);
@@ -29,7 +29,7 @@ impl Fit {
         Fit { half, sums: [sum(0), sum(2), sum(4), sum(6)] }
     }
 
-    /// Coefficients of the first, second and third power around a sample.
+    /// Returns the coefficients of the first, second and third power around a sample.
     fn at(&self, way: &[f64], at: usize) -> [f64; 3] {
         let last = way.len() as i64 - 1;
         let (centre, mut moments) = (way[at], [0.0; 4]);

@@ -1,14 +1,15 @@
-//! Steps to positions, a millisecond apart.
+//! Turns steps into positions that are a millisecond apart.
 //!
-//! A step is the moment at which the motor passes the middle between two positions. Between steps it is
-//! taken to move evenly; when none comes for [`STILL_S`] it stands, but for the half steps at both ends.
+//! A step is the moment at which the motor passes the middle between two positions. Between steps the motor is taken
+//! to move evenly. When no step comes for [`STILL_S`] the motor stands still, except for the half steps at both ends
+//! of the standstill.
 
 use crate::machine::Machine;
 use crate::oracle::{AXES, MotorSetup, Setup, UNITS};
 
 /// Time between two samples, s.
 pub const SAMPLE_S: f64 = 0.001;
-/// A motor that makes no step for so long stands.
+/// A motor that makes no step for so long stands still, s.
 const STILL_S: f64 = 0.2;
 /// Axes that are lengths, X Y Z.
 const LINEAR: usize = 3;
@@ -16,10 +17,11 @@ const LINEAR: usize = 3;
 /// The positions of all axes.
 pub type Position = [f64; AXES];
 
-/// A motor's way as corners of a line: time and position.
+/// The path of a motor as corners of a line: time and position.
 type Corners = Vec<(f64, f64)>;
 
-/// Where the axes are, from the first step to the last. An axis with several motors goes by the first.
+/// Returns the positions of the axes from the first step to the last. An axis with several motors follows the first
+/// of them.
 pub fn positions(machine: &Machine, setup: &Setup) -> Vec<Position> {
     let log = machine.recorder().log();
     let (Some(first), Some(last)) = (log.first(), log.last()) else { return Vec::new() };
@@ -37,7 +39,7 @@ pub fn positions(machine: &Machine, setup: &Setup) -> Vec<Position> {
     positions
 }
 
-/// Millimetres or degrees in a step.
+/// Returns the millimetres or degrees in a step.
 fn step_length(motor: &MotorSetup) -> f64 {
     const FAR: i64 = 1_000_000;
     match motor.steps(FAR * UNITS as i64) {
@@ -55,7 +57,7 @@ fn corners(steps: impl Iterator<Item = (f64, bool)>, length: f64) -> Corners {
         let step = if up { length } else { -length };
         let next = steps.peek().map_or(f64::INFINITY, |(next, _)| *next);
         if time - before > STILL_S {
-            // It has stood: the first half step takes as long as the step that follows, if there is time.
+            // The motor has stood still: its first half step takes as long as the next step, if there is time.
             let lead = (next - time).min(STILL_S).min(0.5 * (time - before));
             corners.extend(halting.map(|halt| (halt, at)));
             corners.push((time - lead, at));
@@ -70,7 +72,7 @@ fn corners(steps: impl Iterator<Item = (f64, bool)>, length: f64) -> Corners {
     corners
 }
 
-/// The line's positions at all samples: before its first corner and behind its last it is level.
+/// Returns the line's positions at all samples. The line is level before its first corner and behind its last.
 fn sampled(corners: &[(f64, f64)]) -> impl Iterator<Item = f64> {
     let mut next = 0;
     (0..).map(move |n| {
@@ -86,7 +88,8 @@ fn sampled(corners: &[(f64, f64)]) -> impl Iterator<Item = f64> {
     })
 }
 
-/// The way made up to each sample: of the linear axes, or of the others where those never move.
+/// Returns the distance travelled up to each sample: of the linear axes, or of the rotary axes if no linear axis ever
+/// moves.
 pub fn way(positions: &[Position]) -> Vec<f64> {
     let moves = |axis: usize| positions.iter().any(|p| p[axis] != positions[0][axis]);
     let axes = if (0..LINEAR).any(moves) { 0..LINEAR } else { LINEAR..AXES };

@@ -1,4 +1,4 @@
-//! How hot a print was, and how well that was held.
+//! How hot a print was, and how well its temperatures were held.
 
 use std::fmt::{self, Display, Formatter};
 
@@ -10,46 +10,47 @@ use crate::thermal::{BED, HOT_END};
 /// A heater of a print.
 #[derive(Clone, PartialEq, Serialize, Debug)]
 pub struct Heat {
-    /// Which one.
+    /// The name of the heater.
     pub heater: &'static str,
     /// The highest temperature that was asked for, degrees.
     pub asked: f64,
-    /// The highest that its sensor has felt.
+    /// The highest temperature that its sensor has felt.
     pub peak: f64,
-    /// From the first line until it was within a degree of that, s.
+    /// Time from the first line until the sensor was within a degree of `asked`, s; `None` if it never was.
     pub seconds_to_reach: Option<f64>,
-    /// The lowest and highest of what its sensor felt from the first step behind homing on, until it was switched off.
+    /// The lowest and the highest temperature that its sensor felt, from the first step behind homing until the
+    /// heater was switched off.
     pub held: Option<(f64, f64)>,
-    /// What its sensor feels at the end.
+    /// The temperature that its sensor feels at the end.
     pub last: f64,
 }
 
-/// What is measured of one.
+/// What is measured of one heater.
 #[derive(Clone, Copy, Default)]
 struct One {
     asked: f64,
-    /// When it was switched off behind that.
+    /// Cycle at which the heater was switched off after it had been on.
     off: Option<u64>,
 }
 
-/// Measures while a print runs.
+/// The measurements of a print while it runs.
 #[derive(Default)]
 pub struct Meter {
     heaters: [One; 2],
 }
 
-/// So near what is asked for it is reached, degrees.
+/// A temperature that is this near to the one asked for counts as reached, degrees.
 const NEAR: f64 = 1.0;
 
 impl Meter {
-    /// A line that is sent at a cycle asks for so many degrees.
+    /// Takes note that a line, sent at `cycle`, asks for so many degrees.
     pub fn asked(&mut self, heater: usize, degrees: i64, cycle: u64) {
         let one = &mut self.heaters[heater];
         one.asked = one.asked.max(degrees as f64);
         one.off = (degrees == 0 && one.asked > 0.0).then_some(cycle);
     }
 
-    /// What came of the heaters that lines have asked for.
+    /// Returns the results for the heaters that lines have asked for.
     pub fn heat(&self, machine: &Machine, began: u64) -> Vec<Heat> {
         let Some(thermal) = machine.thermal() else { return Vec::new() };
         let printing = machine.recorder().span().map_or(u64::MAX, |((first, _), _)| first);

@@ -1,14 +1,14 @@
 //! A print from boot to rest: a file of a slicer, sent as printing hosts send it, to a printer that heats.
 //!
-//! | module | what it has |
+//! | module | contents |
 //! |---|---|
 //! | [`reading`] | where each line must end, and what it asks of heaters |
 //! | [`path`] | whether every step is on the way from line to line |
 //! | [`session`] | a printing host: line numbers, checksums, one line in flight |
-//! | [`heat`] | how hot it was, and how well that was held |
+//! | [`heat`] | how hot the print was, and how well its temperatures were held |
 //!
-//! Settings are asked of a twin, in TinyG's dialect: the port that prints speaks that of printing hosts from its first line on. Steps count from the
-//! last G28 on.
+//! Settings are asked of a twin, a second machine, in TinyG's dialect, because the port that prints speaks the
+//! dialect of printing hosts from its first line on. Steps count from the last G28.
 
 mod heat;
 mod path;
@@ -32,9 +32,9 @@ pub use path::{Followed, Place};
 use reading::{Asked, Corner};
 use session::Session;
 
-/// The machine whose settings a print has unless its image has another than `careful`.
+/// Selects the machine whose settings a print gets if the image is for the machine `careful`.
 const PRINTER: &str = "{mch:3}";
-/// How long an answer may take, and that of a line behind one that waits for a temperature, ms.
+/// Longest time of an answer, ms.
 const LINE_MS: u64 = 120_000;
 const HEAT_MS: u64 = 20 * 60_000;
 /// Time without a step after which motion has ended.
@@ -47,7 +47,8 @@ pub fn is_print(board: &Board, lines: &Lines) -> bool {
     prints && lines.iter().any(|(_, line)| reading::is_printing(line))
 }
 
-/// A machine like this one at power-up, and what settings leave behind in its memory.
+/// Starts a second machine like this one and sends it the settings. Returns that machine, whose EEPROM has the
+/// settings, and its setup.
 fn twin(machine: &Machine, lines: &Lines, settings: &[String]) -> Result<(Machine, Setup)> {
     let mut twin = Machine::new(machine.image().clone(), machine.board())?;
     let mut host = Host::new(1);
@@ -56,28 +57,28 @@ fn twin(machine: &Machine, lines: &Lines, settings: &[String]) -> Result<(Machin
     let careful = machine.body["mch"].as_i64() == Some(0);
     let all: Vec<_> =
         careful.then(|| PRINTER.to_owned()).into_iter().chain(settings.iter().cloned()).collect();
-    // What may wait for a hand waits in a print, too: M0 says so.
+    // Lines such as M0 may wait for an operator in a print, too: this also sends the setting that makes them go on.
     job::ask_settings(&mut twin, &mut host, lines, &all)?;
     job::put_away(&mut twin, &mut host)?;
     let setup = job::read_setup(&mut twin, &mut host)?;
     Ok((twin, setup))
 }
 
-/// What is known of a print while it runs.
+/// The state of a print while it runs.
 struct Run<'a> {
     machine: &'a mut Machine,
     session: Session,
     setup: Setup,
     corners: Result<Vec<Corner>, Unclear>,
     heat: heat::Meter,
-    /// The corner that steps count from.
+    /// The line from whose end steps count.
     home: usize,
     began: u64,
     progress_at: u64,
 }
 
-/// Boots the machine, prints and says how it went. An error means that the print could not begin; all that goes wrong later is in the report.
-/// `progress` gets the lines answered so far.
+/// Boots the machine, prints and says how it went. An error means that the print could not begin; the report has all
+/// that goes wrong later. `progress` gets the number of lines answered so far.
 pub fn run(
     machine: &mut Machine,
     lines: &Lines,
@@ -136,14 +137,14 @@ impl Run<'_> {
         }
     }
 
-    /// Line `n` has been answered: behind a homing steps count anew.
+    /// Takes the answer to line `n`. If the line homes, steps count from its end.
     fn answered(&mut self, n: usize) {
         if self.corners.as_ref().is_ok_and(|corners| corners[n].homes) {
             self.count_from(n);
         }
     }
 
-    /// The machine stands where a line ends: its steps count from there.
+    /// Counts steps from here, where the machine stands at the end of a line.
     fn count_from(&mut self, corner: usize) {
         self.home = corner;
         let ends = self.ends();
@@ -165,11 +166,11 @@ impl Run<'_> {
         std::array::from_fn(|m| if inverted(m) { -place[m] } else { place[m] })
     }
 
-    /// Where the lines behind the last homing end, in steps from there.
+    /// Returns where each line behind the last homing ends, in steps from the end of the homing.
     fn ends(&self) -> Vec<(usize, Place)> {
         let corners = self.corners.as_deref().unwrap_or_default();
         let Some(home) = corners.get(self.home) else { return Vec::new() };
-        // A print that homes begins there; one that does not begins at 0.
+        // Steps count from the end of a homing; in a print that does not home they count from 0.
         let from = |m: usize| {
             let motor = &self.setup.motors[m];
             if home.homes { motor.steps(home.position[motor.axis]) } else { 0 }
@@ -244,7 +245,7 @@ impl Run<'_> {
     }
 }
 
-/// Where a print that does not home ends, in steps of each motor from where it began.
+/// Returns where a print that does not home ends, in steps of each motor from where it began.
 pub fn end_of(lines: &Lines, setup: &Setup) -> Result<Vec<i64>> {
     let corners = reading::read(lines)?;
     let last = corners.last().context("a print without lines")?;

@@ -1,7 +1,8 @@
-//! Whether every step of a print is on the way from one line's end to the next.
+//! Checks whether every step of a print is on the path from one line's end to the next.
 //!
-//! The steps are followed in the order in which the pins made them. Where the motors are then has to be on the stretch of a line, each motor
-//! within [`MOST`] steps of where the motor with the most steps of that line has it; and lines follow in their order.
+//! The steps are followed in the order in which the pins made them. After each step the motors must be on a line:
+//! each motor within [`MOST`] steps of its ideal place on the stretch between two ends of lines. Lines must follow in
+//! their order.
 
 use std::fmt::{self, Display, Formatter};
 
@@ -10,37 +11,38 @@ use serde::Serialize;
 
 use crate::recorder::Step;
 
-/// How far a motor may be off a line, steps. Ends of lines are rounded to steps here, half a step at most; the motors that do not lead are up to
-/// two steps behind or ahead where short lines join.
+/// How far a motor may be off a line, steps. The ends of lines are rounded to steps here, by half a step at most.
+/// Motors that do not lead are up to two steps behind or ahead where short lines join.
 const MOST: f64 = 2.5;
-/// Lines that may be left out one after the other, for each is shorter than a step.
+/// Number of lines within which the motors' place is looked for: a line shorter than a step may be left out.
 const AHEAD: usize = 12;
 
-/// Where the motors are, in steps.
+/// Positions of the motors, in steps.
 pub type Place = [i64; MOTORS];
 
-/// What following the steps has found.
+/// The result of following the steps.
 #[derive(Clone, Serialize, Debug)]
 pub struct Followed {
-    /// The steps that were looked at.
+    /// Number of steps that were checked.
     pub steps: usize,
-    /// The stretches that they had to follow.
+    /// Number of stretches that they had to follow.
     pub stretches: usize,
-    /// How far a motor was off its line at worst, steps.
+    /// The largest distance of a motor from its line, steps.
     pub most: f64,
-    /// The line of the file that was left first, if one was.
+    /// The first line of the file that the steps have left; `None` if they left no line.
     pub left: Option<usize>,
-    /// Steps of each motor, both ways, and how many the file asks for.
+    /// For each motor, its steps in both directions, and the number of steps that the file asks for.
     pub totals: [(u64, u64); MOTORS],
 }
 
 impl Followed {
-    /// What is wrong.
+    /// Returns what is wrong; `None` if nothing is.
     pub fn problem(&self) -> Option<String> {
         if let Some(line) = self.left {
             return Some(format!("steps leave the way of line {line}"));
         }
-        // Where a curve turns round less than the tolerance of the path behind a step, that step is left out there and back.
+        // A curve may reverse just behind a step, within the tolerance of the path. The step there and the step back
+        // are then left out.
         let is_right = |(made, asked): &(u64, u64)| {
             made <= asked && (asked - made).is_multiple_of(2) && (asked - made) * 1_000 <= *asked
         };
@@ -57,7 +59,8 @@ impl Display for Followed {
     }
 }
 
-/// Follows steps along the ends of lines, from `from` on. `up` says of a motor whether a step that counts upwards at the pin does so in the job.
+/// Follows steps along the ends of lines, from `from` on. `up` says for each motor whether a step that counts upwards
+/// at the pin also counts upwards in the job.
 pub fn follow(log: &[Step], from: Place, ends: &[(usize, Place)], up: [bool; MOTORS]) -> Followed {
     let mut stretches = vec![(0, from, from)];
     for (line, end) in ends {
@@ -79,7 +82,7 @@ pub fn follow(log: &[Step], from: Place, ends: &[(usize, Place)], up: [bool; MOT
     for step in log {
         let motor = usize::from(step.motor);
         at[motor] += if step.positive == up[motor] { 1 } else { -1 };
-        // The nearest one, of those that are as near the first.
+        // Takes the nearest stretch; among equally near ones, the first.
         let ahead = stretches.iter().enumerate().skip(now).take(AHEAD);
         let offs = ahead.map(|(n, (_, a, b))| (n, off(at, *a, *b)));
         let Some((n, off)) = offs.min_by(|a, b| a.1.total_cmp(&b.1)) else { break };
@@ -96,7 +99,7 @@ pub fn follow(log: &[Step], from: Place, ends: &[(usize, Place)], up: [bool; MOT
     followed
 }
 
-/// How far the worst motor is from the stretch between two places, in steps.
+/// Returns the distance of the worst motor from the stretch between two places, in steps.
 fn off(at: Place, from: Place, to: Place) -> f64 {
     let way = |motor: usize| (to[motor] - from[motor]) as f64;
     let leads = (0..MOTORS).max_by(|a, b| way(*a).abs().total_cmp(&way(*b).abs())).unwrap_or(0);
@@ -112,7 +115,7 @@ fn off(at: Place, from: Place, to: Place) -> f64 {
 mod tests {
     use super::*;
 
-    /// Steps of motors, upwards or downwards.
+    /// Parses steps: a letter is a motor, upper case upwards, lower case downwards.
     fn steps(text: &str) -> Vec<Step> {
         let step = |c: char| Step {
             cycle: 0,

@@ -1,6 +1,7 @@
-//! Where each line of a print must end: a second reading of the file.
+//! Where each line of a print must end: a second reading of the file, independent of the firmware.
 //!
-//! It shares no code with the firmware. A position is in units of 0.1 um, to which each word is rounded; E is the fourth axis.
+//! It shares no code with the firmware. A position is in units of 0.1 um, and each word is rounded to that. E is the
+//! fourth axis.
 
 use crate::job::Lines;
 use crate::oracle::{AXES, Decimal, Unclear};
@@ -8,19 +9,19 @@ use crate::oracle::{AXES, Decimal, Unclear};
 /// Units in an inch and in a millimetre.
 const INCH: i128 = 254_000;
 const MM: i128 = crate::oracle::UNITS;
-/// The axes of a printer, and how many of them homing knows.
+/// The axes of a printer. The first `HOMED` of them can be homed.
 const LETTERS: [char; 4] = ['X', 'Y', 'Z', 'E'];
 const HOMED: usize = 3;
 const E: usize = 3;
 
-/// What a line leaves behind.
+/// The state after a line.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Corner {
-    /// Its number in the file.
+    /// Number of the line in the file.
     pub line: usize,
-    /// Where the machine is behind it.
+    /// Position of the machine after the line.
     pub position: [i64; AXES],
-    /// Whether it homes, so that positions count from another place.
+    /// Whether the line homes, so that positions count from another place.
     pub homes: bool,
 }
 
@@ -35,12 +36,12 @@ pub enum Asked {
     Bed(i64),
 }
 
-/// A line without its comment and blanks around.
+/// Returns a line without its comment and without blanks around it.
 pub fn without_comment(line: &str) -> &str {
     line.split(';').next().unwrap_or_default().trim()
 }
 
-/// The code of a line in upper case, such as `G1`, and its words.
+/// Returns the code of a line in upper case, such as `G1`, and its words.
 fn parts(line: &str) -> Option<(String, Vec<(char, Decimal)>)> {
     let text: String = without_comment(line).to_ascii_uppercase();
     let text: String = text.chars().filter(|c| !c.is_whitespace()).collect();
@@ -58,7 +59,7 @@ fn parts(line: &str) -> Option<(String, Vec<(char, Decimal)>)> {
     Some((code.to_owned(), words))
 }
 
-/// Whether a line is one of a print: it moves an extruder, or heats.
+/// Whether a line shows that a file is a print: it moves an extruder, or heats.
 pub fn is_printing(line: &str) -> bool {
     let Some((code, words)) = parts(line) else { return false };
     match code.as_str() {
@@ -68,7 +69,7 @@ pub fn is_printing(line: &str) -> bool {
     }
 }
 
-/// What a line asks of a heater.
+/// Returns what a line asks of a heater.
 pub fn asked(line: &str) -> Asked {
     let Some((code, words)) = parts(line) else { return Asked::Nothing };
     let degrees = words.iter().find(|(letter, _)| matches!(letter, 'S' | 'R'));
@@ -79,7 +80,7 @@ pub fn asked(line: &str) -> Asked {
     }
 }
 
-/// Reads a whole file: a corner for each line.
+/// Reads a whole file. Returns a corner for each line.
 pub fn read(lines: &Lines) -> Result<Vec<Corner>, Unclear> {
     let mut reader = Reader::default();
     let corner = |(line, text): &(usize, String)| {
@@ -92,7 +93,7 @@ pub fn read(lines: &Lines) -> Result<Vec<Corner>, Unclear> {
 #[derive(Default)]
 struct Reader {
     position: [i64; AXES],
-    /// What G92 has added.
+    /// The offset that G92 has set.
     offset: [i64; AXES],
     relative: bool,
     relative_e: bool,
@@ -100,7 +101,7 @@ struct Reader {
 }
 
 impl Reader {
-    /// Takes a line; whether it homes.
+    /// Executes a line. Returns whether it homes.
     fn line(&mut self, text: &str) -> Result<bool, String> {
         let Some((code, words)) = parts(text) else { return Ok(false) };
         match code.as_str() {
@@ -123,7 +124,7 @@ impl Reader {
         Ok(false)
     }
 
-    /// The words of axes, in units.
+    /// Returns the words of axes, in units.
     fn axes(&self, words: &[(char, Decimal)]) -> [Option<i64>; LETTERS.len()] {
         let unit = if self.inches { INCH } else { MM };
         LETTERS.map(|axis| {
@@ -141,7 +142,7 @@ impl Reader {
         }
     }
 
-    /// G92: the place is called so; without words all of it is 0.
+    /// G92: gives the position these coordinates; without words all are 0.
     fn call(&mut self, words: &[(char, Decimal)]) {
         let mut values = self.axes(words);
         if values == [None; LETTERS.len()] {
@@ -153,7 +154,7 @@ impl Reader {
         }
     }
 
-    /// G28: all three axes, or those that are named. It is at 0 where a machine homes to its lower end.
+    /// G28: homes the named axes, or all three. The position is 0 where a machine homes to its lower end.
     fn home(&mut self, words: &[(char, Decimal)]) -> bool {
         let named = |axis: usize| words.iter().any(|(letter, _)| *letter == LETTERS[axis]);
         let all = !(0..HOMED).any(named);

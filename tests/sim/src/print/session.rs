@@ -1,11 +1,11 @@
-//! A printing host: each line has a number and a checksum, and waits for the `ok` of the line before.
+//! A printing host. Each line has a number and a checksum, and waits for the `ok` of the line before it.
 
 use anyhow::{Result, bail};
 
 use crate::machine::Machine;
 use crate::report::Rejected;
 
-/// Time between two looks for an answer, ms.
+/// Time between two checks for an answer, ms.
 const LOOK_MS: u64 = 100;
 
 /// The host.
@@ -13,7 +13,7 @@ const LOOK_MS: u64 = 100;
 pub struct Session {
     number: i64,
     partial: Vec<u8>,
-    /// Lines that came and were not looked at.
+    /// Lines that have come and were not examined yet.
     heard: Vec<String>,
     answered: usize,
     rejected: Vec<Rejected>,
@@ -22,7 +22,7 @@ pub struct Session {
     late: u64,
 }
 
-/// What comes unasked and is no fault.
+/// Unsolicited lines that are no fault.
 const NOTICES: [&str; 3] = ["echo:busy: processing", " T:", "{\"r\":{\"fv\":"];
 
 impl Session {
@@ -30,32 +30,32 @@ impl Session {
         Self::default()
     }
 
-    /// Lines answered.
+    /// Number of lines answered.
     pub fn answered(&self) -> usize {
         self.answered
     }
 
-    /// Lines that were not carried out.
+    /// Takes the lines that the firmware has refused.
     pub fn take_rejected(&mut self) -> Vec<Rejected> {
         std::mem::take(&mut self.rejected)
     }
 
-    /// Lines that no line has asked for.
+    /// Lines from the firmware that belong to no request.
     pub fn strays(&self) -> &[String] {
         &self.strays
     }
 
-    /// How often the firmware has started since it was booted.
+    /// How often the firmware has restarted since it was booted.
     pub fn starts(&self) -> usize {
         self.starts.saturating_sub(1)
     }
 
-    /// How often steps came late, as the firmware tells.
+    /// How often steps came late, as the firmware reports.
     pub fn late(&self) -> u64 {
         self.late
     }
 
-    /// Runs until the firmware says `start`, then a little for the line to fall silent.
+    /// Runs until the firmware says `start`, then a little longer until the line is silent.
     pub fn boot(&mut self, machine: &mut Machine, timeout_ms: u64) -> Result<()> {
         let end = machine.cycle() + machine.cycles(timeout_ms);
         while self.starts == 0 {
@@ -67,17 +67,17 @@ impl Session {
         self.run_for_ms(machine, LOOK_MS)
     }
 
-    /// Tells the number that lines count from.
+    /// Sends the number from which lines count.
     pub fn set_number(&mut self, machine: &mut Machine, timeout_ms: u64) -> Result<()> {
         self.number = 0;
         self.say(machine, 0, "M110", timeout_ms)?;
         self.answered = 0;
-        // The port has been told in TinyG's dialect until here.
+        // Until here the firmware has sent lines in TinyG's dialect.
         self.strays.clear();
         Ok(())
     }
 
-    /// Says a line, that of this number in the file, and waits for its `ok`.
+    /// Sends a line, which has this number in the file, and waits for its `ok`.
     pub fn say(
         &mut self,
         machine: &mut Machine,
@@ -106,7 +106,7 @@ impl Session {
         }
     }
 
-    /// Runs the machine for a time. What it tells meanwhile was not asked for.
+    /// Runs the machine for a time. Lines that come meanwhile are unsolicited.
     pub fn run_for_ms(&mut self, machine: &mut Machine, ms: u64) -> Result<()> {
         machine.run_for_ms(ms)?;
         self.listen(machine);

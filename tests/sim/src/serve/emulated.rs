@@ -1,7 +1,7 @@
 //! `kerf-sim serve` of a board whose chip is emulated: its USB behind a pseudo-terminal.
 //!
-//! Opening the port resets nothing, as on the board: a sender's job has to begin where the firmware's zero is. Where a reset would end the connection,
-//! the pseudo-terminal stays open.
+//! Opening the port resets nothing, as on the real board, so a sender's job must begin where the firmware's zero is.
+//! When a reset would end the connection on a real board, the pseudo-terminal stays open.
 
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -27,11 +27,11 @@ struct Server {
     pty: Pty,
     speed: Speed,
     peer: Peer,
-    /// In the last turn no byte went either way, and no motor moved.
+    /// Whether in the last turn no byte went either way and no motor moved.
     rests: bool,
-    /// Steps of each motor when the port was last opened: on balance, and in all.
+    /// Steps of each motor when the port was last opened: up minus down, and in both directions together.
     opened: Vec<(i64, u64)>,
-    /// The cycle that belongs to an instant.
+    /// An instant of real time and the cycle that belongs to it.
     anchor: (Instant, u64),
 }
 
@@ -48,12 +48,12 @@ pub fn serve(args: &ServeArgs, board: &'static Board, stop: &AtomicBool) -> Resu
     Ok(arrived.unwrap_or(true))
 }
 
-/// Steps of each motor, on balance and in all.
+/// Steps of each motor: up minus down, and in both directions together.
 fn steps(board: &Emulated) -> Vec<(i64, u64)> {
     board.steps().into_iter().zip(board.totals()).collect()
 }
 
-/// The switches of a machine, and its plate.
+/// Returns the switches of a machine, and its plate as a switch.
 fn switches(build: &Build, board: &Board) -> Vec<Near> {
     let near = |input: usize, axis: usize, at: f64, hysteresis: f64| {
         let gpio = board.inputs[input]?.bit;
@@ -91,7 +91,7 @@ impl Server {
         })
     }
 
-    /// Looks at the sender, runs the board, carries bytes both ways.
+    /// Does one turn: reads from the sender, runs the board, carries bytes both ways.
     fn turn(&mut self) -> Result<()> {
         let peer = wait(&self.pty, self.rests && self.speed == Speed::Max)?;
         let totals = self.board.totals();
@@ -124,7 +124,8 @@ impl Server {
         Ok(())
     }
 
-    /// The cycle to run to: what it is now, or a little earlier for a board that lags far behind.
+    /// Returns the cycle to run to: the one that corresponds to the present time. For a board that lags far behind it
+    /// is earlier.
     fn until(&mut self) -> u64 {
         let now = self.board.cycle();
         let Speed::Times(factor) = self.speed else { return now + self.board.cycles(SLICE_MS) };
@@ -137,7 +138,7 @@ impl Server {
         target.min(most)
     }
 
-    /// Prints where the last sender's job has brought the motors.
+    /// Prints where the last sender's job has brought the motors. Returns whether that is exact.
     fn has_arrived(&mut self, job: &Path) -> Result<bool> {
         let arrival = Arrival::of_emulated(&mut self.board, &self.opened, job)?;
         print!("{arrival}");

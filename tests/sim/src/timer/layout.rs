@@ -2,7 +2,7 @@
 
 /// Registers and vectors of one timer.
 pub struct Layout {
-    /// 16 bits, and a capture register.
+    /// Whether the timer has 16 bits and a capture register.
     pub wide: bool,
     /// Control register A.
     pub tccra: u16,
@@ -28,7 +28,7 @@ const SYNCHRONOUS: [u64; 8] = [0, 1, 8, 64, 256, 1024, 0, 0];
 const ASYNCHRONOUS: [u64; 8] = [0, 1, 8, 32, 64, 128, 256, 1024];
 
 impl Layout {
-    /// Compare channels.
+    /// Number of compare channels.
     pub fn channels(&self) -> usize {
         self.ocr.iter().filter(|r| **r != 0).count()
     }
@@ -48,7 +48,7 @@ impl Layout {
         [self.tcnt, self.icr].into_iter().chain(self.ocr).filter(|r| *r != 0)
     }
 
-    /// Every register.
+    /// Returns the addresses of all registers.
     pub fn registers(&self) -> Vec<u16> {
         let mut all = vec![self.tccra, self.tccrb, self.timsk, self.tifr];
         for low in self.words() {
@@ -75,7 +75,7 @@ impl Layout {
         }
     }
 
-    /// With three compare channels.
+    /// A 16-bit timer with three compare channels.
     const fn wide(tccra: u16, timsk: u16, tifr: u16, v: u8) -> Layout {
         Layout {
             wide: true,
@@ -91,7 +91,7 @@ impl Layout {
         }
     }
 
-    /// With two compare channels.
+    /// A 16-bit timer with two compare channels.
     const fn wide_of_two(tccra: u16, timsk: u16, tifr: u16, v: u8) -> Layout {
         Layout {
             ocr: [tccra + 8, tccra + 10, 0],

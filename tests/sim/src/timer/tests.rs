@@ -24,7 +24,7 @@ fn read_word(t: &mut Timer, addr: u16, now: u64) -> u16 {
     u16::from_le_bytes([low, t.read(addr + 1, now).unwrap()])
 }
 
-/// Cycle at which the flag of compare match A goes up. The other channels match at 0.
+/// Returns the cycle at which the flag of compare match A goes up. The other channels match at 0.
 fn match_a(t: &mut Timer) -> u64 {
     while t.flags & COMPARE_A == 0 {
         t.advance(t.due());
@@ -51,7 +51,7 @@ fn the_prescaler_runs_freely() {
     let mut t = timer1();
     write_word(&mut t, OCR1A, 9, 0);
     t.write(TCCR1B, CTC | BY_8, 1005);
-    // Counts fall on multiples of 8, whenever the timer was started.
+    // Counts fall on multiples of 8 cycles, whenever the timer was started.
     assert_eq!(match_a(&mut t), 1000 + 80);
 }
 

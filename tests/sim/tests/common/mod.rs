@@ -1,4 +1,4 @@
-//! Building fixtures and running them, and the firmware itself.
+//! Builds and runs fixtures, and runs the firmware itself.
 
 #[macro_use]
 mod rows;
@@ -11,8 +11,8 @@ use std::process::Command;
 use kerf::boards::{Board, MEGA2560_GRBL};
 use kerf_sim::{Host, Image, LINES_IN_FLIGHT, Machine};
 
-/// The folder of the profile's programs, which this one lies in too: cargo runs tests in the package's folder, but a path
-/// fixed at compile time is that of the original in a copied checkout.
+/// Returns the folder of the profile's programs, in which this program lies too. Cargo runs tests in the package's
+/// folder. A path fixed at compile time would be wrong in a copied checkout.
 fn programs() -> PathBuf {
     let test = std::env::current_exe().unwrap();
     test.ancestors().nth(2).expect("deps/test in the folder of the profile").to_owned()
@@ -65,13 +65,13 @@ pub fn word(machine: &Machine, name: &str) -> u16 {
     machine.peek_word(addr.unwrap_or_else(|| panic!("no variable {name}")))
 }
 
-/// Where images lie.
+/// Returns the folder of the images.
 fn images() -> PathBuf {
     std::env::var_os("KERF_ELF_DIR")
         .map_or_else(|| PathBuf::from("../../../target/firmware"), PathBuf::from)
 }
 
-/// Where the firmware's image for a board lies.
+/// Returns the path of the firmware's image for a board.
 pub fn image(board: &Board) -> PathBuf {
     let elf = images().join(format!("{}.elf", board.name));
     let (elf_name, name) = (elf.display(), board.name);
@@ -79,7 +79,7 @@ pub fn image(board: &Board) -> PathBuf {
     elf
 }
 
-/// Where the image of a part of Kerf lies, which `cargo xtask examples` makes of `tests/chip`.
+/// Returns the path of the image of a part of Kerf, which `cargo xtask examples` builds from `tests/chip`.
 pub fn part(name: &str) -> PathBuf {
     let elf = images().join("parts").join(format!("{name}.elf"));
     assert!(elf.exists(), "no {}: `cargo xtask examples` makes it", elf.display());
@@ -91,14 +91,14 @@ pub fn firmware(board: &'static Board) -> Machine {
     Machine::load(&image(board), board).unwrap()
 }
 
-/// The mask of the tick's interrupt.
+/// The register with the mask of the tick's interrupt.
 const TIMSK0: u16 = 0x6E;
-/// The count of milliseconds, the lowest byte first.
+/// The variable that counts milliseconds, the lowest byte first.
 const MILLIS: &str = "avr_embassy::time::MILLIS";
 
-/// A machine that has just been started has run for 49.7 days, but for so many ms.
+/// Sets the clock of a machine that has just been started to `ms` before the wrap, as if it had run for 49.7 days.
 pub fn age(machine: &mut Machine, ms: u32) {
-    // Before any task waits for a time.
+    // The clock is set before any task waits for a time.
     while machine.peek(TIMSK0) == 0 {
         machine.run_until(machine.cycle() + 16).unwrap();
     }
@@ -108,14 +108,14 @@ pub fn age(machine: &mut Machine, ms: u32) {
     }
 }
 
-/// A machine that runs the firmware, booted, and a sender.
+/// A machine that runs the firmware and has booted, and a sender.
 pub fn booted(board: &'static Board) -> (Machine, Host) {
     let (mut machine, mut host) = (firmware(board), Host::new(LINES_IN_FLIGHT));
     host.boot(&mut machine, 1_000).unwrap();
     (machine, host)
 }
 
-/// Sends a line that must be taken.
+/// Sends a line that must be accepted.
 pub fn set(machine: &mut Machine, host: &mut Host, line: &str) {
     let response = host.ask(machine, line, 5_000).unwrap();
     assert_eq!(response.status, 0, "{line} is answered by {}", response.raw);
@@ -123,17 +123,17 @@ pub fn set(machine: &mut Machine, host: &mut Host, line: &str) {
 
 /// Cycles in a millisecond.
 pub const MS: u64 = 16_000;
-/// Bits of a byte on the wire at 115,200 baud, in cycles.
+/// Time of a byte on the wire at 115,200 baud, in cycles.
 const BYTE: u64 = 1_389;
 
-/// Sends a byte before all others, and returns the cycle at which its last bit has come.
+/// Sends a byte ahead of all others, and returns the cycle at which its last bit has come.
 pub fn say_now(machine: &mut Machine, byte: u8) -> u64 {
     let sent = machine.wire().sent() + 1;
     machine.send_now(byte);
     last_bit(machine, sent)
 }
 
-/// Sends a line behind none, and returns the cycle at which its last bit has come.
+/// Sends a line when no other is waiting, and returns the cycle at which its last bit has come.
 pub fn say_line(machine: &mut Machine, host: &mut Host, line: &str) -> u64 {
     let before = machine.wire().sent();
     host.send(machine, 0, line);
@@ -141,7 +141,7 @@ pub fn say_line(machine: &mut Machine, host: &mut Host, line: &str) -> u64 {
     last_bit(machine, before + bytes)
 }
 
-/// Runs until so many bytes have been sent, and returns the cycle at which the last of them has come.
+/// Runs until `sent` bytes have been sent, and returns the cycle at which the last bit of the last byte has come.
 fn last_bit(machine: &mut Machine, sent: u64) -> u64 {
     while machine.wire().sent() < sent {
         machine.run_until(machine.cycle() + 16).unwrap();

@@ -1,6 +1,7 @@
-//! A test for each row of a bench, and one that no row is without a test.
+//! Makes a test for each row of a bench, and one test that no row is without a test.
 
-/// Tests by their names, each with the row that it passes to `keeps_to_its_floor`. An attribute in front is every test's but the last one's.
+/// Makes tests by their names. Each passes its row to `keeps_to_its_floor`. An attribute in front applies to every
+/// test but the last.
 macro_rules! rows {
     ($(#[$attribute:meta])? $($test:ident = $name:literal;)+) => {
         rows! { @tests [$(#[$attribute])?] $($test = $name;)+ }

@@ -7,7 +7,7 @@ use kerf_sim::{AUX, Machine};
 
 use crate::side::Side;
 
-/// Where carriages stand at power-up, in steps from a hard end.
+/// Position of the carriages at power-up, in steps from a hard end.
 const START: f64 = 1e8;
 
 impl Side for Machine {
@@ -60,7 +60,7 @@ impl Side for Machine {
         if switches.is_empty() && pulses == 0 {
             return;
         }
-        // Lengths are steps, from far off any hard end.
+        // Lengths are in steps, and the carriages stand far from any hard end.
         let mut build = Build::of(self.board());
         for axis in &mut build.axes {
             (axis.steps_per_mm, axis.travel, axis.start) = (1.0, f64::INFINITY, START);
@@ -79,10 +79,10 @@ impl Side for Machine {
         if pulses > 0 {
             build.spindle.sensors = Sensors::of(self.board(), pulses);
             if let Some(sensors) = build.spindle.sensors.as_mut().filter(|_| pulses == 1) {
-                // With a single pulse there is the index alone, as on the host.
+                // With a single pulse there is only the index, as on the host.
                 sensors.sync = None;
             }
-            // It turns by `turn_spindle` alone.
+            // Only `turn_spindle` turns the spindle.
             build.spindle.rpm = 0.0;
         }
         self.build(&build);

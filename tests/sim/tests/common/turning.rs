@@ -1,6 +1,7 @@
 //! A lathe on the simulated chip and its sender, in TinyG's or in grbl's dialect.
 //!
-//! X and Z have 200 steps/mm and 500 mm/s2, and no ends. What is said here in TinyG's names is said to the machine in its own dialect.
+//! X and Z have 200 steps/mm and 500 mm/s2, and no ends. Tests use TinyG's names; the machine is addressed in its own
+//! dialect.
 
 use kerf::boards::{Board, MEGA2560_GRBL_LATHE};
 use kerf_sim::mechanics::{Build, Sensors};
@@ -10,42 +11,43 @@ use crate::common::firmware;
 
 /// Steps of X and Z in a millimetre.
 pub const STEPS: f64 = 200.0;
-/// A step, mm.
+/// A step, mm, with a margin for rounding.
 pub const STEP: f64 = 1.0 / STEPS + 1e-9;
 const X: usize = 0;
 const Z: usize = 2;
-/// Cycles of a byte on the wire.
+/// Time of a byte on the wire, cycles.
 const BYTE: u64 = 1_389;
 /// Cycles of a quarter of a millisecond.
 const QUARTER_MS: u64 = 4_000;
-/// Edges of the index so soon behind one another are of one pulse.
+/// Edges of the index within this time belong to one pulse, ms.
 const BOUNCES_MS: u64 = 20;
-/// The longest wait for an answer, and for an end: minutes of a tap are none.
+/// Longest wait for an answer and for rest, ms. No tap takes minutes.
 const PATIENCE_MS: u64 = 20_000;
 
-/// How the machine says that it stands.
+/// The state that the machine reports.
 #[derive(Debug)]
 pub struct Status {
     /// `Idle`, `Run`, `Hold`, `Door`, `Alarm`.
     pub state: String,
-    /// Where it says X and Z are, mm.
+    /// The reported positions of X and Z, mm.
     pub at: [f64; 2],
-    /// How long the answer took from the last byte of the question to its own first one, ms.
+    /// Time from the last byte of the question to the first byte of the answer, ms.
     pub took_ms: f64,
 }
 
-/// What a pass has cut.
+/// The result of a pass.
 pub struct Cut {
-    /// Where X and Z were before it, in steps.
+    /// Positions of X and Z before the pass, in steps.
     pub start: [i64; 2],
-    /// Where they came to rest.
+    /// Positions of X and Z when they came to rest, in steps.
     pub end: [i64; 2],
-    /// Where they were at each index pulse.
+    /// Positions of X and Z at each index pulse, in steps.
     pub indexed: Vec<[i64; 2]>,
 }
 
 impl Cut {
-    /// How far X or Z were along a thread at index pulses, mm modulo its lead; without 1.5 leads at both ends.
+    /// Returns how far X or Z were along a thread at index pulses, mm modulo its lead. 1.5 leads at both ends are
+    /// left out.
     pub fn phases(&self, axis: usize, lead: f64) -> Vec<f64> {
         let length = (self.end[axis] - self.start[axis]).abs() as f64 / STEPS;
         let inside = 1.5 * lead..=length - 1.5 * lead;
@@ -54,13 +56,13 @@ impl Cut {
     }
 }
 
-/// How far two phases are apart, mm of a lead.
+/// Returns the distance between two phases of a lead, mm.
 pub fn apart(one: f64, other: f64, lead: f64) -> f64 {
     let off = (one - other) / lead;
     ((off - off.round()) * lead).abs()
 }
 
-/// The machine and what its sender hears.
+/// The machine, and what its sender hears.
 pub struct Lathe {
     pub machine: Machine,
     /// Whether it speaks grbl's dialect.
@@ -70,7 +72,7 @@ pub struct Lathe {
 }
 
 impl Lathe {
-    /// A board beside a spindle at rest with so many pulses a turn, whose sensors are changed.
+    /// A board beside a spindle at rest with this many pulses a turn; `change` changes its sensors.
     pub fn new(board: &'static Board, pulses: u32, change: impl Fn(&mut Sensors)) -> Self {
         let mut build = Build::lathe(board, pulses).unwrap();
         build.spindle.pwm = None;
@@ -78,7 +80,7 @@ impl Lathe {
         Self::of(board, &build, pulses)
     }
 
-    /// A board in a machine.
+    /// A board in a machine that is built this way.
     pub fn of(board: &'static Board, build: &Build, pulses: u32) -> Self {
         let mut machine = firmware(board);
         machine.build(build);
@@ -96,7 +98,7 @@ impl Lathe {
         lathe
     }
 
-    /// Has the spindle turn so fast, and waits until that is measured.
+    /// Turns the spindle at this speed, and waits until the firmware has measured it.
     pub fn turn(&mut self, rpm: f64) {
         self.machine.tamper(|mechanics, now| mechanics.force_spindle(rpm, now));
         self.run_for_ms(if rpm.abs() < 100.0 { 3_500 } else { 800 });
@@ -125,7 +127,7 @@ impl Lathe {
         self.listen();
     }
 
-    /// Sends a line. Its answer.
+    /// Sends a line and returns its answer.
     pub fn ask(&mut self, line: &str) -> String {
         let from = self.heard.len();
         self.machine.send(format!("{line}\n").as_bytes());
@@ -143,13 +145,13 @@ impl Lathe {
         panic!("no answer to {line}: {:?}", &self.heard[from..]);
     }
 
-    /// Sends a line, which has to be carried out.
+    /// Sends a line that must be executed.
     pub fn take(&mut self, line: &str) {
         let answer = self.ask(line);
         assert!(answer == "ok" || answer.contains("[1,0,"), "{line} is answered by {answer}");
     }
 
-    /// Sets something by TinyG's name, as `spn:4`.
+    /// Changes a setting, given with TinyG's name, as `spn:4`.
     pub fn set(&mut self, setting: &str) {
         let line = match self.grbl {
             true => format!("${}", setting.replace(':', "=")),
@@ -158,7 +160,7 @@ impl Lathe {
         self.take(&line);
     }
 
-    /// Asks for a setting or a value by TinyG's name.
+    /// Asks for a setting or a value, by TinyG's name.
     pub fn value(&mut self, name: &str) -> f64 {
         if self.grbl {
             self.take(&format!("${name}"));
@@ -170,7 +172,7 @@ impl Lathe {
         number(&answer, &format!("\"{name}\":"))
     }
 
-    /// Asks how the machine stands.
+    /// Asks for the state of the machine.
     pub fn status(&mut self) -> Status {
         let from = self.heard.len();
         let question: &[u8] = if self.grbl { b"?" } else { b"{stat:n,mpox:n,mpoz:n}\n" };
@@ -194,7 +196,7 @@ impl Lathe {
             if self.partial.starts_with(&begins.as_bytes()[..1]) {
                 answered.get_or_insert(self.machine.cycle());
             } else if !self.partial.is_empty() {
-                // Another line.
+                // Another line has come, not the answer.
                 answered = None;
             }
             let late = self.machine.cycle().saturating_sub(asked);
@@ -206,7 +208,7 @@ impl Lathe {
         }
     }
 
-    /// Asks on the other port. How long the answer took, ms.
+    /// Asks on the other port. Returns how long the answer took, ms.
     pub fn ask_other_port(&mut self) -> f64 {
         let (question, answer): (&[u8], &str) =
             if self.grbl { (b"?", "<") } else { (b"{mpoz:n}\n", "mpoz") };
@@ -225,17 +227,17 @@ impl Lathe {
         }
     }
 
-    /// The motors of X and Z, in steps.
+    /// Returns the positions of the motors of X and Z, in steps.
     pub fn motors(&self) -> [i64; 2] {
         [X, Z].map(|motor| self.machine.recorder().motors()[motor].position)
     }
 
-    /// Where X and Z were at index pulses from the `since`-th on, in steps.
+    /// Returns the positions of X and Z at index pulses from the `since`-th on, in steps.
     pub fn indexed(&self, since: usize) -> Vec<[i64; 2]> {
         let all = &self.machine.mechanics().unwrap().indexed()[since..];
         let mut kept: Vec<&(u64, _)> = Vec::new();
         for one in all {
-            // What a contact that bounces does behind its edge is no pulse.
+            // Edges of a contact that bounces are not pulses of their own.
             if kept.last().is_none_or(|last| one.0 > last.0 + self.machine.cycles(BOUNCES_MS)) {
                 kept.push(one);
             }
@@ -243,12 +245,12 @@ impl Lathe {
         kept.iter().map(|(_, steps): &&(u64, [i64; 4])| [steps[X], steps[Z]]).collect()
     }
 
-    /// How many index pulses there were.
+    /// Returns the number of index pulses so far.
     pub fn turns(&self) -> usize {
         self.machine.mechanics().unwrap().indexed().len()
     }
 
-    /// Begins a pass and runs until the axis of a thread has come so far, mm.
+    /// Begins a pass and runs until the axis of the thread has come `far` mm.
     pub fn begin(&mut self, line: &str, axis: usize, far: f64) {
         let start = self.motors()[axis];
         self.machine.send(format!("{line}\n").as_bytes());
@@ -259,7 +261,7 @@ impl Lathe {
         }
     }
 
-    /// Runs until nothing moves or waits to. How the machine stands then.
+    /// Runs until nothing moves or waits to move. Returns the state of the machine.
     pub fn rest(&mut self) -> Status {
         for _ in 0..PATIENCE_MS / 100 {
             let before = self.machine.recorder().steps();
@@ -272,7 +274,7 @@ impl Lathe {
         panic!("it does not come to rest: {:?}", self.heard);
     }
 
-    /// Cuts a line.
+    /// Executes a line and returns what it has cut.
     pub fn cut(&mut self, line: &str) -> Cut {
         let (start, since) = (self.motors(), self.turns());
         self.take(line);
@@ -281,13 +283,13 @@ impl Lathe {
         Cut { start, end: self.motors(), indexed: self.indexed(since) }
     }
 
-    /// Where the machine says that X and Z are, in steps, is where its motors are. A line may have ended between two steps.
+    /// Checks that the reported positions of X and Z agree with the motors. A line may have ended between two steps.
     pub fn agrees(&self, status: &Status, why: &str) {
         let told = status.at.map(|at| (at * STEPS).round() as i64);
         assert_eq!(told, self.motors(), "{status:?}: {why}");
     }
 
-    /// Leads the machine out of an alarm, and both axes back to 0.
+    /// Ends an alarm, and moves both axes back to 0.
     pub fn recover(&mut self) {
         self.take(if self.grbl { "$X" } else { "{clear:n}" });
         self.take("g90 g53 g0 x0 z0");
@@ -295,7 +297,8 @@ impl Lathe {
         assert_eq!(self.motors(), [0, 0], "the way back");
     }
 
-    /// How often an exception was told, by its number in TinyG's dialect, or its line in grbl's; and forgets what was heard.
+    /// Returns how often an exception was reported, by its number in TinyG's dialect or its line in grbl's. Forgets
+    /// what was heard.
     pub fn told(&mut self, exception: u16, line: &str) -> usize {
         let token = if self.grbl { line.to_string() } else { format!("\"st\":{exception},") };
         let is_it =
@@ -303,7 +306,7 @@ impl Lathe {
         self.heard.iter().filter(is_it).count()
     }
 
-    /// The exceptions that were told, as they stand; in grbl's dialect alarms and messages.
+    /// Returns the exceptions that were reported, as they came; in grbl's dialect alarms and messages.
     pub fn exceptions(&self) -> Vec<&str> {
         let begins = if self.grbl { ["ALARM:", "[MSG:"] } else { ["{\"er\"", "{\"er\""] };
         let is_one = |one: &&String| begins.iter().any(|begin| one.starts_with(begin));

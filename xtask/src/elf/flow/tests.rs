@@ -1,8 +1,8 @@
-//! Small programs whose stack is known.
+//! Small programs whose stack use is known.
 
 use super::*;
 
-/// One instruction each two bytes from address 0.
+/// Returns code with one instruction every two bytes from address 0.
 fn code(lines: &[&str]) -> Code {
     let rows = lines.iter().enumerate().map(|(i, l)| format!(" {:x}:\t{l}\n", 2 * i));
     Code::parse(&rows.collect::<String>())
@@ -80,7 +80,7 @@ fn a_prologue_that_is_called_leaves_more_on_the_stack() {
     let rest =
         ["out\t0x3d, r28", "rjmp\t.+2\t; 0x1c", "nop", "push\tr30", "push\tr31", "push\tr0", "ret"];
     let flow = follow(&code(&[&calls[..], &takes, &rest].concat()), 0, &marks);
-    // Two registers, a frame of five and the return address; behind that no deeper.
+    // Two registers, a frame of five and the return address. Behind that it gets no deeper.
     assert_eq!(flow.frame, 2 + 5 + 3);
     assert!(flow.calls.is_empty());
     let two = ["ldi\tr26, 0x2c", "ldi\tr27, 0x01", "rcall\t.+2\t; 0x8", "ret"];

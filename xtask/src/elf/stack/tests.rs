@@ -1,4 +1,4 @@
-//! A small image with two executors, whose stack is known.
+//! A small image with two executors, whose stack use is known.
 
 use super::*;
 use crate::elf::{Sizes, Symbol};
@@ -78,7 +78,7 @@ fn levels_add_up() {
     // main 3 + call 3, executor 1 + call 3, shallow 2 + call 3, wake 4.
     assert_eq!(stack.main.bytes(), 19);
     assert_eq!(names(&stack.main)[3], "wake");
-    // Entry 3, push 1 + call 3, executor 1 + call 3, then wake's 4 exceed exec's 3.
+    // Entry 3, push 1 + call 3, executor 1 + call 3. Then the 4 of `wake` exceed the 3 of `exec`.
     assert_eq!(stack.nesting.len(), 1);
     assert_eq!(stack.nesting[0].root(), "__vector_55");
     assert_eq!(stack.nesting[0].bytes(), 15);

@@ -3,7 +3,7 @@
 use super::{PLANES, Program, offset};
 
 impl Program {
-    /// Canned cycles from above R, which falls from line to line.
+    /// Adds canned cycles that begin above R, which falls from line to line.
     pub(super) fn series(&mut self) {
         let depth = PLANES[self.plane][2];
         self.distance(false);
@@ -12,7 +12,7 @@ impl Program {
         self.say("M3 S100");
         let incremental = self.dice.below(3) == 0;
         self.distance(incremental);
-        // G91 with G99, and G85 with G98, are not understood alike.
+        // The interpreters read G91 with G99, and G85 with G98, differently.
         let to_r = !incremental && self.dice.below(2) == 0;
         self.say(if to_r { "G99" } else { "G98" });
         let mut retract = 40;
@@ -34,11 +34,12 @@ impl Program {
         };
         let mut code = self.dice.of(codes).to_owned();
         if code.ends_with('Q') {
-            // No part of a depth: the other interpreter's sum of them may just miss the bottom.
+            // The peck is no divisor of a depth, because the other interpreter's sum of pecks may just miss the
+            // bottom.
             code += self.dice.of(if self.inch { &["0.137", "0.171"] } else { &["3.37", "5.71"] });
         }
         if code == "G87" {
-            // Up to above the bottom and below R, wherever that is counted from.
+            // The value is above the bottom and below R, wherever it is counted from.
             let top = self.number(1_000);
             code += &offset(depth, &top);
             for axis in [first, second] {

@@ -1,4 +1,4 @@
-//! Rules for addresses: pointers that are near one another, and places far in the frame.
+//! Rules for addresses: pointers that are near each other, and places far away in the frame.
 
 use super::super::text::{Insn, Line};
 use super::effect::{self, bit, operands, pair, register};
@@ -7,7 +7,7 @@ use super::offsets::subtracted;
 use super::rules::{Edit, Place};
 
 impl Place<'_> {
-    /// Keeps flags that nobody needs, and puts them back.
+    /// Removes a save and restore of flags that nobody needs.
     pub(super) fn kept(&self) -> Option<Edit> {
         let out = self.flow.restores[self.at]?;
         let kept = register(operands(self.insn).0)?;
@@ -17,7 +17,7 @@ impl Place<'_> {
         (is_ours && !is_needed).then(|| vec![(self.at, None), (out, None)])
     }
 
-    /// Moves a pair back, and on again.
+    /// Joins two successive additions to a pair, forth or back, into one.
     pub(super) fn moved(&self) -> Option<Edit> {
         let next = self.insn_at(self.at + 1)?;
         let way = |insn: &Insn| {
@@ -40,7 +40,7 @@ impl Place<'_> {
         Some(vec![(self.at, moving(&pair, sum)), (self.at + 1, None)])
     }
 
-    /// Makes an address of one that is far, where another pair is near.
+    /// Computes an address from another pair that is near it.
     ///
     /// ```text
     ///   movw r30, r24
@@ -70,7 +70,7 @@ impl Place<'_> {
             return Some([(self.at, step(way))].into_iter().chain(gone(self.at + 1)).collect());
         }
         let others = (0..32).step_by(2).filter(|pair| *pair != d && *pair != s);
-        // Two instructions for three.
+        // Two instructions replace three.
         let most = if last == self.at + 2 { 63 } else { 0 };
         let (pair, way) = others
             .filter_map(|pair| Some((pair, way(pair).filter(is_near)?)))
@@ -81,7 +81,7 @@ impl Place<'_> {
         Some(edit.into_iter().chain(gone(self.at + 2)).collect())
     }
 
-    /// Adds to a pointer what the accesses by it can add.
+    /// Lets accesses through a pointer do an addition to the pointer.
     ///
     /// ```text
     ///   adiw r30, 6
@@ -115,7 +115,7 @@ impl Place<'_> {
     }
 }
 
-/// An access by Z, to what is further away.
+/// Returns an access by Z to a place further away; `None` if there is none.
 fn further(insn: &Insn, number: i32) -> Option<Insn> {
     let (first, second) = operands(insn);
     let displaced = |operand: &str| {
@@ -132,12 +132,12 @@ fn further(insn: &Insn, number: i32) -> Option<Insn> {
     }
 }
 
-/// Whether a register is none of Z.
+/// Whether an operand is a register that is no half of Z.
 fn pointer_free(operand: &str) -> bool {
     register(operand).is_some_and(|register| register < 30)
 }
 
-/// What moves a pair by so much, 63 at most either way; nothing for 0.
+/// Returns the instruction that moves a pair by a distance, at most 63 either way; `None` for 0.
 fn moving(pair: &str, way: i32) -> Option<Insn> {
     let op = if way < 0 { "sbiw" } else { "adiw" };
     (way != 0).then(|| Insn::new(&format!("{op} {pair}, {}", way.abs())))

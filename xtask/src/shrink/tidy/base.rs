@@ -1,4 +1,4 @@
-//! Bytes of one variable are reached by a pointer.
+//! Accesses the bytes of one variable through a pointer.
 //!
 //! ```text
 //!   sts PLACE, r24                      ldi r30, lo8(PLACE)
@@ -9,8 +9,8 @@
 //!                                       std Z+3, r1
 //! ```
 //!
-//! An address takes two bytes in each `lds` and `sts`; four of them and more are worth a pointer, if Z is free. It costs two cycles, so that
-//! nothing is changed where interrupts are off.
+//! An address takes two bytes in each `lds` and `sts`. Four or more of them are worth a pointer, if Z is free. It
+//! costs two cycles, so nothing is changed where interrupts are off.
 
 use super::super::quiet;
 use super::super::text::{Function, Insn, Line};
@@ -18,9 +18,9 @@ use super::effect::{operands, pair, register};
 use super::flow::Flow;
 use super::needs::Needs;
 
-/// Fewer are not worth a pointer.
+/// Least number of accesses that are worth a pointer.
 const FEWEST: usize = 4;
-/// How far a pointer reaches.
+/// How far a pointer reaches, bytes.
 const REACH: i32 = 63;
 
 /// A `lds` or `sts`.
@@ -31,7 +31,7 @@ struct Access {
     offset: i32,
 }
 
-/// Has all runs of accesses to a variable go by a pointer; whether there was one.
+/// Lets all runs of accesses to a variable go through a pointer. Returns whether there was one.
 pub fn share(function: &mut Function, needs: &Needs) -> bool {
     let Some(flow) = Flow::of(function, needs) else { return false };
     let needed = flow.needed();
@@ -63,7 +63,7 @@ pub fn share(function: &mut Function, needs: &Needs) -> bool {
     any
 }
 
-/// The accesses to one variable from a line on, as far as Z is not touched and nothing else runs between.
+/// Returns the accesses to one variable from a line on, up to where Z is touched or other code runs.
 fn run(flow: &Flow, first: usize) -> Vec<Access> {
     let mut run: Vec<Access> = Vec::new();
     let Some(symbol) = flow.insn(first).and_then(variable).map(|(symbol, _)| symbol) else {
@@ -90,7 +90,7 @@ fn run(flow: &Flow, first: usize) -> Vec<Access> {
     run
 }
 
-/// The variable that an instruction reads or writes, and where in it.
+/// Returns the variable that an instruction reads or writes, and the offset in it.
 fn variable(insn: &Insn) -> Option<(&str, i32)> {
     let (first, second) = operands(insn);
     let address = match insn.op.as_str() {

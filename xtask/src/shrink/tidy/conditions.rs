@@ -1,4 +1,5 @@
-//! Rules for conditions: comparisons that are made already, and branches on what was made of one.
+//! Rules for conditions: comparisons that have been made already, and branches on a 0 or 1 that was made from a
+//! condition.
 
 use super::super::text::Insn;
 use super::super::text::Line;
@@ -7,7 +8,7 @@ use super::flow::immediate;
 use super::rules::{Edit, Place};
 
 impl Place<'_> {
-    /// Compares a register with 0 whose value set the flags alike.
+    /// Removes a comparison of a register with 0 if computing its value has set the same flags.
     pub(super) fn compare(&self) -> Option<Edit> {
         let d = self.tested()?;
         let needed = self.needed[self.at] & effect::FLAGS;
@@ -34,7 +35,7 @@ impl Place<'_> {
         None
     }
 
-    /// The register that is compared with 0 here.
+    /// Returns the register that is compared with 0 here.
     pub(super) fn tested(&self) -> Option<u8> {
         let (first, second) = operands(self.insn);
         let is_test = match self.insn.op.as_str() {
@@ -47,7 +48,7 @@ impl Place<'_> {
         is_test.then(|| register(first))?
     }
 
-    /// Compares a pair with 0 byte by byte.
+    /// Compares a pair with 0 in one instruction instead of byte by byte.
     pub(super) fn word(&self) -> Option<Edit> {
         let high = self.insn_at(self.at + 1)?;
         let of = |insn: &Insn, op: &str| {
@@ -73,7 +74,7 @@ impl Place<'_> {
         Some(vec![(self.at, Some(Insn::new(&insn))), (self.at + 1, None)])
     }
 
-    /// Makes 0 or 1 of a condition, and branches on that.
+    /// Branches directly on a condition, instead of on a 0 or 1 that is made from it.
     ///
     /// ```text
     ///   ldi  r24, 1
@@ -143,7 +144,7 @@ impl Place<'_> {
             (*self.flow.labels.get(branch.args.as_str())?, self.flow.skip_labels(at + 1));
         let (so, not) = if on_so { (there, here) } else { (here, there) };
         let is_needed = |at: usize, what: Set| self.flow.needed_before(at, self.needed) & what != 0;
-        // Where the condition is true the register holds what it should.
+        // Where the condition is true the register already holds the right value.
         let is_free = self.needed[at] & effect::FLAGS == 0
             && !is_needed(not, bit(x))
             && !(is_masked && is_needed(so, bit(x)));

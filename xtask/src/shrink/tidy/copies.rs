@@ -1,24 +1,24 @@
-//! Which registers hold the same, wherever control comes from.
+//! Finds which registers hold the same value, wherever control comes from.
 
 use super::super::text::{Insn, Line};
 use super::effect::{Effect, Set, bit, operands, pair, register};
 use super::flow::Flow;
 
-/// Of each register: the one that stands for all that hold the same.
+/// For each register: the register that represents all registers with the same value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Copies {
     roots: [u8; 32],
 }
 
 impl Default for Copies {
-    /// Any two may differ.
+    /// No two registers are known to hold the same value.
     fn default() -> Copies {
         Copies { roots: std::array::from_fn(|register| register as u8) }
     }
 }
 
 impl Copies {
-    /// Of each line: what holds before it, on every way that leads there.
+    /// Returns for each line what is true before it on every path that leads there.
     pub fn of(flow: &Flow) -> Vec<Copies> {
         let mut before: Vec<Option<Copies>> = vec![None; flow.lines.len()];
         let mut open = Vec::new();
@@ -43,12 +43,12 @@ impl Copies {
         before.into_iter().map(Option::unwrap_or_default).collect()
     }
 
-    /// The register that stands for all that hold the same as this.
+    /// Returns the register that represents all registers with the same value as this one.
     pub fn root(&self, register: u8) -> u8 {
         self.roots[usize::from(register)]
     }
 
-    /// What holds in both.
+    /// Returns what is true in both.
     fn and(&self, other: &Copies) -> Copies {
         let mut both = Copies::default();
         for register in 0..32 {
@@ -84,7 +84,8 @@ impl Copies {
         behind
     }
 
-    /// A register gets another value: one of the others stands for those that it stood for.
+    /// Takes note that a register gets another value. One of the others now represents the registers that it
+    /// represented.
     fn forget(&mut self, register: u8) {
         self.roots[usize::from(register)] = register;
         let next =

@@ -1,8 +1,8 @@
-//! What an instruction reads and writes.
+//! What each instruction reads and writes.
 
 use super::super::text::{Insn, Line};
 
-/// Registers 0 to 31, then the flags, a bit each.
+/// A set of registers and flags: a bit for each of the registers 0 to 31, then for the flags.
 pub type Set = u64;
 
 pub const C: Set = 1 << 32;
@@ -13,40 +13,40 @@ pub const S: Set = 1 << 36;
 pub const H: Set = 1 << 37;
 pub const T: Set = 1 << 38;
 
-/// What arithmetic writes.
+/// Flags that arithmetic writes.
 const SUM: Set = C | Z | N | V | S | H;
-/// What logic writes.
+/// Flags that logic writes.
 const LOGIC: Set = Z | N | V | S;
-/// What shifts to the right and additions to pairs write.
+/// Flags that right shifts and additions to pairs write.
 const SHIFT: Set = C | Z | N | V | S;
 pub const FLAGS: Set = SUM | T;
 pub const REGISTERS: Set = u32::MAX as Set;
 pub const ALL: Set = REGISTERS | FLAGS;
 
-/// Registers that a function hands back as they were.
+/// Registers that a function returns unchanged.
 pub const KEPT: Set = range(2, 17) | range(28, 29);
-/// Where arguments lie.
+/// Registers of arguments.
 pub const ARGUMENTS: Set = range(8, 25);
-/// Where results lie.
+/// Registers of results.
 pub const RESULTS: Set = range(18, 25);
-/// What a call leaves undefined.
+/// Registers and flags that a call leaves undefined.
 const LOST: Set = bit(0) | range(26, 27) | range(30, 31) | FLAGS;
 
 /// What an instruction does to registers and flags.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Effect {
-    /// What it depends on.
+    /// What the result depends on.
     pub reads: Set,
-    /// What it always writes.
+    /// What is always written.
     pub writes: Set,
-    /// What it may write besides.
+    /// What may also be written.
     pub spoils: Set,
-    /// It does more than that: memory, ports, the stack, where the program goes on.
+    /// Whether it does more: memory, ports, the stack, or control flow.
     pub acts: bool,
 }
 
 impl Effect {
-    /// Of what is not known.
+    /// The effect of unknown code.
     pub const UNKNOWN: Effect = Effect { reads: ALL, writes: 0, spoils: ALL, acts: true };
 
     fn pure(reads: Set, writes: Set) -> Option<Effect> {
@@ -57,7 +57,7 @@ impl Effect {
         Some(Effect { reads, writes, spoils: 0, acts: true })
     }
 
-    /// All that may have another value behind it.
+    /// Returns all that may have another value afterwards.
     pub fn changes(&self) -> Set {
         self.writes | self.spoils
     }
@@ -75,21 +75,22 @@ pub const fn pair(register: u8) -> Set {
     3 << register
 }
 
-/// The register that an operand names.
+/// Returns the register that an operand names.
 pub fn register(operand: &str) -> Option<u8> {
     operand.strip_prefix('r')?.parse().ok().filter(|number| *number < 32)
 }
 
 /// The operands of an instruction, at most two.
 pub fn operands(insn: &Insn) -> (&str, &str) {
-    // A search for a character is many times as fast as one for a text, and this is asked more often than anything else.
+    // A search for a character is many times as fast as a search for a text, and this function is called more often
+    // than any other.
     match insn.args.split_once(',') {
         Some((first, second)) => (first, second.trim_start()),
         None => (&insn.args, ""),
     }
 }
 
-/// The pointer that a memory operand goes by, and what is added to it.
+/// Returns the pointer of a memory operand, and what is added to it.
 pub fn place(operand: &str) -> Option<(u8, &str)> {
     let base = match operand.get(..1)? {
         "X" => 26,
@@ -100,7 +101,7 @@ pub fn place(operand: &str) -> Option<(u8, &str)> {
     Some((base, &operand[1..]))
 }
 
-/// What a line does.
+/// Returns the effect of a line.
 pub fn of_line(line: &Line) -> Effect {
     match line {
         Line::Insn(insn) => of(insn).unwrap_or(Effect::UNKNOWN),
@@ -109,7 +110,7 @@ pub fn of_line(line: &Line) -> Effect {
     }
 }
 
-/// What an instruction does, if it is known.
+/// Returns the effect of an instruction; `None` if it is unknown.
 pub fn of(insn: &Insn) -> Option<Effect> {
     let (first, second) = operands(insn);
     let (d, s) = (register(first), register(second));
@@ -166,7 +167,7 @@ pub fn of(insn: &Insn) -> Option<Effect> {
     }
 }
 
-/// The flag that a branch asks for.
+/// Returns the flag that a branch tests.
 pub fn branch(op: &str) -> Option<Set> {
     match op {
         "breq" | "brne" => Some(Z),

@@ -1,8 +1,9 @@
-//! Runs two functions side by side: whether one does what the other does.
+//! Runs two functions side by side, to check that the second does what the first does.
 //!
-//! Both run from each label that both have to the next, from registers that hold random values. They must read and write memory
-//! alike, call alike, arrive at one label, and arrive there with all that is needed. What [`super::flow`] says is put to the test
-//! on the way: registers that it says nobody needs hold different values in the two, and those that arrive must be as it says.
+//! Both run from each common label to the next, from registers with random values. They must read and write memory
+//! alike, call alike, and arrive at the same label with equal values in all registers that are needed. This also
+//! tests the results of [`super::flow`]: registers that it declares unneeded hold different values in the two, and
+//! the values on arrival must be as it says.
 
 use std::collections::HashMap;
 
@@ -15,13 +16,13 @@ use super::flow::{Flow, Known};
 use super::needs::Needs;
 use super::run::{End, Run};
 
-/// How often each piece runs.
+/// How often each piece is run.
 const TRIALS: u64 = 12;
 
 /// Fails if the last of several versions of a function does anything else than the first.
 ///
-/// What is true of a version may follow from what became of it on the way: where the last does not match the first, those between
-/// are compared, too.
+/// A fact about a version may follow from an earlier change. So where the last version does not match the first, the
+/// versions between them are compared, too.
 pub fn check(versions: &[Function], needs: &Needs) -> Result<()> {
     let [first, .., last] = versions else { return Ok(()) };
     let refused = match function(first, last, needs) {
@@ -55,7 +56,7 @@ fn function(old: &Function, new: &Function, needs: &Needs) -> Result<()> {
     Ok(())
 }
 
-/// The labels where a piece ends: not those that lead straight on.
+/// Returns the labels where a piece ends: those that do not lead straight on.
 fn stops<'a>(flow: &Flow<'a>) -> HashMap<&'a str, ()> {
     let leads_on = |at: usize| {
         let insn = flow.lines[at..].iter().find(|line| !matches!(line, Line::Label(_)));
@@ -68,11 +69,11 @@ struct Pieces<'a> {
     old: Flow<'a>,
     new: Flow<'a>,
     stops: HashMap<&'a str, ()>,
-    /// Of the new one: what is needed behind each line.
+    /// For each line of the new function: what is needed behind it.
     needed: Vec<Set>,
-    /// Of the old one: what is known before each line.
+    /// For each line of the old function: what is known before it.
     known: Vec<Known>,
-    /// Of the old one: which registers hold the same before each line.
+    /// For each line of the old function: which registers hold the same value before it.
     copies: Vec<Copies>,
 }
 
@@ -104,7 +105,7 @@ impl Pieces<'_> {
         ensure!(all == made, "{made} things are done instead of {all}, {:?}", first.log.last());
         let at = match ends {
             (End::At(a), End::At(b)) => {
-                // Two labels may stand at one place, or one lead to the other.
+                // Two labels may stand at one place, or one may lead to the other.
                 let place = |label: &str| self.old.destination(label);
                 ensure!(place(&a) == place(&b), "it goes to {b} instead of {a}");
                 (self.old.labels[a.as_str()], self.new.labels[a.as_str()])

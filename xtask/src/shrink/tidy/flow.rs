@@ -1,4 +1,4 @@
-//! Where a function goes from each of its lines, which values are needed there, and what is known of them.
+//! The control flow of a function, the values that are needed at each line, and what is known of them.
 
 use std::collections::HashMap;
 
@@ -6,26 +6,27 @@ use super::super::text::{Function, Insn, Line};
 use super::effect::{self, Effect, Set};
 use super::needs::Needs;
 
-/// The code of a function, line by line, and where it goes.
+/// The code of a function, line by line, and its control flow.
 pub struct Flow<'a> {
-    /// What makes code, and labels.
+    /// The lines that make code, and labels.
     pub lines: Vec<&'a Line>,
-    /// Where these stand among the lines of the function.
+    /// Index of each of these lines among all lines of the function.
     pub origins: Vec<usize>,
     pub effects: Vec<Effect>,
-    /// Where it goes on behind each line: nowhere, to one line or to two.
+    /// For each line, the lines that may run next: none, one or two.
     pub next: Vec<Vec<usize>>,
-    /// An instruction before may skip this one.
+    /// Whether the instruction before may skip this one.
     pub may_be_skipped: Vec<bool>,
     pub labels: HashMap<&'a str, usize>,
-    /// Instructions in assembler of the source whose effect is known.
+    /// Instructions in assembler from the source whose effect is known.
     pub fixed: HashMap<usize, Insn>,
-    /// Of each line that keeps the status register: the line that puts it back.
+    /// For each line that saves the status register: the line that restores it.
     pub restores: Vec<Option<usize>>,
 }
 
 impl<'a> Flow<'a> {
-    /// None if the function goes where nobody knows. `needs` are those of all functions.
+    /// Returns the flow of a function; `None` if it has jumps to unknown places. `needs` are the needs of all
+    /// functions.
     pub fn of(function: &'a Function, needs: &Needs) -> Option<Flow<'a>> {
         let code =
             function.lines.iter().enumerate().filter(|(_, line)| !matches!(line, Line::Note(_)));
@@ -63,7 +64,7 @@ impl<'a> Flow<'a> {
         Some(flow)
     }
 
-    /// The instruction of a line, also one of assembler of the source whose effect is known.
+    /// Returns the instruction of a line, including one in assembler from the source whose effect is known.
     pub fn insn(&self, at: usize) -> Option<&Insn> {
         match self.lines.get(at)? {
             Line::Insn(insn) => Some(insn),
@@ -72,7 +73,7 @@ impl<'a> Flow<'a> {
         }
     }
 
-    /// Where what `in r0, 63` keeps is put back: straight on, with nothing but that reading the register.
+    /// Returns where the status that `in r0, 63` saves is restored: straight on, with no other use of the register.
     fn restored(&self, at: usize) -> Option<usize> {
         let kept = kept_status(self.insn(at)?).filter(|_| !self.may_be_skipped[at])?;
         for out in at + 1..self.lines.len() {
@@ -91,9 +92,9 @@ impl<'a> Flow<'a> {
         None
     }
 
-    /// What a line reads, if that is needed which is needed behind each line.
+    /// Returns what a line reads, given what is needed behind each line.
     ///
-    /// Flags that are kept and put back are read if they are needed then.
+    /// Flags that are saved and restored are read if they are needed where they are restored.
     fn reads(&self, at: usize, needed: &[Set]) -> Set {
         let reads = self.effects[at].reads;
         let Some(out) = self.restores[at] else { return reads };
@@ -104,12 +105,12 @@ impl<'a> Flow<'a> {
         reads & !effect::FLAGS | needed[out] & effect::FLAGS
     }
 
-    /// The first line at or behind a line that is no label.
+    /// Returns the first line at or behind a line that is no label.
     pub fn skip_labels(&self, at: usize) -> usize {
         self.lines[at..].iter().take_while(|line| matches!(line, Line::Label(_))).count() + at
     }
 
-    /// The line that runs first at a label and is no jump. Where jumps lead in a circle it is one of them.
+    /// Returns the first line that runs at a label and is no jump. If jumps lead in a circle it is one of them.
     pub fn destination(&self, label: &str) -> usize {
         let mut at = self.skip_labels(self.labels[label]);
         for _ in 0..self.labels.len() {
@@ -123,7 +124,7 @@ impl<'a> Flow<'a> {
         at
     }
 
-    /// Of each line: what is needed behind it.
+    /// Returns for each line what is needed behind it.
     pub fn needed(&self) -> Vec<Set> {
         let mut before = vec![0; self.lines.len()];
         let mut behind = vec![0; self.lines.len()];
@@ -141,14 +142,14 @@ impl<'a> Flow<'a> {
         behind
     }
 
-    /// What is needed before a line, if that is needed which is needed behind each line.
+    /// Returns what is needed before a line, given what is needed behind each line.
     pub fn needed_before(&self, at: usize, needed: &[Set]) -> Set {
         let Some(effect) = self.effects.get(at) else { return 0 };
         let written = if self.may_be_skipped[at] { 0 } else { effect.writes };
         needed[at] & !written | self.reads(at, needed)
     }
 
-    /// Of each line: what is known of the registers before it.
+    /// Returns for each line what is known of the registers before it.
     pub fn known(&self) -> Vec<Known> {
         let mut before: Vec<Option<Known>> = vec![None; self.lines.len()];
         let mut open = Vec::new();
@@ -174,7 +175,8 @@ impl<'a> Flow<'a> {
     }
 }
 
-/// The effect of a line: a call reads what that function needs, a return what callers need of this one.
+/// Returns the effect of a line with regard to needs: a call reads what the called function needs, and a return reads
+/// what callers need.
 fn as_needed(effect: Effect, line: &Line, name: &str, needs: &Needs) -> Effect {
     let Line::Insn(insn) = line else { return effect };
     let reads = match insn.op.as_str() {
@@ -185,18 +187,18 @@ fn as_needed(effect: Effect, line: &Line, name: &str, needs: &Needs) -> Effect {
     Effect { reads, ..effect }
 }
 
-/// The register that an instruction keeps the status register in.
+/// Returns the register in which an instruction saves the status register.
 fn kept_status(insn: &Insn) -> Option<u8> {
     let (first, second) = effect::operands(insn);
     if insn.op == "in" && second == "63" { effect::register(first) } else { None }
 }
 
-/// Pieces of assembler of the source whose effect is known.
+/// Pieces of assembler from the source whose effect is known.
 #[derive(Default)]
 struct Pieces {
-    /// Instructions of those that run straight on, by their lines.
+    /// Instructions of pieces that run straight on, by their lines.
     straight: HashMap<usize, Insn>,
-    /// Of each line of those that go to places of their own: what the whole piece may do.
+    /// For each line of a piece with jumps within it: the possible effect of the whole piece.
     winding: HashMap<usize, Effect>,
 }
 
@@ -243,7 +245,7 @@ fn is_skip(line: &Line) -> bool {
     matches!(line, Line::Insn(insn) if insn.is_skip())
 }
 
-/// Where it goes on behind a line.
+/// Returns the lines that may run behind a line.
 fn next(lines: &[&Line], labels: &HashMap<&str, usize>, at: usize) -> Option<Vec<usize>> {
     let follows = (at + 1 < lines.len()).then_some(at + 1);
     let Line::Insn(insn) = lines[at] else { return Some(follows.into_iter().collect()) };
@@ -251,7 +253,7 @@ fn next(lines: &[&Line], labels: &HashMap<&str, usize>, at: usize) -> Option<Vec
     match insn.op.as_str() {
         "ret" | "jmp" => Some(Vec::new()),
         "rjmp" => Some(vec![to()?]),
-        // Were it to return, the next function would follow.
+        // If this call returned, it would run into the next function.
         "call" if follows.is_none() => Some(Vec::new()),
         _ if effect::branch(&insn.op).is_some() => Some(vec![to()?, follows?]),
         "cpse" | "sbrc" | "sbrs" | "sbic" | "sbis" => {
@@ -262,7 +264,7 @@ fn next(lines: &[&Line], labels: &HashMap<&str, usize>, at: usize) -> Option<Vec
     }
 }
 
-/// Which bits of each register are 0 for certain, and which 1.
+/// The bits of each register that are known to be 0, and those known to be 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Known {
     registers: [Bits; 32],
@@ -285,7 +287,7 @@ impl Bits {
 }
 
 impl Known {
-    /// Register 1 is 0 wherever a function begins.
+    /// Register 1 is 0 at the beginning of every function.
     fn at_entry() -> Known {
         let mut known = Known::default();
         known.registers[1] = Bits::of(0);
@@ -308,7 +310,7 @@ impl Known {
         Known { registers: std::array::from_fn(both) }
     }
 
-    /// What is known behind a line.
+    /// Returns what is known behind a line.
     pub fn behind(&self, line: &Line, insn: Option<&Insn>, effect: &Effect) -> Known {
         let mut known = *self;
         for (number, register) in known.registers.iter_mut().enumerate() {
@@ -316,7 +318,7 @@ impl Known {
                 *register = Bits::default();
             }
         }
-        // Assembler of the source leaves register 1 as it was.
+        // Assembler from the source leaves register 1 unchanged.
         if matches!(line, Line::Fixed(_)) && insn.is_none() {
             known.registers[1] = self.registers[1];
         }
@@ -356,7 +358,7 @@ impl Known {
     }
 }
 
-/// An operand that is a number, as a byte.
+/// Returns an operand that is a number, as a byte.
 pub fn immediate(operand: &str) -> Option<u8> {
     let number: i32 = operand.parse().ok()?;
     u8::try_from(number & 0xFF).ok()

@@ -1,4 +1,4 @@
-//! What a jump leads to stands behind it.
+//! Puts code behind the jump that leads to it.
 //!
 //! ```text
 //!   rjmp .L2                      .L2:
@@ -10,8 +10,8 @@
 //!   ret
 //! ```
 //!
-//! Code that nothing falls into may stand anywhere in its function. Behind a jump to it it saves the jump, in flash and in time, as long as
-//! every branch still reaches where it goes.
+//! Code into which no other code falls through may stand anywhere in its function. Behind a jump to it, it makes the
+//! jump unnecessary, which saves flash and time. Every branch must still reach its destination.
 
 use std::collections::HashMap;
 
@@ -19,7 +19,7 @@ use super::super::branch::REACH;
 use super::super::text::{Function, Line};
 use super::effect;
 
-/// Puts code behind the jumps to it; whether any was moved.
+/// Puts code behind the jumps to it. Returns whether any code was moved.
 pub fn arrange(function: &mut Function) -> bool {
     let mut pieces = pieces(&function.lines);
     let mut moved = false;
@@ -36,14 +36,15 @@ pub fn arrange(function: &mut Function) -> bool {
     moved
 }
 
-/// Lines that run on to the next: nothing falls into the first of them but where the function begins.
+/// Lines that run on from one to the next. No code falls through into the first of them, except at the beginning of
+/// the function.
 #[derive(Clone)]
 struct Piece {
     lines: Vec<Line>,
 }
 
 impl Piece {
-    /// The place that the jump at its end leads to.
+    /// Returns the label that the jump at its end leads to.
     fn target(&self) -> Option<&str> {
         match self.lines.last()? {
             Line::Insn(insn) if insn.op == "rjmp" => Some(&insn.args),
@@ -60,7 +61,7 @@ impl Piece {
     }
 }
 
-/// The pieces of a function. What the last one ends with stays at the end.
+/// Returns the pieces of a function. The last piece stays at the end.
 fn pieces(lines: &[Line]) -> Vec<Piece> {
     let mut pieces = vec![Piece { lines: Vec::new() }];
     let mut may_be_skipped = false;
@@ -80,7 +81,8 @@ fn pieces(lines: &[Line]) -> Vec<Piece> {
     pieces
 }
 
-/// The pieces with the one that begins with a label behind another, whose jump goes, and where the two are: if all branches reach then.
+/// Moves the piece that begins with a label behind another piece, whose jump is removed. Returns the new pieces and
+/// the index of the pair; `None` if a branch would no longer reach.
 fn behind(pieces: &[Piece], at: usize, label: &str) -> Option<(Vec<Piece>, usize)> {
     let to = pieces.iter().position(|piece| piece.begins(label))?;
     if to == at || to == 0 || to + 1 == pieces.len() {
@@ -99,7 +101,7 @@ fn behind(pieces: &[Piece], at: usize, label: &str) -> Option<(Vec<Piece>, usize
     Some((better, at))
 }
 
-/// Whether every branch from one piece to another reaches: those within a piece go no farther than they did.
+/// Whether every branch from one piece to another reaches. Branches within a piece do not get longer.
 fn all_reach(pieces: &[Piece]) -> bool {
     let mut place = 0;
     let mut labels: HashMap<&str, (usize, usize)> = HashMap::new();
@@ -113,7 +115,7 @@ fn all_reach(pieces: &[Piece]) -> bool {
                     }
                     place += insn.size();
                 }
-                // What a line of the source takes is not known: no branch goes past it.
+                // The size of assembler from the source is unknown, so no branch goes past it.
                 Line::Fixed(_) => place += REACH + 1,
                 Line::Label(label) => drop(labels.insert(label, (number, place))),
                 Line::Note(_) => {}
@@ -151,7 +153,7 @@ mod tests {
     fn what_is_fallen_into_stays() {
         for text in [
             "cpi r24, 1\nbreq .LBB0_1\nret\n.LBB0_1:\nwdr\n.LBB0_2:\nret\n.LBB0_3:\nrjmp .LBB0_2",
-            // The jump may be skipped, and what follows it is fallen into.
+            // The jump may be skipped, so the code behind it is reached by falling through.
             "sbrc r24, 0\nrjmp .LBB0_2\n.LBB0_1:\nret\n.LBB0_2:\nwdr\nret\n.LBB0_3:\nret",
             ".LBB0_1:\nwdr\nrjmp .LBB0_1",
             // The last piece may end with a call that never returns.

@@ -1,4 +1,4 @@
-//! What is known between two labels: which registers hold copies, and which hold what lies in the frame.
+//! What is known between two labels: which registers hold copies, and which hold values of the frame.
 
 use super::super::text::{Insn, Line};
 use super::copies::Copies;
@@ -9,13 +9,13 @@ use super::offsets::Offsets;
 /// What is known before a line.
 #[derive(Clone, Default)]
 pub struct Local {
-    /// Of each register: another that has the same value.
+    /// For each register: another register with the same value.
     copies: [Option<u8>; 32],
-    /// Places in the frame and the registers that hold what is there.
+    /// Places in the frame, each with a register that holds its value.
     frame: Vec<(String, u8)>,
-    /// What pairs hold.
+    /// The values of pairs.
     pub offsets: Offsets,
-    /// Y points to the frame, and nowhere else.
+    /// Whether Y points to the frame.
     pub has_frame: bool,
 }
 
@@ -29,14 +29,14 @@ impl Local {
         Local { has_frame: loads("in", "r28, 61") && loads("in", "r29, 62"), ..Local::default() }
     }
 
-    /// Forgets all: control may come from elsewhere.
+    /// Forgets all, because control may come from elsewhere.
     pub fn clear(&mut self) {
         self.copies = [None; 32];
         self.frame.clear();
         self.offsets.clear();
     }
 
-    /// Control comes from elsewhere: all that is known are the copies that hold on every way.
+    /// Control comes from elsewhere. Only the copies that are true on every path are known.
     pub fn enter(&mut self, copies: &Copies) {
         self.clear();
         for register in 0..32 {
@@ -56,13 +56,13 @@ impl Local {
         self.root(a) == self.root(b)
     }
 
-    /// The register that holds what this would load.
+    /// Returns the register that holds the value that this would load.
     pub fn held(&self, is_load: bool, place: &str) -> Option<u8> {
         let found = self.frame.iter().find(|(known, _)| known == place);
         found.filter(|_| is_load && self.has_frame).map(|(_, register)| *register)
     }
 
-    /// Goes past a line.
+    /// Moves past a line.
     pub fn pass(&mut self, flow: &Flow, at: usize) {
         let (line, effect, may_be_skipped) =
             (flow.lines[at], &flow.effects[at], flow.may_be_skipped[at]);
@@ -108,7 +108,7 @@ impl Local {
             }
             ("ldd", Some(d), _) if second.starts_with("Y+") => self.hold(second, d),
             ("std", _, Some(s)) if first.starts_with("Y+") => self.hold(first, s),
-            // It may be the frame that this writes to.
+            // This may write to the frame.
             ("st" | "std" | "call" | "eicall", ..) => self.frame.clear(),
             _ => {}
         }

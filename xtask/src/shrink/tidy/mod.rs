@@ -1,10 +1,11 @@
-//! Leaves out what the compiler need not have written.
+//! Removes what the compiler need not have written.
 //!
-//! LLVM's back end for AVR makes 0 or 1 of a condition and tests that, copies registers to and fro, loads from the frame what a
-//! register holds still, and compares with 0 what has set the flags. What goes here takes flash and time, so it goes from hot
-//! functions as well. [`rules`], [`conditions`] and [`addresses`] have what is done, each by what [`flow`] and [`local`] know, and
-//! [`needs`] of other functions; [`layout`] puts code behind the jumps to it; [`equal`] holds every function against the one
-//! that the compiler wrote, by running both.
+//! LLVM's back end for AVR makes a 0 or 1 from a condition and tests that, copies registers to and fro, loads values
+//! from the frame that a register still holds, and compares with 0 a value whose computation has set the flags.
+//! Removing that saves flash and time, so it is done in hot functions as well. [`rules`], [`conditions`] and
+//! [`addresses`] have the changes. They depend on what [`flow`] and [`local`] know, and on what [`needs`] knows of
+//! other functions. [`layout`] puts code behind the jumps to it. [`equal`] compares every function with the
+//! compiler's version, by running both.
 
 mod addresses;
 mod base;
@@ -34,7 +35,7 @@ use local::Local;
 use needs::Needs;
 use rules::{Edit, Place};
 
-/// How often a function is looked at.
+/// Most sweeps over a function.
 const SWEEPS: usize = 1_000;
 
 /// Tidies all functions that follow the compiler's own conventions.
@@ -67,7 +68,7 @@ fn tidy_function(function: &mut Function, needs: &Needs) -> Result<()> {
     equal::check(&versions, needs)
 }
 
-/// Applies one rule between each two labels; whether there was one.
+/// Applies at most one rule between each two labels. Returns whether any was applied.
 fn sweep(function: &mut Function, needs: &Needs) -> bool {
     let Some(flow) = Flow::of(function, needs) else { return false };
     let sweep =
@@ -94,7 +95,7 @@ fn sweep(function: &mut Function, needs: &Needs) -> bool {
     !lost
 }
 
-/// How many jumps and branches go to each label.
+/// Returns how many jumps and branches go to each label.
 fn uses(flow: &Flow) -> HashMap<String, usize> {
     let mut uses = HashMap::new();
     for line in &flow.lines {
@@ -115,13 +116,13 @@ struct Sweep<'a> {
 }
 
 impl Sweep<'_> {
-    /// What a rule finds: all, or only the first, which may depend on what holds at labels.
+    /// Returns the edits that a rule finds: all, or only the first if the rule depends on what is true at labels.
     fn edits(&self, rule: impl Fn(&Place) -> Option<Edit>, first: Option<&[Copies]>) -> Edit {
         let flow = self.flow;
         let calls = |label: &str| self.uses.get(label).copied().unwrap_or(0);
         let mut local = Local::of(flow);
         let mut edits = Edit::new();
-        // Behind the last line that an edit changes a new look may begin.
+        // A new search may begin behind the last line that an edit changes.
         let mut busy = None;
         let mut waits = false;
         for (at, line) in flow.lines.iter().enumerate() {
@@ -322,7 +323,7 @@ mod tests {
         assert!(!tidied(&text("sts 500, r24\n")).contains("cpi"));
         let asm = "and r24, r22\ncpi r24, 0\n;APP\nin r18, 63\ncli\n;NO_APP\nsts 500, r24\n;APP\nout 63, r18\n;NO_APP\n";
         assert!(!tidied(&format!("{asm}ldi r18, 0\nret")).contains("cpi"));
-        // The register is read, or the flags are needed behind.
+        // The register is read, or the flags are needed later.
         assert!(tidied(&text("sts 500, r0\n")).contains("cpi"));
         assert!(tidied(&format!("{asm}sts 502, r18\nret")).contains("cpi"));
         assert!(
@@ -401,7 +402,7 @@ mod tests {
 
     #[test]
     fn a_condition_that_one_way_needs_is_branched_on() {
-        // Where the branch goes the register holds 1, as it did before.
+        // Where the branch goes the register holds 1, as before.
         let text = |read: &str| {
             format!(
                 "ldi r18, 1\ncp r24, r22\nbrlt .LBB0_1\nmov r18, r1\n.LBB0_1:\ncpi r18, 0\nbreq .LBB0_2\n{read}\n\

@@ -1,7 +1,8 @@
-//! What functions take of their callers, and callers of what functions return.
+//! Which arguments functions read, and which results their callers read.
 //!
-//! The convention lets a function read 18 registers of arguments and return 8: most read and return a few. What it does not read need not be
-//! put there, and what no caller looks at need not be computed. Both are found together: each function is looked at again until nothing is new.
+//! The convention lets a function read 18 registers of arguments and return 8. Most functions read and return a few.
+//! An argument that the function does not read need not be computed, nor a result that no caller reads. Both are
+//! found together: each function is examined again until nothing changes.
 
 use std::collections::{HashMap, HashSet};
 
@@ -9,20 +10,20 @@ use super::super::text::{Function, Program};
 use super::effect::{ARGUMENTS, RESULTS, Set, bit};
 use super::flow::Flow;
 
-/// What calls by a pointer call.
+/// The name for all functions that are called through a pointer.
 pub const ANY: &str = "";
 
-/// Of functions by their names. Of others all is needed that the convention has.
+/// The needs of functions, by name. A function that is not listed needs all that the convention allows.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Needs {
     arguments: HashMap<String, Set>,
     results: HashMap<String, Set>,
-    /// Functions that are called by a pointer.
+    /// Functions that are called through a pointer.
     taken: HashSet<String>,
 }
 
 impl Needs {
-    /// What all functions of a program need.
+    /// Returns the needs of all functions of a program.
     pub fn of(program: &Program) -> Needs {
         let insns = program.functions.iter().flat_map(Function::insns);
         let called: HashSet<&str> =
@@ -48,18 +49,18 @@ impl Needs {
         needs
     }
 
-    /// The registers that a call of this function reads.
+    /// Returns the registers that a call of this function reads.
     pub fn arguments(&self, name: &str) -> Set {
         self.arguments.get(name).copied().unwrap_or(ARGUMENTS) | bit(1)
     }
 
-    /// The registers that some caller of this function reads when it has returned.
+    /// Returns the registers that some caller of this function reads after it has returned.
     pub fn results(&self, name: &str) -> Set {
         let by_name = self.results.get(name).copied().unwrap_or(RESULTS);
         if self.taken.contains(name) { by_name | self.results[ANY] } else { by_name }
     }
 
-    /// Whether none of these is more than another program needs.
+    /// Whether every need is within the needs of another program.
     pub fn are_within(&self, others: &Needs) -> bool {
         let within = |name: &String| {
             self.arguments(name) & !others.arguments(name) == 0
@@ -68,7 +69,7 @@ impl Needs {
         self.arguments.keys().all(within)
     }
 
-    /// Adds what a function needs; whether that is new.
+    /// Adds the needs of a function. Returns whether that changed anything.
     fn look(&mut self, function: &Function) -> bool {
         let Some(flow) = Flow::of(function, self) else {
             return self.look_at_unknown(function);
@@ -82,7 +83,7 @@ impl Needs {
             match insn.op.as_str() {
                 "call" => is_new |= add(&mut self.results, &insn.args, behind & RESULTS),
                 "eicall" => is_new |= add(&mut self.results, ANY, behind & RESULTS),
-                // What it returns is returned for this one.
+                // The results of the function that is jumped to are also the results of this one.
                 "jmp" => is_new |= add(&mut self.results, &insn.args, RESULTS),
                 _ => {}
             }
@@ -90,7 +91,7 @@ impl Needs {
         is_new
     }
 
-    /// It goes where nobody knows: it needs all.
+    /// Handles a function with jumps to unknown places: it needs everything.
     fn look_at_unknown(&mut self, function: &Function) -> bool {
         let mut is_new = add(&mut self.arguments, &function.name, ARGUMENTS);
         is_new |= add(&mut self.results, ANY, RESULTS);
@@ -101,7 +102,7 @@ impl Needs {
     }
 }
 
-/// Adds to what is known of a function, unless it is one of which nothing is kept; whether that is new.
+/// Adds to what is known of a function, if the function is listed. Returns whether that changed anything.
 pub fn add(sets: &mut HashMap<String, Set>, name: &str, set: Set) -> bool {
     let Some(known) = sets.get_mut(name) else { return false };
     let is_new = set & !*known != 0;
@@ -114,7 +115,7 @@ mod tests {
     use super::super::super::text::tests::program;
     use super::*;
 
-    /// Registers that a function need not hand back.
+    /// Registers that a function need not return unchanged.
     const OWN: Set = RESULTS;
 
     fn needs(functions: &[(&str, &str)]) -> Needs {

@@ -1,35 +1,35 @@
-//! Which pairs of registers hold one address and what is added to it.
+//! Finds which pairs of registers hold the same address, and what is added to it.
 
 use super::super::text::Insn;
 use super::effect::{Set, operands, pair, register};
 use super::flow::immediate;
 
-/// A value that a pair held once, and a number.
+/// A former value of a pair, plus a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sum {
-    /// The pair, and how many values it had had by then.
+    /// The pair, and the number of its values up to then.
     origin: (u8, u32),
     offset: u16,
 }
 
 impl Sum {
-    /// The sum and a number.
+    /// Returns the sum plus a number.
     pub fn plus(self, number: u16) -> Sum {
         Sum { offset: self.offset.wrapping_add(number), ..self }
     }
 
-    /// What is to be added to another to have this, if both are of one value.
+    /// Returns the difference between two sums; `None` unless both are based on the same value.
     pub fn beyond(self, other: Sum) -> Option<i16> {
         (self.origin == other.origin).then(|| self.offset.wrapping_sub(other.offset).cast_signed())
     }
 }
 
-/// Of each pair: what it holds.
+/// The sum that each pair holds.
 #[derive(Clone, Debug)]
 pub struct Offsets {
     sums: [Sum; 16],
     values: [u32; 16],
-    /// The pair of which one half has been added to.
+    /// The pair of which only one half has been added to so far.
     half: Option<u8>,
 }
 
@@ -41,7 +41,7 @@ impl Default for Offsets {
 }
 
 impl Offsets {
-    /// What a pair holds, by the number of its lower register.
+    /// Returns the sum that a pair holds, by the number of its lower register.
     pub fn of(&self, low: u8) -> Sum {
         self.sums[usize::from(low / 2)]
     }
@@ -51,7 +51,7 @@ impl Offsets {
         (0..16).for_each(|at| self.renew(at));
     }
 
-    /// Goes past an instruction that changes these registers; `then` is the one that runs next.
+    /// Moves past an instruction that changes these registers; `then` is the instruction that runs next.
     pub fn pass(&mut self, insn: Option<&Insn>, then: Option<&Insn>, changes: Set) {
         if let Some(low) = self.half.take() {
             let ends =
@@ -76,7 +76,8 @@ impl Offsets {
         self.sums[at] = Sum { origin: (at as u8 * 2, self.values[at]), offset: 0 };
     }
 
-    /// The pair that gets a sum, and the sum. A pair that two instructions add to has it from the first on.
+    /// Returns the pair that gets a sum, and the sum. If two instructions add to a pair, it has the sum from the
+    /// first one on.
     fn result(&self, insn: &Insn, then: Option<&Insn>) -> Option<(u8, Sum)> {
         let (first, second) = operands(insn);
         let d = register(first)?;
@@ -90,7 +91,7 @@ impl Offsets {
     }
 }
 
-/// The number that two instructions subtract from a pair.
+/// Returns the number that two instructions subtract from a pair.
 pub fn subtracted(low: &Insn, high: &Insn) -> Option<u16> {
     let ((a, number), (b, rest)) = (operands(low), operands(high));
     let (a, b) = (register(a)?, register(b)?);

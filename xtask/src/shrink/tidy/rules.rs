@@ -1,14 +1,14 @@
-//! What may be left out or written otherwise.
+//! Rules for code that can be removed or written differently.
 //!
-//! A rule looks at one line, with what is known there, and says which lines become what. A rule holds for itself: only one is
-//! applied between two labels before all is looked at again.
+//! A rule looks at one line, with what is known there, and returns the lines to change. Each rule is valid on its
+//! own: only one is applied between two labels before everything is computed again.
 
 use super::super::text::{Insn, Line};
 use super::effect::{self, Set, bit, operands, pair, register};
 use super::flow::{Flow, Known, immediate};
 use super::local::Local;
 
-/// Lines of a [`Flow`], and what becomes of them.
+/// Lines of a [`Flow`], and their replacements; `None` removes a line.
 pub type Edit = Vec<(usize, Option<Insn>)>;
 
 /// A place in a function, and all that is known of it.
@@ -18,7 +18,7 @@ pub struct Place<'a> {
     pub needed: &'a [Set],
     pub known: &'a [Known],
     pub local: &'a Local,
-    /// How many jumps and branches go to each label.
+    /// Returns how many jumps and branches go to a label.
     pub calls: &'a dyn Fn(&str) -> usize,
     pub at: usize,
     pub insn: &'a Insn,
@@ -67,7 +67,7 @@ impl Place<'_> {
         &self.known[self.at]
     }
 
-    /// Nobody needs what it computes.
+    /// Removes an instruction whose result nobody needs.
     fn dead(&self) -> Option<Edit> {
         let effect = &self.flow.effects[self.at];
         let is_dead = !effect.acts && effect.changes() & self.needed[self.at] == 0;
@@ -78,7 +78,7 @@ impl Place<'_> {
         (is_dead || reads_frame).then(|| self.gone())?
     }
 
-    /// Takes bits off that are off already.
+    /// Removes a mask of bits that are 0 already.
     fn mask(&self) -> Option<Edit> {
         let (first, second) = operands(self.insn);
         if self.insn.op != "andi"
@@ -90,7 +90,7 @@ impl Place<'_> {
         (self.known().bits(register(first)?).zeros | mask == u8::MAX).then(|| self.gone())?
     }
 
-    /// Copies what was copied.
+    /// Removes a copy that has been made already.
     fn again(&self) -> Option<Edit> {
         let (first, second) = operands(self.insn);
         let (d, s) = (register(first)?, register(second)?);
@@ -102,9 +102,10 @@ impl Place<'_> {
         again.then(|| self.gone())?
     }
 
-    /// Gives a register the value that it has.
+    /// Removes an instruction that gives a register the value that it has.
     ///
-    /// What gave it that value may stand anywhere before, and be needed for this alone: nothing else may be left out with it.
+    /// The code that gave it the value may stand anywhere before, and may be needed only for this. So nothing else
+    /// may be removed in the same step.
     pub fn constant(&self) -> Option<Edit> {
         let (first, second) = operands(self.insn);
         let d = register(first)?;
@@ -119,7 +120,7 @@ impl Place<'_> {
         if again { self.gone() } else { self.constant_pair() }
     }
 
-    /// Gives a pair, byte by byte, values that another pair has.
+    /// Replaces two instructions that give a pair, byte by byte, the values of another pair.
     fn constant_pair(&self) -> Option<Edit> {
         let value = |at: usize| {
             let insn = self.insn_at(at)?;
@@ -146,14 +147,15 @@ impl Place<'_> {
         Some(vec![(self.at, Some(copy)), (self.at + 1, None)])
     }
 
-    /// Copies what was copied, or reads a copy, by what holds on every way that leads here.
+    /// Removes a copy that has been made already, or reads the original, by what is true on every path that leads
+    /// here.
     ///
-    /// As with a [`constant`](Self::constant), nothing else may be left out with it.
+    /// As with a [`constant`](Self::constant), nothing else may be removed in the same step.
     pub fn copy(&self) -> Option<Edit> {
         self.again().or_else(|| self.copies())
     }
 
-    /// Reads a copy where the original is.
+    /// Reads the original instead of a copy.
     fn copies(&self) -> Option<Edit> {
         let (first, second) = operands(self.insn);
         let original = |operand: &str| register(operand).and_then(|copy| self.local.original(copy));
@@ -182,7 +184,7 @@ impl Place<'_> {
         self.becomes(insn)
     }
 
-    /// Reads a 0 that register 1 is, too.
+    /// Reads register 1, which is 0, instead of another 0.
     fn zero(&self) -> Option<Edit> {
         let (first, second) = operands(self.insn);
         let op = self.insn.op.as_str();
@@ -205,7 +207,7 @@ impl Place<'_> {
         self.becomes(Insn { op: op.into(), args: format!("{}, {}", args.0, args.1) })
     }
 
-    /// Adds nothing, or to nothing: that is no work, or a copy.
+    /// Removes an addition of 0, or replaces an addition to 0 by a copy.
     fn neutral(&self) -> Option<Edit> {
         let (first, second) = operands(self.insn);
         let (d, s) = (register(first)?, register(second)?);
@@ -220,7 +222,7 @@ impl Place<'_> {
         if is_zero(d) { self.becomes(Insn::new(&format!("mov r{d}, r{s}"))) } else { None }
     }
 
-    /// Copies a pair byte by byte.
+    /// Copies a pair in one instruction instead of byte by byte.
     fn pairs(&self) -> Option<Edit> {
         let other = self.insn_at(self.at + 1)?;
         let copied = |insn: &Insn| {
@@ -235,7 +237,7 @@ impl Place<'_> {
         (is_pair && is_free).then(|| vec![(self.at, Some(whole)), (self.at + 1, None)])
     }
 
-    /// Loads from the frame what a register holds.
+    /// Replaces a load from the frame by a register that holds the value.
     fn reload(&self) -> Option<Edit> {
         let (first, second) = operands(self.insn);
         let d = register(first)?;
@@ -246,7 +248,7 @@ impl Place<'_> {
         self.becomes(Insn::new(&format!("mov r{d}, r{held}")))
     }
 
-    /// Computes in one register what is wanted in another.
+    /// Computes a value in the register where it is wanted.
     fn origin(&self) -> Option<Edit> {
         let (first, second) = operands(self.insn);
         let (d, s) = (register(first)?, register(second)?);
@@ -285,7 +287,7 @@ impl Place<'_> {
         None
     }
 
-    /// Jumps to a jump.
+    /// Replaces a jump to a jump.
     fn thread(&self) -> Option<Edit> {
         if self.insn.op != "rjmp" {
             return None;
@@ -300,7 +302,7 @@ impl Place<'_> {
     }
 }
 
-/// Whether an instruction only reads its second operand, and any register does.
+/// Whether an instruction only reads its second operand, and accepts any register there.
 fn reads_second(op: &str) -> bool {
     matches!(
         op,
@@ -322,7 +324,7 @@ fn reads_second(op: &str) -> bool {
     )
 }
 
-/// An instruction with other registers, if it may have them.
+/// Returns an instruction with other registers; `None` if it may not have them.
 fn renamed(insn: &Insn, from: Set, to: u8, was: u8) -> Option<Insn> {
     let (first, second) = operands(insn);
     let other = |operand: &str| match register(operand) {
@@ -340,13 +342,13 @@ fn renamed(insn: &Insn, from: Set, to: u8, was: u8) -> Option<Insn> {
         "mov" | "add" | "adc" | "sub" | "sbc" | "cp" | "cpc" | "and" | "or" | "eor" | "com"
         | "neg" | "inc" | "dec" | "lsl" | "rol" | "lsr" | "asr" | "ror" | "swap" | "tst"
         | "clr" | "mul" | "lds" | "in" => true,
-        // A pointer stays what it is.
+        // A pointer must not change.
         "ld" | "ldd" => d.is_some() && pointer(second) & from == 0,
         "st" | "std" => s.is_some() && pointer(first) & from == 0,
         "sts" | "out" => true,
         _ => false,
     };
-    // A pair is renamed whole.
+    // A pair can only be renamed as a whole.
     let halves = matches!(op, "adiw" | "sbiw" | "movw") && from.count_ones() == 1;
     if !allowed || halves || (d.is_none() && s.is_none()) {
         return None;

@@ -1,4 +1,4 @@
-//! A model of the CPU: runs a piece of a function and writes down what it does.
+//! A model of the CPU: runs a piece of a function and records what it does.
 
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -8,10 +8,10 @@ use super::copies::Copies;
 use super::effect::{self, Effect, Set, bit, operands, register};
 use super::flow::{Flow, Known, immediate};
 
-/// A piece that goes on longer never ends.
+/// Most steps of a piece. A piece that takes more never ends.
 const STEPS: usize = 3_000;
 
-/// All flags but that which lets interrupts in.
+/// All flags except the interrupt flag.
 const FLAGS: u8 = (effect::FLAGS >> 32) as u8;
 
 /// Where a piece ended.
@@ -21,7 +21,7 @@ pub enum End {
     At(String),
     /// It left the function.
     Left,
-    /// It went on and on.
+    /// It did not end.
     Endless,
 }
 
@@ -31,16 +31,17 @@ pub struct Run {
     registers: [u8; 32],
     /// The flags as in the bits of [`Set`], shifted by 32.
     flags: u8,
-    /// What was written since memory was last touched from elsewhere.
+    /// Bytes written since unknown code last changed memory.
     memory: HashMap<u16, u8>,
-    /// How often that was.
+    /// How often unknown code has changed memory.
     touched: u64,
-    /// All that others can see.
+    /// The actions that are visible outside.
     pub log: Vec<(String, Vec<u8>)>,
 }
 
 impl Run {
-    /// Registers hold anything that may be in them. Two with one `seed` find the same in memory.
+    /// Makes a CPU whose registers hold random values that agree with what is known. Two CPUs with the same `seed`
+    /// find the same values in memory.
     pub fn new(seed: u64, registers: u64, (known, copies): (&Known, &Copies)) -> Run {
         let value = |number: usize| {
             let root = copies.root(number as u8);
@@ -56,7 +57,7 @@ impl Run {
         Run { seed, registers, flags, memory, touched: 0, log: Vec::new() }
     }
 
-    /// Takes some registers and flags over from another.
+    /// Copies some registers and flags from another CPU.
     pub fn take(&mut self, other: &Run, parts: Set) {
         for number in (0..32).filter(|number| parts & bit(*number) != 0) {
             self.registers[usize::from(number)] = other.part(number);
@@ -65,7 +66,7 @@ impl Run {
         self.flags = self.flags & !mask | other.flags & mask;
     }
 
-    /// A register, or a flag as 0 or 1.
+    /// Returns a register, or a flag as 0 or 1.
     pub fn part(&self, part: u8) -> u8 {
         match part {
             0..32 => self.registers[usize::from(part)],
@@ -73,7 +74,7 @@ impl Run {
         }
     }
 
-    /// Runs until a label where pieces end.
+    /// Runs up to a label where pieces end.
     pub fn run(&mut self, flow: &Flow, from: usize, stops: &HashMap<&str, ()>) -> End {
         let mut at = from;
         for step in 0..STEPS {
@@ -98,7 +99,7 @@ impl Run {
             at = match next[..] {
                 [] => return End::Left,
                 [only] => only,
-                // Of a branch the first is where it goes to, of a skip the second.
+                // For a branch the first line is its destination, for a skip the second.
                 [first, second, ..] => match line {
                     Line::Insn(insn) if insn.is_branch() == taken => first,
                     _ => second,
@@ -135,7 +136,7 @@ impl Run {
         self.flags = if on { self.flags | mask } else { self.flags & !mask };
     }
 
-    /// Writes down what is done, and the registers that it depends on.
+    /// Records an action, and the registers that it depends on.
     fn note(&mut self, what: &str, parts: Set) {
         let mut values: Vec<u8> =
             (0..32).filter(|r| parts & bit(*r) != 0).map(|r| self.get(r)).collect();
@@ -145,7 +146,7 @@ impl Run {
         self.log.push((what.into(), values));
     }
 
-    /// Puts anything into registers.
+    /// Puts random values into registers.
     fn spoil(&mut self, parts: Set, why: &str) {
         let times = self.log.len();
         for r in (0..32).filter(|r| parts & bit(*r) != 0) {
@@ -158,7 +159,7 @@ impl Run {
         self.touched += 1;
     }
 
-    /// Executes an instruction; returns whether a condition is true.
+    /// Executes an instruction. Returns whether its condition is true.
     fn step(&mut self, insn: &Insn, effect: &Effect) -> bool {
         let (first, second) = operands(insn);
         let (d, s) = (register(first), register(second));
@@ -237,7 +238,7 @@ impl Run {
         let Some((base, offset)) = effect::place(from) else { return };
         let pointer = self.word(base);
         let address = pointer.wrapping_add(offset.trim_start_matches('+').parse().unwrap_or(0));
-        // What lies in the frame nobody sees being read.
+        // Reads of the frame are not recorded, because they are invisible outside.
         let times = self.log.len();
         let value = self.loaded(op, address);
         if base == 28 {
@@ -249,7 +250,7 @@ impl Run {
         self.set(d, value);
     }
 
-    /// What lies in memory, or in flash.
+    /// Returns the byte in memory or in flash.
     fn loaded(&mut self, op: &str, address: u16) -> u8 {
         let is_flash = op.ends_with("pm");
         let found = self.memory.get(&address).copied().filter(|_| !is_flash);
@@ -301,7 +302,7 @@ impl Run {
         self.set_flag(effect::S, negative != self.flag(effect::V));
     }
 
-    /// Arithmetic and logic of one byte; false if it is none.
+    /// Executes arithmetic and logic of one byte. Returns false for other instructions.
     fn computed(&mut self, op: &str, d: Option<u8>, s: Option<u8>, second: &str) -> bool {
         let Some(d) = d else { return false };
         let a = self.get(d);
@@ -383,7 +384,7 @@ impl Run {
     }
 }
 
-/// The value of an operand; of an address anything, but always the same.
+/// Returns the value of an operand; for an address any value, but always the same.
 fn number(operand: &str) -> u8 {
     let inside = |half: &str| {
         operand.strip_prefix(half)?.strip_suffix(')').filter(|inside| !inside.contains('('))
@@ -396,7 +397,7 @@ fn number(operand: &str) -> u8 {
     }
 }
 
-/// An address: a number, or that of a variable, which may be any, and what is added to it.
+/// Returns an address: a number, or the address of a variable, which is arbitrary but fixed, plus an offset.
 fn address(text: &str) -> u16 {
     let (symbol, offset) = text.split_once('+').unwrap_or((text, "0"));
     let base =
@@ -410,7 +411,7 @@ fn hash(what: &impl Hash) -> u8 {
     hasher.finish() as u8
 }
 
-/// A value of the kind that a run has: near the ends of the range as often as anywhere, 0 or 1, or one of two.
+/// Returns a value for a run: as often near the ends of the range as elsewhere, or 0 or 1, or one of two.
 fn usual(random: u8, seed: u64) -> u8 {
     const ENDS: [u8; 8] = [0, 1, 2, 0x7F, 0x80, 0x81, 0xFE, 0xFF];
     match seed % 3 {

@@ -1,17 +1,19 @@
-//! Functions save no register that nobody has a use for when they return.
+//! Lets functions not save registers that nobody needs when they return.
 //!
-//! The convention has a function hand back 18 registers as it found them: each that it uses it pushes first and pops at its end, four cycles and
-//! four bytes. Most callers have nothing in most of these registers, nor have their callers. Which ones hold something that is read behind
-//! a call is found for all functions together: what a function hands back is what is needed behind some call of it, and what those that call it
-//! hand back themselves. A register that is not among these need not be saved.
+//! By the convention a function returns 18 registers unchanged: it pushes each one that it uses and pops it at its
+//! end, which takes four cycles and four bytes. Most callers have no value in most of these registers, nor have their
+//! own callers. Which of them hold a value that is read after a call is found for all functions together. A function
+//! must return unchanged what is needed after some call of it, and what its callers must return unchanged themselves.
+//! Any other register need not be saved.
 //!
-//! What is called from outside, from assembler of the source or from start-up code, keeps to the convention. What is called by a pointer hands back
-//! what is needed behind any such call.
+//! A function that is called from outside, from assembler from the source or from start-up code, follows the
+//! convention. A function that is called through a pointer returns unchanged what is needed after any call through a
+//! pointer.
 //!
-//! Cold functions keep what they save: it is alike in many of them, and they share it.
+//! Cold functions keep their saves: many of them have the same saves, and share them.
 //!
-//! [`check`] holds the result against another question, from the other side: which registers has a call changed when it returns? None of these
-//! may be needed behind it.
+//! [`check`] tests the result from the other side: it computes which registers a call has changed when it returns.
+//! None of them may be needed after the call.
 
 use std::collections::{HashMap, HashSet};
 
@@ -24,7 +26,7 @@ use super::effect::{self, KEPT, Set};
 use super::flow::Flow;
 use super::needs::{ANY, Needs, add};
 
-/// Leaves out what need not be saved.
+/// Removes saves that are not needed.
 pub fn leave_out(program: &mut Program, needs: &Needs) -> Result<()> {
     leave_out_of(program, needs, |function| heat(function) != Heat::Cold)
 }
@@ -50,19 +52,20 @@ fn leave_out_of(
     check(program, &calls, &before)
 }
 
-/// A register that a function saves: the lines that push and pop it.
+/// A register that a function saves, and the lines that push and pop it.
 struct Pair {
     register: u8,
     lines: Vec<usize>,
 }
 
-/// What a function saves.
+/// The saves of a function.
 struct Saves {
     pairs: Vec<Pair>,
 }
 
 impl Saves {
-    /// Those of a function that begins with pushes and pops the same in front of each of its ends, and nowhere else.
+    /// Returns the saves of a function that begins with pushes, pops the same registers before each of its ends, and
+    /// does so nowhere else; `None` for other functions.
     fn of(function: &Function) -> Option<Saves> {
         let code: Vec<(usize, &Line)> = (function.lines.iter().enumerate())
             .filter(|(_, line)| !matches!(line, Line::Note(_)))
@@ -112,10 +115,10 @@ fn is_end(line: &Line) -> bool {
     matches!(line, Line::Insn(insn) if insn.op == "ret" || insn.op == "jmp")
 }
 
-/// What each function has to hand back.
+/// What each function must return unchanged.
 struct Handed {
     back: HashMap<String, Set>,
-    /// Functions that are called by a pointer.
+    /// Functions that are called through a pointer.
     taken: HashSet<String>,
 }
 
@@ -140,7 +143,7 @@ impl Handed {
         if self.taken.contains(name) { by_name | self.back[ANY] } else { by_name }
     }
 
-    /// Adds what this function needs of those that it calls; whether that is new.
+    /// Adds what this function needs of the functions that it calls. Returns whether that changed anything.
     fn look(&mut self, function: &Function, reads: &Calls) -> bool {
         let own = self.by(&function.name);
         let mut is_new = false;
@@ -151,13 +154,13 @@ impl Handed {
     }
 }
 
-/// A call, and which registers that functions hand back are needed behind it.
+/// A call, and the registers among those of the convention that are needed after it.
 struct Call<'a> {
     to: &'a str,
     behind: Set,
 }
 
-/// What calls read of the registers that functions hand back, which may have arguments as well.
+/// Which registers of the convention are read as arguments by calls.
 struct Calls<'a> {
     needs: &'a Needs,
     read: HashMap<String, Set>,
@@ -171,7 +174,7 @@ impl Calls<'_> {
         while is_new {
             is_new = false;
             for function in &program.functions {
-                // To save a register is not to read it.
+                // Saving a register does not count as reading it.
                 let saves = Saves::of(function).map_or(Vec::new(), |saves| saves.pairs);
                 let read = calls.flow(function, 0).map_or(KEPT, |mut flow| {
                     for pushed in saves.iter().filter_map(|pair| pair.lines.first()) {
@@ -192,7 +195,7 @@ impl Calls<'_> {
         calls
     }
 
-    /// The calls of a function that has to hand back `own`.
+    /// Returns the calls of a function that must return `own` unchanged.
     fn of_function<'f>(&self, function: &'f Function, own: Set) -> Vec<Call<'f>> {
         let Some(flow) = self.flow(function, own) else {
             let insns = function.insns().filter_map(called);
@@ -207,7 +210,7 @@ impl Calls<'_> {
         needed.iter().enumerate().filter_map(call).collect()
     }
 
-    /// The flow of a function that hands back `own` alone.
+    /// Returns the flow of a function that returns only `own` unchanged.
     fn flow<'f>(&self, function: &'f Function, own: Set) -> Option<Flow<'f>> {
         let mut flow = Flow::of(function, self.needs)?;
         let own_asm = Saves::of(function).map_or(0, |saves| saves.registers()) | named(function);
@@ -225,7 +228,7 @@ impl Calls<'_> {
                         _ => {}
                     }
                 }
-                // It uses no register of these but those that it names and those that the function has saved for it.
+                // The assembler uses only registers that it names and registers that the function has saved for it.
                 Line::Fixed(_) if *effect == effect::Effect::UNKNOWN => {
                     effect.reads &= !KEPT | own_asm;
                     effect.spoils &= !KEPT | own_asm;
@@ -237,14 +240,14 @@ impl Calls<'_> {
     }
 }
 
-/// The registers that assembler of the source names in a function, with those that make pairs with them.
+/// Returns the registers that assembler from the source names in a function, with the other halves of their pairs.
 fn named(function: &Function) -> Set {
     let words = function.fixed().flat_map(|line| line.split(|c: char| !c.is_alphanumeric()));
     let registers = words.filter_map(effect::register);
     registers.fold(0, |all, register| all | effect::pair(register & !1))
 }
 
-/// What an instruction calls, or goes on with in another function.
+/// Returns the function that an instruction calls or jumps to.
 fn called(insn: &Insn) -> Option<&str> {
     match insn.op.as_str() {
         "call" | "jmp" => Some(&insn.args),
@@ -253,13 +256,13 @@ fn called(insn: &Insn) -> Option<&str> {
     }
 }
 
-/// An empty set for each function, and for calls by a pointer.
+/// Returns an empty set for each function, and for calls through a pointer.
 fn none(program: &Program) -> HashMap<String, Set> {
     let names = program.functions.iter().map(|function| function.name.clone());
     names.chain([ANY.into()]).map(|name| (name, 0)).collect()
 }
 
-/// Functions that others than those of the program may call.
+/// Returns the functions that code outside the program may call.
 fn outside(program: &Program) -> HashSet<String> {
     let called: HashSet<&str> = (program.functions.iter().flat_map(Function::insns))
         .filter(|insn| insn.op == "call" || insn.op == "jmp")
@@ -278,7 +281,7 @@ fn taken(program: &Program) -> HashSet<String> {
     program.taken().into_iter().map(str::to_owned).collect()
 }
 
-/// Fails if a call may change a register that is needed behind it, and did not `before`.
+/// Fails if a call may change a register that is needed after it and that it did not change `before`.
 fn check(program: &Program, calls: &Calls, before: &Changed) -> Result<()> {
     let handed = Handed::back(program, calls);
     let after = Changed::by(program, calls);
@@ -295,7 +298,7 @@ fn check(program: &Program, calls: &Calls, before: &Changed) -> Result<()> {
     Ok(())
 }
 
-/// The registers that each function may have changed when it returns, of those that the convention has it hand back.
+/// The registers of the convention that each function may have changed when it returns.
 struct Changed {
     by: HashMap<String, Set>,
 }
@@ -347,7 +350,7 @@ mod tests {
         program
     }
 
-    /// Saves 16 and 17, and changes both.
+    /// Saves r16 and r17, and changes both.
     const SAVES: &str = "push r16\npush r17\nldi r16, 1\nldi r17, 2\npop r17\npop r16\nret";
 
     #[test]
@@ -365,7 +368,7 @@ mod tests {
             let saved = "push r16; ldi r16, 1; ldi r17, 2; pop r16; ret";
             assert_eq!(code(&after, "f"), saved, "{g}");
         }
-        // Who saves it himself leaves it to those that he calls.
+        // A function that saves a register itself relieves the functions that it calls.
         let g = "push r16\nldi r16, 3\ncall f\npop r16\nret";
         let after = without(&[("main", main), ("g", g), ("f", SAVES)]);
         assert_eq!(code(&after, "f"), "ldi r16, 1; ldi r17, 2; ret");
@@ -404,7 +407,7 @@ mod tests {
 
     #[test]
     fn what_assembler_of_the_source_reads_is_an_argument() {
-        // It goes to a place of its own and calls, so that nobody knows what it does.
+        // The assembler has a jump within it and a call, so its effect is unknown.
         let g = ";APP\nrcall 1f\ncp r24, r16\n1: ret\n;NO_APP\nret";
         let main = ".LBB0_1:\nldi r16, 5\ncall f\ncall g\nrjmp .LBB0_1";
         let after = without(&[("main", main), ("g", g), ("f", SAVES)]);
