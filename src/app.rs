@@ -1,6 +1,6 @@
-//! Putting it together: makes the links, hands every end to its task, starts the hardware.
+//! Start-up: creates the [`Links`] and the channels, gives each task its ends, then starts the hardware.
 //!
-//! This code runs on every chip and on the host; what differs between them is in `hal`.
+//! This code runs on every chip and on the host. What differs between them is in `hal`.
 
 use kerf_macros::small;
 
@@ -37,9 +37,9 @@ use crate::tasks::{
     alarm, control, drivers, exec, heat, parser, planner, power, reader, reporter, spindle, storage,
 };
 
-/// Bytes for all lines of USB together, and of the other port.
+/// Size of the line pool of the USB port, in bytes.
 const LINES_USB: usize = LINE_BYTES[0];
-/// See [`LINES_USB`].
+/// Size of the line pool of the auxiliary port, in bytes.
 const LINES_AUX: usize = LINE_BYTES[1];
 const _: () = assert!(LINES_AUX >= 80 + AUX_RESERVE as usize);
 
@@ -71,14 +71,14 @@ impl Links {
             job: Cell::default(),
             storage,
             report: RefCell::new(Memory::new()),
-            // Their defaults come when they are in place: they would take as much of the stack.
+            // `recall` sets the defaults later, in place. Here they would need as much space again on the stack.
             settings: RefCell::new(Settings::blank()),
             model: RefCell::new(Interpreter::with(storage)),
         }
     }
 }
 
-/// Makes the links. Not inlined: what it needs of the stack is free again after it.
+/// Creates the links in their static place. Not inlined, so that its stack space is free again when it returns.
 #[inline(never)]
 #[small]
 fn place(thread: Thread, ports: [Port; PORTS]) -> &'static Links {
@@ -86,7 +86,7 @@ fn place(thread: Thread, ports: [Port; PORTS]) -> &'static Links {
     place!(Links, Links::new(thread, ports, storage))
 }
 
-/// Puts the card into its place. Not inlined, for it takes much of the stack.
+/// Creates the card in its static place. Not inlined, because it takes much of the stack.
 #[cfg(feature = "sd")]
 #[inline(never)]
 #[small]
@@ -94,16 +94,17 @@ fn place_card() -> &'static RefCell<crate::card::Card> {
     place!(RefCell<crate::card::Card>, RefCell::new(crate::card::Card::new()))
 }
 
-/// Puts the planner into its place, which its task and the parser share.
+/// Creates the planner in its static place. The planner task and the parser share it.
 #[inline(never)]
 #[small]
 fn place_planner(links: &'static Links, queue: BlockQueue) -> &'static planner::Shared {
     place!(planner::Shared, Mutex::new(Planner::new(links, queue)))
 }
 
-/// Starts the firmware: `main` is the thread-mode executor, of which `thread` is the token; the exec task has the interrupt executor to itself.
+/// Starts the firmware. `main` is the thread-mode executor and `thread` is its token. The exec task has the interrupt
+/// executor to itself.
 ///
-/// Interrupts are off. `None` if it has been started before.
+/// Call it with interrupts off. Returns `None` if the firmware has been started before.
 #[inline(never)]
 #[small]
 pub fn start(main: Spawner, thread: Thread, rate: u32) -> Option<()> {
@@ -139,7 +140,8 @@ pub fn start(main: Spawner, thread: Thread, rate: u32) -> Option<()> {
     Some(())
 }
 
-/// How each port is spoken to; what is said first decides between dialects, if the settings let it.
+/// Sets the dialect of each port. A port whose settings leave the choice to the sender takes the dialect of the first
+/// lines that arrive.
 #[inline(never)]
 #[small]
 fn choose_dialects(links: &Links) {
@@ -155,22 +157,23 @@ fn choose_dialects(links: &Links) {
     links.decided(&settings);
 }
 
-/// A machine on the host that runs the firmware.
+/// A simulated machine on the host that runs the firmware.
 #[cfg(feature = "std")]
 impl crate::hal::imp::Machine {
-    /// Makes the machine and boots the firmware at `baud`. One for each thread: `None` for a second.
+    /// Creates the machine and boots the firmware at `baud`. A thread can have one machine; for a second one this
+    /// returns `None`.
     pub fn boot(baud: u32) -> Option<Self> {
         Self::boot_at(baud, 0)
     }
 
-    /// Makes the machine and boots the firmware at `baud`, with a millisecond count that begins at `ms`: to test what happens when it
-    /// wraps. `None` for a second machine in a thread.
+    /// Creates the machine and boots the firmware at `baud`. The millisecond count begins at `ms`, so that tests can
+    /// make it wrap. Returns `None` for a second machine in a thread.
     pub fn boot_at(baud: u32, ms: u64) -> Option<Self> {
         Self::start(ms, |main, thread| start(main, thread, baud))
     }
 }
 
-/// Starts the ports and makes the links. Not inlined, as [`place()`].
+/// Starts the ports and creates the links. Not inlined, for the reason given at [`place()`].
 #[inline(never)]
 #[small]
 fn connect(thread: Thread, rate: u32) -> Option<(&'static Links, Received, Option<Received>)> {
@@ -190,7 +193,8 @@ fn connect(thread: Thread, rate: u32) -> Option<(&'static Links, Received, Optio
     Some((place(thread, ports.into_array().ok()?), received, aux))
 }
 
-/// The defaults, and over them what was put away before the reset. Says also what has come of it.
+/// Sets all settings to their defaults, then loads those that EEPROM holds. Returns `Occasion::Defaults` if the log in
+/// EEPROM is unreadable.
 #[inline(never)]
 fn recall(settings: &mut Settings, storage: &Storage) -> Occasion {
     let (log, memory) = (storage.log(), Eeprom::take());

@@ -1,26 +1,27 @@
-//! Rates of the serial line: what `{baud:n}` may ask for, and the divisor that makes it.
+//! Rates of the serial line: the rates that `{baud:n}` may ask for, and the divisor that produces a rate.
 //!
-//! A rate is given as itself, or by one of TinyG's codes 1 to 6. Pure functions; `config` checks with
-//! them and the UART is set by them. A division of 32 bits each, 600 cycles on AVR.
+//! A rate is given in bits a second, or as one of TinyG's codes 1 to 6. `config` checks a rate with these pure
+//! functions, and the UART driver takes its divisor from them. Each costs a 32-bit division, 600 cycles on AVR.
 
 use crate::boards::ACTIVE;
 use crate::progmem;
 
-/// At power-up.
+/// The rate at power-up.
 pub const DEFAULT: u32 = 115_200;
-/// The lowest and the highest.
+/// The lowest and the highest rate that may be asked for by value.
 const LIMITS: core::ops::RangeInclusive<u32> = 9_600..=1_000_000;
-/// A rate that is made by the clock to 1 in 40, 2.5 %, is near enough: the sender adds its own error,
-/// and the receiver takes 4.5 % between the two.
+/// The clock has to produce a rate to 1 in 40, or 2.5 %. The sender adds its own error, and a receiver tolerates a
+/// difference of 4.5 % between the two.
 const NEARNESS: u32 = 40;
 
 progmem! {
-    /// The rates of the codes 1 to 6. All are taken, though the clock makes 230,400 with an error of
-    /// 3.5 %: senders know it as one of the six, and it works with one that keeps to it exactly.
+    /// The rates of the codes 1 to 6. All six are accepted, although the clock produces 230,400 with an error of 3.5 %:
+    /// senders offer this rate, and it works with a sender whose own rate is exact.
     static CODES: [u32; 6] = [9_600, 19_200, 38_400, 57_600, 115_200, 230_400];
 }
 
-/// The rate, in bits a second, that `value` stands for; `None` if there is no such rate.
+/// Returns the rate, in bits a second, that `value` stands for. `None` if `value` is neither a code nor a possible
+/// rate.
 #[small]
 pub fn rate(value: i32) -> Option<u32> {
     let value = u32::try_from(value).ok()?;
@@ -38,8 +39,8 @@ fn is_near(rate: u32) -> bool {
     eighth().abs_diff(ideal) * NEARNESS <= ideal
 }
 
-/// What goes into the UART's rate register for the nearest rate to `baud`, at double speed (data sheet,
-/// table 22-1). `baud` is one that [`rate`] returned.
+/// Returns the value of the UART's rate register for the rate nearest to `baud`, at double speed (data sheet,
+/// table 22-1). `baud` is a rate that [`rate`] has returned.
 #[small]
 pub fn divisor(baud: u32) -> u16 {
     let nearest = (eighth() + baud / 2) / baud.max(1);

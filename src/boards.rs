@@ -1,7 +1,7 @@
-//! Boards as data: which pin does what, and which timer belongs to whom.
+//! Boards as data: what each pin does, and what each timer is used for.
 //!
 //! A board is one constant in one file under `boards/`. The image is built for [`ACTIVE`];
-//! host tools see them all through [`by_name`]. A pin or a timer that is used twice fails the
+//! host tools reach all boards through [`by_name`]. A pin or a timer that is used twice fails the
 //! build (see [`Board::check`]).
 
 mod check;
@@ -40,13 +40,14 @@ pub use ramps14::RAMPS14;
 pub use ramps14_sd::RAMPS14_SD;
 pub use skr_pico::SKR_PICO;
 
-/// Motors that the board of this image drives.
+/// The number of motors that the board of this image drives.
 pub const MOTORS: usize = ACTIVE.motors.len();
 
-/// The timer of the looks at the switches, on the ATmega2560. Of a printer timer 2 drives heaters.
+/// The timer that samples the switches, on the ATmega2560. On a printer, timer 2 drives heaters and timer 3 samples.
 pub const LOOKS: Timer = if cfg!(feature = "printer") { Timer::T3 } else { Timer::T2 };
 
-/// Whether the chip itself makes the pulses of the hot end, the bed and the fan: those on pins of timer 2.
+/// Whether a timer produces the pulses of the hot end, the bed and the fan, in this order. It does so for pins that are
+/// outputs of timer 2.
 pub const PULSED: [bool; 3] = match ACTIVE.heaters {
     Some(Heaters { heaters: [hot_end, bed], fan }) => {
         [hot_end.pin.channel().is_some(), bed.pin.channel().is_some(), fan.channel().is_some()]
@@ -54,14 +55,16 @@ pub const PULSED: [bool; 3] = match ACTIVE.heaters {
     None => [false; 3],
 };
 
-/// Whether steps are made by a unit of the chip which takes entries from memory: pulses take no time of the CPU then.
+/// Whether a unit of the chip produces the step pulses from entries in memory (the PIO of the RP2040). Pulses then take
+/// no CPU time.
 pub const STEPS_BY_UNIT: bool = matches!(ACTIVE.step_timer, Timer::Pio);
 
-/// The shortest step pulse, us. 0 stands for half a microsecond.
+/// The shortest step pulse that the settings allow, us. 0 stands for half a microsecond.
 pub const SHORTEST_PULSE_US: i32 = if STEPS_BY_UNIT { 0 } else { 1 };
 
-/// Does the same for each motor with its number as a constant: what is found by it is found when the image is
-/// built, which is worth its flash where each segment goes and where pins become single instructions.
+/// Repeats an expression for each motor, with the motor's number as a constant. The compiler then resolves every
+/// look-up by that number. This is worth its flash in code that runs for each segment, and where a pin access becomes a
+/// single instruction.
 macro_rules! each_motor {
     ($m:ident => $body:expr) => {
         $crate::boards::motor_numbers!(each_motor, $m => $body)
@@ -74,7 +77,7 @@ macro_rules! each_motor {
 
 pub(crate) use each_motor;
 
-/// Calls a macro with what it is given and the numbers of all motors.
+/// Calls the macro `$call` with the tokens that follow and the numbers of all motors.
 #[cfg(not(feature = "board-pico-cnc6"))]
 macro_rules! motor_numbers {
     ($call:ident, $($given:tt)*) => {
@@ -90,7 +93,7 @@ macro_rules! motor_numbers {
 
 pub(crate) use motor_numbers;
 
-/// [`each_motor`] has an arm for each motor that an image may have.
+/// Checks that [`motor_numbers`] lists as many motors as the board has.
 const _: () = {
     let mut motors = 0;
     each_motor!(M => if M == motors { motors += 1 });
@@ -102,10 +105,11 @@ const _: () = {
 pub struct Board {
     /// The name that `--board` takes.
     pub name: &'static str,
-    /// The Cargo features that its image has: dialects and [capabilities](crate::capability::Capability). `cargo xtask` reads them in
-    /// the board's file.
+    /// The Cargo features that its image has: dialects and [capabilities](crate::capability::Capability). `cargo xtask`
+    /// reads them in the board's file.
     pub features: &'static [&'static str],
-    /// In which dialect its ports begin by default: the default of the setting `dia`. With 0 what is said first decides.
+    /// The default of the setting `dia`: the dialect in which the ports begin. With 0 the first lines that arrive
+    /// decide.
     pub dialect: u8,
     /// CPU clock, Hz.
     pub clock_hz: u32,
@@ -115,22 +119,22 @@ pub struct Board {
     pub enable_all: Option<Pin>,
     /// Outputs that the panic handler drives low: spindles, heaters, fans.
     pub hazards: &'static [Pin],
-    /// What M3 to M9 switch: see [`outputs`]. Hazards, all of them.
+    /// The pins that M3 to M9 switch, indexed as in [`outputs`]. All of them are hazards.
     pub outputs: [Option<Pin>; outputs::COUNT],
-    /// Says how fast the spindle is to turn. Its pin is a hazard.
+    /// The output that controls the speed of the spindle. Its pin is a hazard.
     pub pwm: Option<Pwm>,
     /// The serial ports: [`USB`], and a second one if there is room for it.
     pub serial: &'static [Serial],
-    /// Switches between a pin and ground: see [`inputs`]. One pin may serve both ends of an axis. Each
+    /// Switches between a pin and ground, indexed as in [`inputs`]. One pin may serve both ends of an axis. Each pin
     /// must be able to interrupt: see [`Pin::interrupt`].
     pub inputs: [Option<Pin>; inputs::COUNT],
-    /// The sensors of the spindle. Timer 5 tells the time of their pulses.
+    /// The sensors of the spindle. Timer 5 takes the time of their pulses.
     pub encoder: Option<Encoder>,
-    /// Drivers that are told their current and microsteps by UART1 of the RP2040.
+    /// Drivers that receive their current and microsteps over UART1 of the RP2040.
     pub drivers: Option<Tmc2209>,
     /// The heaters, for an image that can print.
     pub heaters: Option<Heaters>,
-    /// Selects an SD card, on the SPI of the ATmega2560; its SS may do that. Low for selected.
+    /// The select pin of an SD card on the SPI of the ATmega2560, active low. The SS pin of the SPI may serve as it.
     pub card: Option<Pin>,
     /// Timer of the step interrupt (16 bit).
     pub step_timer: Timer,
@@ -138,13 +142,13 @@ pub struct Board {
     pub tick_timer: Timer,
 }
 
-/// SS, SCK, MOSI, MISO of the ATmega2560. SS is an output, or its SPI is no master.
+/// SS, SCK, MOSI, MISO of the ATmega2560. SS has to be an output, because the SPI is a master only then.
 pub(crate) const SPI: [Pin; 4] =
     [pin(Port::B, 0), pin(Port::B, 1), pin(Port::B, 2), pin(Port::B, 3)];
 
 impl Board {
-    /// The motors whose drivers are on (bits) when those of `wanted` are to be: all of them where they
-    /// share one enable, and always where there is none.
+    /// Returns the motors whose drivers are on, as bits, when the motors in `wanted` are to be on. Drivers that share
+    /// one enable are on together. A driver without any enable is always on.
     pub fn powered(&self, wanted: u8) -> u8 {
         let shared = self.enable_all.is_none() || wanted != 0;
         self.motors.iter().enumerate().fold(0, |bits, (m, motor)| {
@@ -153,7 +157,7 @@ impl Board {
         })
     }
 
-    /// The inputs that share a pin with the sensors `lines` of the encoder (bit 0 index, bit 1 sync), as bits.
+    /// Returns the inputs, as bits, that share a pin with the sensors `lines` of the encoder (bit 0 index, bit 1 sync).
     pub const fn shared_inputs(&self, lines: u8) -> u16 {
         let Some(encoder) = self.encoder else { return 0 };
         let (mut bits, mut i) = (0, 0);
@@ -170,7 +174,7 @@ impl Board {
         bits
     }
 
-    /// Whether something on it is spoken to over SPI.
+    /// Whether the board has a device on the SPI.
     pub const fn has_spi(&self) -> bool {
         self.card.is_some() || self.has_max6675(0) || self.has_max6675(1)
     }
@@ -195,7 +199,7 @@ impl Board {
     }
 }
 
-/// Every board Kerf knows.
+/// Every board that Kerf supports.
 pub const ALL: [&Board; 8] = [
     &MEGA2560_GRBL,
     &MEGA2560_GRBL_LATHE,
@@ -215,7 +219,7 @@ const _: () = {
     }
 };
 
-/// The board with this name.
+/// Returns the board with this name, or `None`.
 pub fn by_name(name: &str) -> Option<&'static Board> {
     ALL.into_iter().find(|b| b.name == name)
 }

@@ -1,8 +1,8 @@
-//! What an image may have or do without: capabilities, a Cargo feature each.
+//! Capabilities: the optional parts of an image. Each is a Cargo feature.
 //!
-//! A board's file says which ones its image has (`features`), and `cargo xtask build --without NAME` leaves one out. What is
-//! not built in is refused by its name with [`Status::NotBuiltIn`]; nothing is ignored. The questions here are
-//! answered by the compiler: code behind them is in the image or it is not.
+//! A board's file lists the capabilities of its image (`features`), and `cargo xtask build --without NAME` leaves one
+//! out. A request for a missing capability is refused with [`Status::NotBuiltIn`], never ignored. All functions here
+//! are constants for the compiler, so code of a missing capability is not in the image.
 
 use crate::status::Status;
 
@@ -13,26 +13,26 @@ pub enum Capability {
     Cycles,
     /// Probing: G38.2 to G38.5.
     Probing,
-    /// Built-in jobs: `{test:n}` but for the stored program.
+    /// Built-in jobs: `{test:n}`, except the stored program.
     Jobs,
     /// Help for people at a terminal: `h`, `$h`, `$test` and so on.
     Help,
-    /// Turning: the encoder of the spindle, and the codes that go by it.
+    /// Turning: the encoder of the spindle, and the codes that use it.
     Lathe,
     /// Printing: heaters, their sensors and fans, and the codes for them.
     Printer,
-    /// Motors that drive X and Y together, as those of a CoreXY machine do.
+    /// Motors that drive X and Y together, as on a CoreXY machine.
     CoreXy,
     /// Printing from an SD card.
     Sd,
-    /// Settings of drivers that take them by UART, and homing by the load that such drivers measure.
+    /// Stepper drivers that are set up over a UART, and homing by the load that these drivers measure.
     Drivers,
-    /// A bed that is a plane, which moves follow: G29 and M420.
+    /// Moves that follow the plane of a tilted bed: G29 and M420.
     BedPlane,
 }
 
 impl Capability {
-    /// All of them.
+    /// All capabilities.
     pub const ALL: [Self; 10] = [
         Self::Cycles,
         Self::Probing,
@@ -46,7 +46,7 @@ impl Capability {
         Self::BedPlane,
     ];
 
-    /// Whether this image has it.
+    /// Whether this image has the capability.
     #[inline(always)]
     pub const fn is_built_in(self) -> bool {
         match self {
@@ -63,13 +63,13 @@ impl Capability {
         }
     }
 
-    /// Refuses what needs it if this image has it not.
+    /// Returns `Ok` if this image has the capability, else [`Status::NotBuiltIn`].
     #[inline(always)]
     pub const fn check(self) -> Result<(), Status> {
         if self.is_built_in() { Ok(()) } else { Err(Status::NotBuiltIn) }
     }
 
-    /// The feature, for documents and tests.
+    /// Returns the name of the Cargo feature, for documents and tests.
     #[cfg(feature = "std")]
     pub const fn name(self) -> &'static str {
         match self {

@@ -1,4 +1,4 @@
-//! The command line: what Kerf makes of a program, on the host.
+//! The command line on the host: checks a program, or prints its canonical commands.
 
 mod check;
 
@@ -42,7 +42,7 @@ enum Command {
     },
 }
 
-/// Does what the arguments say.
+/// Runs the command that the arguments name.
 pub fn run() -> ExitCode {
     let file = match Args::parse().command {
         Command::Check { file, machine, set, zero } => {
@@ -52,7 +52,7 @@ pub fn run() -> ExitCode {
     };
     match canon(&file) {
         Ok(()) => ExitCode::SUCCESS,
-        // Whoever reads has seen enough.
+        // The reader of the pipe, `head` for example, has closed it. That is no failure.
         Err(Failure::Io(error)) if error.kind() == io::ErrorKind::BrokenPipe => ExitCode::SUCCESS,
         Err(failure) => {
             let between = if matches!(failure, Failure::Io(_)) { ": " } else { ":" };
@@ -62,7 +62,7 @@ pub fn run() -> ExitCode {
     }
 }
 
-/// Says what comes of a job; fails if the machine would not carry it out.
+/// Prints the result of a dry run. Fails if the machine would not carry the job out.
 fn check(file: &Path, machine: &str, settings: &[String], zero: Option<&str>) -> ExitCode {
     let answer = read(file).map_err(|error| error.to_string()).and_then(|text| {
         let zero = zero.map(place).transpose()?;
@@ -80,7 +80,7 @@ fn check(file: &Path, machine: &str, settings: &[String], zero: Option<&str>) ->
     }
 }
 
-/// A place, as `X,Y,Z`.
+/// Parses a place that is written as `X,Y,Z`.
 fn place(text: &str) -> Result<[f64; 3], String> {
     let numbers: Vec<f64> = text.split(',').filter_map(|n| n.trim().parse().ok()).collect();
     numbers.try_into().map_err(|_| format!("{text} is no place: X,Y,Z"))
@@ -112,7 +112,7 @@ impl From<io::Error> for Failure {
     }
 }
 
-/// Prints the commands of a program up to a line that is refused.
+/// Prints the commands of a program. Stops with an error at the first line that is refused.
 fn canon(file: &Path) -> Result<(), Failure> {
     let mut out = BufWriter::new(io::stdout().lock());
     let mut reader = Reader::new(Usual);

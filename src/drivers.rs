@@ -1,47 +1,51 @@
 //! TMC2209 drivers: the values of their registers, and the datagrams that write them. Pure: no pin, no UART.
 //!
-//! A driver is told its microsteps, its currents, its chopper, and at which load it raises its pin DIAG. It measures that load with
-//! stealthChop alone, and only while a 256th of a step takes TCOOLTHRS cycles of its clock at most: Kerf sets that to three quarters
-//! of the speed at which the axis searches, for the load of a slower motor cannot be told from a stall.
+//! The registers set the microsteps, the currents, the chopper mode, and the load at which the driver raises its pin
+//! DIAG. The driver measures the load only in stealthChop mode, and only while a 256th of a step takes at most
+//! TCOOLTHRS cycles of the driver's clock. Kerf sets TCOOLTHRS to three quarters of the speed at which the axis
+//! searches for its switch, because at lower speeds the load cannot be told from a stall.
 //!
-//! Registers and datagrams: TMC2209 data sheet, 4.1 (UART datagram structure), 5.1 to 5.5 (register map), 9 (currents), 11 (StallGuard4).
+//! Registers and datagrams: TMC2209 data sheet, 4.1 (UART datagram structure), 5.1 to 5.5 (register map), 9 (currents),
+//! 11 (StallGuard4).
 
 use crate::config::Settings;
 use crate::config::drive::Drive;
 
-/// How many registers a driver is told.
+/// The number of registers that Kerf writes to each driver.
 pub const REGISTERS: usize = 5;
 
-/// Their addresses: GCONF, CHOPCONF, IHOLD_IRUN, TCOOLTHRS, SGTHRS.
+/// The addresses of GCONF, CHOPCONF, IHOLD_IRUN, TCOOLTHRS and SGTHRS, in the order of [`FIRST`].
 const ADDRESSES: [u8; REGISTERS] = [0x00, 0x6C, 0x10, 0x14, 0x40];
 
-/// GCONF: by UART, not by pins; microsteps from CHOPCONF; pulses filtered; the current not from the pin VREF.
+/// GCONF: the UART is used instead of the configuration pins, microsteps come from CHOPCONF, step pulses are filtered,
+/// and the current does not depend on the pin VREF.
 const GCONF: u32 = 1 << 6 | 1 << 7 | 1 << 8;
 const SPREAD_CYCLE: u32 = 1 << 2;
-/// CHOPCONF: microsteps made 256 by the driver; as after a reset otherwise.
+/// CHOPCONF: the driver interpolates microsteps to 256. All other bits are as after a reset.
 const CHOPCONF: u32 = 1 << 28 | 1 << 16 | 0x53;
 const LOW_RANGE: u32 = 1 << 17;
 const FIRST_RESOLUTION: u32 = 24;
-/// Microsteps that have the resolution 0, as a power of two.
+/// The resolution code 0 stands for 2^8 microsteps. Each higher code halves the number.
 const FINEST: u32 = 8;
-/// IHOLD_IRUN: an eighth of a second and more from the current of motion to that of standstill.
+/// IHOLD_IRUN: the current falls from its value in motion to its value at standstill in an eighth of a second or more.
 const HOLD_DELAY: u32 = 8 << 16;
-/// What all 32 counts of current are with sense resistors of 0.11 ohms, mA (RMS): of the low range, and of the high one.
+/// The current of a full 32 counts with sense resistors of 0.11 ohms, mA (RMS), in the low and in the high range.
 const LOW_FULL: u32 = 979;
 const HIGH_FULL: u32 = 1_768;
-/// Its own clock, Hz.
+/// The internal clock of a driver, Hz.
 const OWN_HZ: f32 = 12e6;
-/// TCOOLTHRS has 20 bits.
+/// The greatest value of TCOOLTHRS, which has 20 bits.
 const SLOWEST: u32 = 0xF_FFFF;
-/// Of the speed of the search a stall is told from here on.
+/// A stall is reported from this share of the search speed upwards.
 const SHARE: f32 = 0.75;
-/// Units of [`Length`](crate::units::Length) in a millimetre, or a degree.
+/// Units of [`Length`](crate::units::Length) in a millimetre or a degree.
 const UNITS: f32 = 1e4;
 
-/// What registers are until settings have been read.
+/// The values of the registers until settings have been read.
 pub const FIRST: [u32; REGISTERS] = values(&Drive::DEFAULT, 8, 0);
 
-/// The values of the registers of a driver, by what settings say, microsteps, and the slowest 256th of a step at which a stall counts.
+/// Returns the register values of a driver. `slowest` is the longest time of a 256th of a step at which a stall counts,
+/// in cycles of the driver's clock.
 const fn values(drive: &Drive, microsteps: u8, slowest: u32) -> [u32; REGISTERS] {
     let (run, hold) = (drive.run as u32, drive.hold as u32);
     let is_low = run <= LOW_FULL && hold <= LOW_FULL;
@@ -57,7 +61,7 @@ const fn values(drive: &Drive, microsteps: u8, slowest: u32) -> [u32; REGISTERS]
     ]
 }
 
-/// The nearest count for a current, of which there are 32.
+/// Returns the register value, 0 to 31, of the count nearest to a current. The value n stands for n + 1 counts.
 const fn counts(current: u32, full: u32) -> u32 {
     let counts = (current * 32 + full / 2) / full;
     if counts == 0 {
@@ -69,25 +73,26 @@ const fn counts(current: u32, full: u32) -> u32 {
     }
 }
 
-/// What the driver of a motor is to be told, by all settings. Cost: two divisions of floats.
+/// Returns the register values for the driver of a motor, computed from the settings. Cost: two divisions of floats.
 pub fn registers(settings: &Settings, motor: usize) -> [u32; REGISTERS] {
     let drive = settings.drives.get(motor).copied().unwrap_or(Drive::DEFAULT);
     values(&drive, settings.motor_microsteps(motor), slowest(settings, motor))
 }
 
-/// How many cycles of a driver's clock a 256th of a step takes at the slowest speed at which it tells a stall. Its DIAG pin is at the stop of the axis of
-/// its number, which searches.
+/// Returns how many cycles of a driver's clock a 256th of a step takes at the slowest speed at which the driver reports
+/// a stall. The DIAG pin of motor n serves as the limit switch of axis n, so the search speed of axis n counts.
 fn slowest(settings: &Settings, motor: usize) -> u32 {
     let speed = settings.search_velocity(motor).min(settings.velocity_max(motor)) * SHARE;
     let ratio = settings.step_ratio(motor);
     let parts = 256.0 / f32::from(settings.motor_microsteps(motor).max(1));
     let of_unit = ratio.num as f32 / ratio.den as f32 * parts;
     let cycles = OWN_HZ * 60.0 / (speed * UNITS * of_unit);
-    // Also for a motor that never moves, by which cycles have no end.
+    // A speed of 0 makes `cycles` infinite. The cast saturates, and the minimum limits it.
     (cycles as u32).min(SLOWEST)
 }
 
-/// What writes a register of the driver of an address: `number` is its place among [`REGISTERS`]. Cost on a Cortex-M0+: 1,000 cycles.
+/// Returns the datagram that writes a register of the driver with the given address. `number` is the index of the
+/// register, below [`REGISTERS`]. Cost on a Cortex-M0+: 1,000 cycles.
 pub fn datagram(address: u8, number: usize, value: u32) -> [u8; 8] {
     let register = ADDRESSES.get(number).copied().unwrap_or(0);
     let [a, b, c, d] = value.to_be_bytes();
@@ -96,7 +101,7 @@ pub fn datagram(address: u8, number: usize, value: u32) -> [u8; 8] {
     datagram
 }
 
-/// CRC of x^8 + x^2 + x + 1, the lowest bit of each byte first.
+/// Returns the CRC with the polynomial x^8 + x^2 + x + 1. It takes the lowest bit of each byte first.
 fn checksum(bytes: &[u8]) -> u8 {
     let mut crc = 0u8;
     for byte in bytes {
@@ -129,7 +134,7 @@ mod tests {
     fn a_datagram_is_that_of_the_data_sheet() {
         assert_eq!(FIRST, [0x1C0, 0x1503_0053, 0x0008_1209, 0, 0]);
         assert_eq!(datagram(2, 0, 0x1C0)[..7], [5, 2, 0x80, 0, 0, 1, 0xC0]);
-        // That of a request to read GCONF.
+        // A request to read GCONF.
         assert_eq!(checksum(&[5, 0, 0]), 0x48);
     }
 
@@ -161,7 +166,7 @@ mod tests {
     fn a_stall_counts_from_three_quarters_of_the_search_on() {
         let mut settings = Settings::new();
         settings.drives[0].stall = 90;
-        // 600 mm/min are 8 turns of 1.25 mm a second, 409,600 parts of a step.
+        // 600 mm/min are 8 turns of 1.25 mm a second, or 409,600 256ths of a step a second.
         for (name, value) in [("xvm", "800"), ("xsv", "600")] {
             set(&mut settings, name, value);
         }

@@ -1,117 +1,122 @@
-//! The encoder of the spindle: from pulses to turns a minute, and whether they fit one another.
+//! The encoder of the spindle: computes the speed from its pulses, and checks that the pulses are consistent.
 //!
-//! Two sensors: the *index* gives a pulse a turn, *sync* so many (`spn`). With `spn` 1 the index alone is read. The hardware counts pulses
-//! and takes their time ([`Pulses`], `hal::encoder`); [`Encoder::sample`] makes of that what is known of the spindle. It is asked each 20 ms by
-//! the power task (`tasks::power`), under the ceiling lock. Nothing waits, and nothing can be full: between two samples any number of pulses may
-//! have come, of which the newest counts.
+//! The spindle has two sensors. The *index* gives one pulse a turn, *sync* gives `spn` pulses a turn. With `spn` 1 only
+//! the index is read. The hardware counts the pulses and takes their time ([`Pulses`], `hal::encoder`).
+//! [`Encoder::sample`] evaluates the counts. The power task (`tasks::power`) calls it every 20 ms, under the ceiling
+//! lock. There is no queue that could overflow: any number of pulses may arrive between two samples, and only the
+//! newest of each sensor counts.
 //!
-//! **Fit.** At each index so many pulses of sync must have come as a turn has: one that is missing, or one more, is a *misfit*, and so
-//! is one of an index. With the index alone a pulse in less than 0.6 of the turn before is one; one that is
-//! missing looks like a slower spindle. Misfits are counted (`spx`), and the first is told (exception 40).
+//! **Misfits.** Between two index pulses exactly `spn` sync pulses have to arrive. A missing or an extra pulse, of sync
+//! or of the index, is a *misfit*. With the index alone, a pulse less than 0.6 of the previous turn after the last one
+//! is a misfit; a missing pulse cannot be told from a slower spindle. Misfits are counted (`spx`), and the first one is
+//! reported (exception 40).
 //!
-//! **Direction.** A second sensor of sync, if there is one and `spdi` says so, has pulses count down when the spindle turns backwards. One that turns round
-//! outside of G33.1 is measured anew. A pass is told pulses that count up, whichever way it goes ([`Encoder::of_pass`]).
+//! **Direction.** With a second sync sensor (setting `spdi`), the count of sync pulses goes down while the spindle
+//! turns backwards. After a reversal outside of G33.1 the speed is measured anew. A threading pass gets pulses that
+//! count up, whichever way the spindle turns ([`Encoder::of_pass`]).
 //!
-//! **Stop.** No pulse for half a second, or for twice as long as between the last two if that is more, is a spindle that
-//! stands still: its speed is 0, and nothing is known of it any more.
+//! **Stop.** The spindle counts as standing still if no pulse has come for half a second, or for twice the time between
+//! the last two pulses if that is longer. Its speed is then 0, and the last turn is forgotten.
 //!
-//! Units: counts of 4 us ([`COUNTS_PER_S`]), in 32 bits that wrap after 4.7 hours; differences are right across the wrap. Cost of a sample:
-//! 300 cycles without a pulse, 1,000 with one. The speed is that of the last turn: as exact as the time of two pulses, each of which may be taken late by
-//! what a step interrupt lasts, 17 us.
+//! Units: counts of 4 us ([`COUNTS_PER_S`]), in 32 bits that wrap after 4.7 hours. Differences are right across the
+//! wrap. Cost of a sample: 300 cycles without a pulse, 1,000 with one. The speed is that of the last turn. It is as
+//! exact as the times of its two pulses, each of which may be taken late by the duration of a step interrupt, 17 us.
 
 use kerf_macros::small;
 
 use crate::status::Status;
 
-/// Counts of time in a second.
+/// Counts of time in a second: the unit of all times here.
 pub const COUNTS_PER_S: u32 = 250_000;
 
-/// Half a second.
+/// Without a pulse for half a second the spindle stands still.
 const STILL: u32 = COUNTS_PER_S / 2;
 
-/// Pulses do not come quite evenly: half a millisecond.
+/// Tolerance for pulses that are not quite evenly spaced: half a millisecond.
 const SLACK: u32 = COUNTS_PER_S / 2_000;
 
-/// A turn that takes longer is none: three seconds.
+/// The time that is assumed for a turn until one has been measured: three seconds.
 const SLOWEST: u32 = 3 * COUNTS_PER_S;
 
-/// What the sensors have seen. Times and counts modulo 2^16.
+/// The pulses that the sensors have given. Times and counts are modulo 2^16.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pulses {
     /// The time now.
     pub now: u16,
-    /// Pulses of the index, and the time of the last one.
+    /// Count of index pulses.
     pub index: u16,
-    /// See `index`.
+    /// The time of the last index pulse.
     pub index_at: u16,
-    /// Pulses of sync when that came.
+    /// The count of sync pulses at the last index pulse.
     pub at_index: u16,
-    /// Pulses of sync, less those of the way back if the direction is told; and the time of the last one.
+    /// Count of sync pulses. If the sensors tell the direction, it goes down while the spindle turns backwards.
     pub sync: u16,
-    /// See `sync`.
+    /// The time of the last sync pulse.
     pub sync_at: u16,
 }
 
 impl Pulses {
-    /// None so far.
+    /// No pulses yet, at time 0.
     pub const NONE: Self = Self { now: 0, index: 0, index_at: 0, at_index: 0, sync: 0, sync_at: 0 };
 }
 
-/// What is known of the spindle.
+/// What is known of the turning spindle.
 #[derive(Clone, Copy, Debug)]
 pub struct Encoder {
     /// Pulses of sync in a turn; 0 for no encoder.
     per_turn: u16,
     /// The time of the last sample.
     time: u32,
-    /// The pulses by then.
+    /// The counts of index and sync pulses at the last sample.
     index: u16,
     sync: u16,
-    /// Those of sync at the last index.
+    /// The count of sync pulses at the last index.
     at_index: u16,
-    /// When the last index came.
+    /// The time of the last index pulse.
     index_at: u32,
-    /// When the last pulse of sync came.
+    /// The time of the last sync pulse.
     sync_at: u32,
     /// How long the last turn took; 0 if it is not known.
     turn: u32,
-    /// Index pulses in a row, up to [`SURE`], and the bits below.
+    /// Index pulses in a row up to [`SURE`], in the bits of [`COUNT`]. The other bits are the flags below.
     seen: u8,
-    /// Misfits, up to 255.
+    /// The number of misfits, up to 255.
     misfits: u8,
-    /// The first has been told.
+    /// Whether the first misfit has been reported.
     told: bool,
     /// How far the axes are ahead of the spindle in a pass, um, at the last index.
     error: i16,
-    /// How the pass stands in step with the spindle ([`thread`](crate::motion::thread)): [`Status::Again`] for none that has begun,
-    /// [`Status::Ok`] while it goes on, else why it did not begin, or has ended. The planner and exec write it.
+    /// The state of the pass in step with the spindle ([`thread`](crate::motion::thread)): [`Status::Again`] while none
+    /// has begun, [`Status::Ok`] while one goes on, otherwise the reason why it did not begin or has ended. The planner
+    /// and exec write it.
     pub pass: Status,
 }
 
-/// Of [`Encoder::seen`]: nobody has been told of [`Encoder::error`] yet.
+/// Flag of [`Encoder::seen`]: there is a new [`Encoder::error`], which has not been reported.
 const NEWS: u8 = 0x80;
 
-/// Of [`Encoder::seen`]: it turns round, so that the pulses of sync before the next index do not tell.
+/// Flag of [`Encoder::seen`]: the spindle reverses, so that the number of sync pulses before the next index is not
+/// checked.
 const ROUND: u8 = 0x40;
 
-/// Of [`Encoder::seen`]: it turns backwards.
+/// Flag of [`Encoder::seen`]: the spindle turns backwards.
 const BACK: u8 = 0x20;
 
-/// Of [`Encoder::seen`]: pulses of the pass count down.
+/// Flag of [`Encoder::seen`]: sync pulses count down during the pass, and [`Encoder::of_pass`] negates them.
 const MIRRORS: u8 = 0x10;
 
-/// Of [`Encoder::seen`]: pulses tell the direction.
+/// Flag of [`Encoder::seen`]: sync pulses tell the direction.
 const TELLS: u8 = 0x08;
 
-/// Of [`Encoder::seen`]: the index pulses.
+/// The bits of [`Encoder::seen`] that count index pulses.
 const COUNT: u8 = 0x07;
 
-/// After so many index pulses in a row the time of a turn tells of its neighbours.
+/// After this many index pulses in a row, the time of a turn is a prediction for the next turn.
 const SURE: u8 = 4;
 
 #[small]
 impl Encoder {
-    /// None is set up.
+    /// Returns the state without an encoder.
     pub const fn new() -> Self {
         Self {
             per_turn: 0,
@@ -130,13 +135,13 @@ impl Encoder {
         }
     }
 
-    /// One that knows a spindle at a steady speed.
+    /// Returns the state of a spindle at a steady speed.
     #[cfg(test)]
     pub fn at(time: u32, per_turn: u16, turn: u32) -> Self {
         Self { per_turn, time, turn, ..Self::new() }
     }
 
-    /// It, with pulses that tell the direction.
+    /// Returns this state, with sync pulses that tell the direction if `tells`.
     #[cfg(test)]
     pub fn that_tells(self, tells: bool) -> Self {
         Self { seen: if tells { self.seen | TELLS } else { self.seen }, ..self }
@@ -147,7 +152,8 @@ impl Encoder {
         self.per_turn
     }
 
-    /// An encoder with so many pulses of sync in a turn is set up, 0 for none, whose pulses may tell the direction. What was known is forgotten.
+    /// Sets up an encoder with `per_turn` sync pulses in a turn, 0 for no encoder. `tells` says whether its pulses tell
+    /// the direction. Everything that was known is forgotten.
     pub fn set_up(&mut self, per_turn: u16, tells: bool, pulses: &Pulses) {
         let seen = if tells { TELLS } else { 0 };
         *self = Self { per_turn, seen, index: pulses.index, sync: pulses.sync, ..Self::new() };
@@ -159,7 +165,7 @@ impl Encoder {
         self.time
     }
 
-    /// The time when the clock of the pulses said `now`, since the last sample.
+    /// Returns the 32-bit time at which the 16-bit clock of the pulses reads `now`, at or after the last sample.
     pub fn time_at(&self, now: u16) -> u32 {
         self.time.wrapping_add(now.wrapping_sub(self.time as u16).into())
     }
@@ -169,7 +175,8 @@ impl Encoder {
         self.turn
     }
 
-    /// Index pulses in a row, up to a few; and whether sync has given any, which the index alone does not need.
+    /// Returns the number of index pulses in a row, up to a few, and whether sync pulses arrive as well. With the index
+    /// alone no sync pulses are needed.
     pub fn seen(&self) -> (u8, bool) {
         let synced =
             self.per_turn == 1 || self.time.wrapping_sub(self.sync_at) < STILL.max(self.turn);
@@ -177,36 +184,37 @@ impl Encoder {
         (seen, seen > 0 && synced)
     }
 
-    /// The spindle is about to turn round, or does (G33.1). Exec.
+    /// Notes that the spindle is about to reverse, or does so (G33.1). Exec.
     pub fn note_turning(&mut self) {
         self.seen |= ROUND;
     }
 
-    /// Whether pulses tell the direction.
+    /// Whether sync pulses tell the direction.
     pub fn tells(&self) -> bool {
         self.seen & TELLS != 0
     }
 
-    /// Whether it turns backwards, as far as that is told.
+    /// Whether the spindle turns backwards. Always false if the pulses do not tell the direction.
     pub fn turns_back(&self) -> bool {
         self.seen & BACK != 0
     }
 
-    /// A pass begins, of a spindle that is told to turn backwards or not; `None` if nobody knows. False if it turns the other way.
+    /// Begins a pass. `backwards` is the commanded direction of the spindle, `None` if it is not known. Returns false
+    /// if the pulses tell the opposite direction.
     pub fn begin(&mut self, backwards: Option<bool>) -> bool {
         let turns_back = self.turns_back();
         self.seen = self.seen & !MIRRORS | if turns_back { MIRRORS } else { 0 };
         !self.tells() || backwards.is_none_or(|backwards| backwards == turns_back)
     }
 
-    /// The way back of G33.1 begins: pulses of the pass count the other way. Exec.
+    /// Begins the way back of G33.1, on which the sync pulses count the other way. Exec.
     pub fn turn_pass(&mut self) {
         if self.tells() {
             self.seen ^= MIRRORS;
         }
     }
 
-    /// The pulses as the pass sees them: they count up on the way that it has begun with.
+    /// Returns the pulses for the pass. They count up in the direction in which the pass has begun.
     pub fn of_pass(&self, pulses: Pulses) -> Pulses {
         if self.seen & MIRRORS == 0 {
             return pulses;
@@ -215,37 +223,37 @@ impl Encoder {
         Pulses { sync, at_index, ..pulses }
     }
 
-    /// Misfits so far, 255 for more.
+    /// Returns the number of misfits so far, at most 255.
     pub fn misfits(&self) -> u8 {
         self.misfits
     }
 
-    /// Whether there has been a misfit that nobody has been told of: the first alone.
+    /// Whether the first misfit has come and has not been reported. Takes it as reported.
     pub fn take_misfit(&mut self) -> bool {
         let is_new = self.misfits != 0 && !self.told;
         self.told |= is_new;
         is_new
     }
 
-    /// In a pass the axes were so far ahead of the spindle at an index, mm. Exec.
+    /// Records how far the axes of a pass are ahead of the spindle at an index, mm. Exec.
     pub fn note_error(&mut self, mm: f32) {
         self.error = (mm * 1e3) as i16;
         self.seen |= NEWS;
     }
 
-    /// How far the axes are ahead of the spindle, um, at the last index of the pass; 0 without one.
+    /// Returns how far the axes were ahead of the spindle at the last index of the pass, um. 0 if no pass is under way.
     pub fn error(&self) -> i16 {
         if self.pass == Status::Ok { self.error } else { 0 }
     }
 
-    /// Whether there has been another index in a pass since this was asked last.
+    /// Whether the error of a pass has been recorded at another index since the last call.
     pub fn take_news(&mut self) -> bool {
         let is_new = self.seen & NEWS != 0;
         self.seen &= !NEWS;
         is_new
     }
 
-    /// Takes up what the sensors have seen since the last sample. Whether pulses did not fit.
+    /// Evaluates the pulses since the last sample. Returns whether there was a misfit.
     #[inline(never)]
     pub fn sample(&mut self, pulses: &Pulses) -> bool {
         self.time = self.time_at(pulses.now);
@@ -266,7 +274,8 @@ impl Encoder {
         misfit
     }
 
-    /// So many pulses have come, or were taken back.
+    /// Takes the direction from the change in the count of sync pulses. After an unexpected reversal the speed is
+    /// measured anew.
     fn take_direction(&mut self, change: i16) {
         let turns_back = if change < 0 { BACK } else { 0 };
         if self.seen & BACK != turns_back {
@@ -277,12 +286,12 @@ impl Encoder {
         }
     }
 
-    /// A time before the last sample.
+    /// Returns the 32-bit time of `at`, a 16-bit time before the last sample.
     fn time_of(&self, pulses: &Pulses, at: u16) -> u32 {
         self.time.wrapping_sub(pulses.now.wrapping_sub(at).into())
     }
 
-    /// An index has come, or several. Whether it does not fit.
+    /// Evaluates one or more new index pulses. Returns whether they are a misfit.
     #[inline(never)]
     fn take_index(&mut self, pulses: &Pulses) -> bool {
         let turns = pulses.index.wrapping_sub(self.index);
@@ -316,9 +325,9 @@ impl Encoder {
         age > STILL.max(two)
     }
 
-    /// How long ago the last pulse was, and how long two take.
+    /// Returns the time since the last pulse, and twice the time between two pulses.
     fn age(&self) -> (u32, u32) {
-        // The second index tells how long a turn is.
+        // The length of a turn is not known before the second index.
         let turn = if self.turn == 0 { SLOWEST } else { self.turn };
         let indexed = self.time.wrapping_sub(self.index_at);
         let synced = self.time.wrapping_sub(self.sync_at);
@@ -326,7 +335,8 @@ impl Encoder {
         (age, 2 * turn / u32::from(self.per_turn))
     }
 
-    /// How fast feeds may take it to turn, thousandths of a turn a minute: 0 as soon as no pulse has come for longer than two of them take.
+    /// Returns the speed that scales feeds per turn, thousandths of a turn a minute. It is 0 as soon as no pulse has
+    /// come for longer than two pulses take.
     pub fn feeds(&self) -> u32 {
         if self.turn == 0 {
             return 0;
@@ -335,7 +345,7 @@ impl Encoder {
         if age > two + two / 64 + SLACK { 0 } else { self.speed() }
     }
 
-    /// How fast it turns, thousandths of a turn a minute; 0 if it stands still. Cost: 900.
+    /// Returns the speed of the last turn, thousandths of a turn a minute. 0 if the spindle stands still. Cost: 900.
     pub fn speed(&self) -> u32 {
         if self.turn == 0 {
             return 0;
@@ -354,7 +364,7 @@ impl Default for Encoder {
 mod tests {
     use super::*;
 
-    /// A spindle that is looked at each 20 ms. Times in counts.
+    /// A spindle that is sampled every 20 ms. Times are in counts.
     struct Spindle {
         encoder: Encoder,
         pulses: Pulses,
@@ -393,7 +403,7 @@ mod tests {
             self.pulses.sync_at = self.now as u16;
         }
 
-        /// A turn with so many pulses of sync.
+        /// Makes a turn with `pulses` sync pulses.
         fn turn(&mut self, pulses: u16, counts: u64) {
             self.index();
             for _ in 0..pulses {
@@ -464,7 +474,7 @@ mod tests {
             assert_eq!(spindle.misfits, before + 1);
         }
         assert_eq!(spindle.encoder.misfits(), 2);
-        // An index is missing.
+        // An index pulse is missing.
         (0..8).for_each(|_| {
             spindle.pass(2_500);
             spindle.sync();
@@ -480,7 +490,7 @@ mod tests {
         let mut spindle = Spindle::new(8, 0);
         (0..5).for_each(|_| spindle.turn(8, 40_000));
         spindle.index();
-        // Half a turn there, and back over the mark of the index.
+        // Half a turn forwards, then back over the mark of the index.
         (0..7).for_each(|_| {
             spindle.encoder.note_turning();
             spindle.pass(2_500);
@@ -531,7 +541,7 @@ mod tests {
         spindle.index();
         spindle.pass(LOOK);
         assert_eq!(spindle.misfits, 1);
-        // From rest turns become shorter, but not so much.
+        // During a start from standstill turns become shorter, but not by as much as a misfit.
         let mut spindle = Spindle::new(1, 0);
         for turn in 1..20u32 {
             let taken = f64::from(turn).sqrt() - f64::from(turn - 1).sqrt();

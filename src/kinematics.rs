@@ -1,21 +1,24 @@
-//! What a motor drives: an axis, or X and Y together.
+//! Kinematics: what a motor drives, which is one axis, or X and Y together.
 //!
-//! On a CoreXY machine two motors share one belt or two: the first drives the sum of X and Y, the second their difference. A motor's
-//! place is a length all the same, and its steps follow from that as those of any motor. The setting `ma` says what a motor
-//! drives: an axis by its number, [`SUM`] or [`DIFFERENCE`]. Limits of axes stay those of X and Y; the step rate is that of motors.
+//! On a CoreXY machine two motors move X and Y with one or two shared belts. The coordinate of the first motor is the
+//! sum of X and Y, the coordinate of the second is their difference. Both coordinates are lengths, so a motor's steps
+//! follow from its coordinate as on any other machine. The setting `ma` says what a motor drives: an axis by its
+//! number, [`SUM`] or [`DIFFERENCE`]. The limits of axes remain those of X and Y. The step rate is limited for each
+//! motor.
 //!
-//! Called by the line builder. An image without the capability has motors of axes alone, at no cost. Sums saturate: moves to where that
-//! would matter are refused before ([`Setup::reach`](crate::gcode::setup::Setup::reach)).
+//! The line builder calls these functions. In an image without the capability each motor drives one axis, and the
+//! functions cost nothing. Sums saturate. Moves to places where a sum would saturate are refused before
+//! ([`Setup::reach`](crate::gcode::setup::Setup::reach)).
 
 use crate::capability::Capability;
 use crate::status::Status;
 use crate::units::{Length, PerAxis};
 
-/// Drives X + Y.
+/// The motor drives X + Y.
 pub const SUM: u8 = 6;
-/// Drives X - Y.
+/// The motor drives X - Y.
 pub const DIFFERENCE: u8 = 7;
-/// Drives nothing.
+/// The motor drives nothing.
 pub const NOTHING: u8 = u8::MAX;
 
 /// Whether a motor drives X and Y together.
@@ -24,7 +27,7 @@ pub const fn is_shared(drives: u8) -> bool {
     Capability::CoreXy.is_built_in() && (drives == SUM || drives == DIFFERENCE)
 }
 
-/// Refuses what a motor cannot drive in this image.
+/// Refuses [`SUM`] and [`DIFFERENCE`] in an image without the capability.
 #[inline(always)]
 pub const fn check(drives: i32) -> Result<(), Status> {
     if drives == SUM as i32 || drives == DIFFERENCE as i32 {
@@ -38,12 +41,13 @@ pub fn turns(drives: u8, axis: u8) -> bool {
     drives == axis || axis < 2 && is_shared(drives)
 }
 
-/// The axis in whose place a motor stands for a sender that knows of axes alone: X for [`SUM`], Y for [`DIFFERENCE`], as it is wired.
+/// Returns the axis under whose name a sender that knows only axes sees the motor: X for [`SUM`], Y for [`DIFFERENCE`],
+/// as the motors are wired.
 pub const fn stands_for(drives: u8) -> u8 {
     if is_shared(drives) { drives - SUM } else { drives }
 }
 
-/// Where a motor's coordinate is when the axes are at `place`; none if the motor drives nothing.
+/// Returns a motor's coordinate when the axes are at `place`. `None` if the motor drives nothing.
 #[inline(always)]
 pub fn place(drives: u8, place: &PerAxis<Length>) -> Option<Length> {
     if is_shared(drives) {
@@ -53,14 +57,15 @@ pub fn place(drives: u8, place: &PerAxis<Length>) -> Option<Length> {
     place.get(usize::from(drives)).copied()
 }
 
-/// As [`place()`], by a call: where nothing is hot.
+/// Does the same as [`place()`], but is not inlined. For code that need not be fast.
 #[inline(never)]
 #[small]
 pub fn place_of(drives: u8, at: &PerAxis<Length>) -> Option<Length> {
     place(drives, at)
 }
 
-/// How far a motor's coordinate goes when the axes go so far, in units of [`Length`]; none if the motor drives nothing.
+/// Returns how far a motor's coordinate goes when the axes go by `travel`, in units of [`Length`]. `None` if the motor
+/// drives nothing.
 #[inline(always)]
 pub fn travel(drives: u8, travel: &PerAxis<i32>) -> Option<i32> {
     if is_shared(drives) {
@@ -70,11 +75,11 @@ pub fn travel(drives: u8, travel: &PerAxis<i32>) -> Option<i32> {
     travel.get(usize::from(drives)).copied()
 }
 
-/// X or Y, whose motors' coordinates are these. Rounded down to a unit.
+/// Returns the coordinate of X or Y, computed from the coordinates of the two motors. Rounded down to a unit.
 pub fn axis(axis: usize, sum: Length, difference: Length) -> Length {
     let (sum, difference) = (i64::from(sum.0), i64::from(difference.0));
     let twice = if axis == 0 { sum + difference } else { sum - difference };
-    // Half the sum of two of 32 bits fits these.
+    // Half the sum of two 32-bit numbers fits 32 bits.
     Length((twice >> 1) as i32)
 }
 

@@ -1,12 +1,12 @@
 //! Kerf: motion-control firmware in async Rust on Embassy, for 8-bit AVR boards and the RP2040.
 //!
-//! This library is the whole firmware but for the image's entry point. It is `no_std` and runs on
-//! the ATmega2560, the RP2040 and, for tests and tools, on the host. `ARCHITECTURE.md` is the tour of the house.
+//! This library is the whole firmware except the image's entry point. It is `no_std` and runs on
+//! the ATmega2560, the RP2040 and, for tests and tools, on the host. `ARCHITECTURE.md` is a guided tour of the code.
 //!
-//! # The way of a line
+//! # The path of a line
 //!
-//! A line of G-code comes in as bytes and leaves as steps; each stage is a task or an interrupt, joined to the next by a bounded channel
-//! ([`tasks::links`] lists them all):
+//! A line of G-code arrives as bytes and leaves as steps. Each stage is a task or an interrupt, and a bounded channel
+//! joins it to the next stage ([`tasks::links`] lists the channels):
 //!
 //! | stage | level | modules |
 //! |---|---|---|
@@ -17,19 +17,19 @@
 //! | blocks into segments of some milliseconds | exec interrupt | [`tasks::exec`], [`motion::governor`], [`motion::prep`] |
 //! | segments into steps at pins | step interrupt | [`dda`], `hal::avr::step_isr` |
 //!
-//! Beside that way: [`tasks::control`] carries out real-time characters, [`tasks::reporter`] tells what changes, [`tasks::storage`] puts
-//! settings away, [`tasks::power`] switches motors on and off.
+//! Other tasks work beside these stages: [`tasks::control`] carries out real-time characters, [`tasks::reporter`]
+//! reports changes, [`tasks::storage`] writes settings to EEPROM, [`tasks::power`] switches motors on and off.
 //!
-//! # What the rest is
+//! # The other modules
 //!
 //! - [`machine`]: what the machine is doing, as one state with a table of transitions.
-//! - [`config`]: the settings, a row each in [`config::groups`]; [`store`] keeps them in EEPROM.
-//! - [`boards`]: pins and chips as data; [`hal`]: the chip, behind one interface for AVR and host.
-//! - [`units`], [`math`], [`status`], [`baud`]: what all of these share.
+//! - [`config`]: the settings, each a row in [`config::groups`]; [`store`] keeps them in EEPROM.
+//! - [`boards`]: pins and chips as data; [`hal`]: the chip, behind one interface for AVR, RP2040 and host.
+//! - [`units`], [`math`], [`status`], [`baud`]: definitions that all other modules share.
 #![no_std]
-// An image has no `std`, and needs these of the compiler.
+// An image has no `std`, and needs these unstable features of the compiler.
 #![cfg_attr(not(feature = "std"), feature(asm_experimental_arch, optimize_attribute))]
-// On some chips.
+// Some chips do not use all of these features.
 #![cfg_attr(not(feature = "std"), allow(unused_features))]
 
 #[cfg(feature = "std")]

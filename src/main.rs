@@ -1,4 +1,4 @@
-//! The image. On the host, the command line.
+//! The entry point of the image. On the host, the entry point of the command line.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_arch = "avr")]

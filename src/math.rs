@@ -1,7 +1,7 @@
 //! The few float functions that dynamics and arcs need.
 //!
-//! On AVR they come from avr-libc, and so does every `f32` operation: hand-written routines, five times faster
-//! than Rust's own; `cargo xtask build` checks that it stays so.
+//! On AVR these functions and all `f32` operations come from avr-libc. Its hand-written routines are five times faster
+//! than Rust's own. `cargo xtask build` checks that an image uses them.
 //!
 //! Cost on AVR, cycles: add 130, mul 160, div 500, sqrt 490, sin and cos about 1,800, atan2 3,000.
 
@@ -10,13 +10,14 @@ use crate::hal::float;
 /// Square root; 0 for a negative argument, which rounding produces where the true value is 0.
 #[inline(never)]
 pub fn sqrt(x: f32) -> f32 {
-    // The bits of numbers above 0, which are compared in a sixth of the time that floats take.
+    // The bit patterns of the positive floats. Comparing them as integers takes a sixth of the time of a float
+    // comparison.
     const LEAST: u32 = 1;
     const INFINITE: u32 = f32::INFINITY.to_bits();
     if (LEAST..=INFINITE).contains(&x.to_bits()) { float::sqrtf(x) } else { 0.0 }
 }
 
-/// The nearest whole number, or the end of the range.
+/// Returns the nearest whole number, or the end of the range of `i32`.
 #[inline(never)]
 #[small]
 pub fn round(x: f32) -> i32 {
@@ -33,7 +34,7 @@ pub fn cos(x: f32) -> f32 {
     float::cosf(x)
 }
 
-/// A number above 0 to a power. Cost on AVR: 4,000 cycles.
+/// Raises a number above 0 to a power. Cost on AVR: 4,000 cycles.
 pub fn pow(x: f32, power: f32) -> f32 {
     float::powf(x, power)
 }

@@ -1,31 +1,30 @@
-//! Which motors have power, and until when: the decisions, without any pin.
+//! Motor power: decides which motors have power, and for how long. Touches no pin.
 //!
-//! Each motor has a mode (setting `pm`): never, always, in a cycle, or while it moves; the last two keep
-//! power for a timeout (setting `mt`) after their last use. `{me:..}` and `{md:..}` overrule that until
-//! the next move. Positions do not depend on any of it.
+//! The mode of a motor (setting `pm`) says when it has power: never, always, in a cycle, or while it moves. In the last
+//! two modes power stays on for a timeout (setting `mt`) after the last use. `{me:..}` and `{md:..}` override the mode
+//! until the next move. Positions do not depend on motor power.
 //!
-//! [`Motors::segment`] is for exec, before a segment goes to the steppers, so that power always comes
-//! before the step; the rest is for thread mode (`tasks::power`). Times are milliseconds since reset,
-//! modulo 2^32.
+//! Exec calls [`Motors::segment`] before a segment goes to the steppers, so that power always comes on before the first
+//! step. Everything else is for thread mode (`tasks::power`). Times are milliseconds since reset, modulo 2^32.
 
 use crate::boards::MOTORS;
 
 /// All motors, as bits.
 const ALL: u8 = (1 << MOTORS) - 1;
 
-/// When motors have power: a bit for each motor, in at most one of the masks.
+/// The modes of all motors. Each motor has its bit in at most one of the masks; in none if it never has power.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Modes {
-    /// From the start.
+    /// Motors that always have power.
     pub always: u8,
-    /// While anything moves or dwells, and for the timeout after it.
+    /// Motors that have power while any motor moves or the machine dwells, and for the timeout afterwards.
     pub in_cycle: u8,
-    /// While it moves itself, and for the timeout after it.
+    /// Motors that have power while they move themselves, and for the timeout afterwards.
     pub moving: u8,
 }
 
 impl Modes {
-    /// From the mode of each motor: 0 never, 1 always, 2 in a cycle, 3 while it moves.
+    /// Collects the mode of each motor: 0 never, 1 always, 2 in a cycle, 3 while it moves.
     #[small]
     pub fn new(mode: impl Fn(usize) -> u8) -> Self {
         let mut modes = Self::default();
@@ -52,35 +51,37 @@ pub struct Motors {
     modes: Modes,
     /// Motors that have power, as bits.
     on: u8,
-    /// Motors that the segment queued last moves, as bits.
+    /// Motors that the last queued segment uses, as bits: all motors of mode `in_cycle`, and those of mode `moving`
+    /// that step in it.
     busy: u8,
-    /// Motors that have moved since the last look at the clock, as bits.
+    /// Motors that have been used since the last [`Motors::pass`], as bits.
     used: u8,
-    /// When each was used last.
+    /// The time at which each motor was last used.
     last: [u32; MOTORS],
 }
 
 impl Motors {
-    /// No power; all motors get it in a cycle, as the settings have it by default.
+    /// Returns the state at power-up: all motors off, and in mode `in_cycle`, the default of the settings.
     pub const fn new() -> Self {
         let modes = Modes { always: 0, in_cycle: ALL, moving: 0 };
         Self { modes, on: 0, busy: 0, used: 0, last: [0; MOTORS] }
     }
 
-    /// The motors that have power, as bits.
+    /// Returns the motors that have power, as bits.
     pub fn on(&self) -> u8 {
         self.on
     }
 
-    /// A segment is about to be queued in which `stepping` motors step; `None` of them in a dwell.
+    /// Powers the motors for a segment that is about to be queued. `stepping` are the motors that step in it, as bits:
+    /// 0 in a dwell.
     pub fn segment(&mut self, stepping: u8) {
         self.busy = self.modes.in_cycle | self.modes.moving & stepping;
         self.used |= self.busy;
         self.on |= self.busy | self.modes.always;
     }
 
-    /// Other modes. One that always has power gets it now, one that never has it loses it; a motor
-    /// that was on for another reason is on for the timeout.
+    /// Changes the modes. A motor that always has power is switched on now, and a motor that never has power is
+    /// switched off now. Any other motor that was on stays on for the timeout.
     #[small]
     pub fn set_modes(&mut self, modes: Modes) {
         if modes == self.modes {
@@ -91,20 +92,20 @@ impl Motors {
         self.on = (self.on | modes.always) & modes.any();
     }
 
-    /// Powers `motors` for the timeout, but for those that never have power.
+    /// Powers `motors` for the timeout, except motors that never have power.
     pub fn energize(&mut self, motors: u8) {
         let motors = motors & self.modes.any();
         self.on |= motors;
         self.used |= motors;
     }
 
-    /// Takes power from `motors`, until they are used.
+    /// Takes power from `motors` until they are used again.
     pub fn release(&mut self, motors: u8) {
         self.on &= !motors;
     }
 
-    /// In a feedhold, before [`Motors::pass`]: timeouts stand still for so many milliseconds, which have passed since
-    /// the last look.
+    /// Stops the timeouts during a feedhold: `ms` milliseconds, which have passed since the last [`Motors::pass`], do
+    /// not count. Call it before [`Motors::pass`].
     #[inline(never)]
     #[small]
     pub fn stand_still(&mut self, ms: u32) {
@@ -113,8 +114,8 @@ impl Motors {
         }
     }
 
-    /// Time passes: it is `now`; `running` says that the machine moves or dwells. Takes power from
-    /// motors that have not been used for `timeout`. Whether any lost it.
+    /// Takes power from the motors that have not been used for `timeout` at the time `now`. `running` says whether the
+    /// machine moves or dwells. Returns whether any motor has lost power.
     #[inline(never)]
     #[small]
     pub fn pass(&mut self, now: u32, running: bool, timeout: u32) -> bool {
@@ -179,7 +180,7 @@ mod tests {
             motors.pass(now * 1_000, true, TIMEOUT);
         }
         assert_eq!(motors.on(), 0b1101, "the second motor has stopped");
-        // A dwell is part of the cycle.
+        // A dwell counts as part of the cycle.
         motors.segment(0);
         motors.pass(100_000, true, TIMEOUT);
         assert_eq!(motors.on(), 0b1100 | 0b0001);
@@ -207,7 +208,7 @@ mod tests {
         motors.segment(0b0010);
         motors.pass(0, true, TIMEOUT);
         assert!(!motors.pass(1_900, true, TIMEOUT));
-        // The first motor has 100 ms left, whatever the hold takes.
+        // The first motor has 100 ms left. The hold does not use them up.
         for look in 1..500 {
             motors.stand_still(20);
             assert!(!motors.pass(1_900 + look * 20, true, TIMEOUT));
@@ -236,7 +237,7 @@ mod tests {
         let mut motors = motors([2; 4]);
         motors.set_modes(Modes::new(|m| [1, 2, 2, 2][m]));
         assert_eq!(motors.on(), 0b0001);
-        // No longer always: for the timeout from now on.
+        // The motor no longer has power always. It keeps its power for the timeout from now on.
         motors.pass(50_000, false, TIMEOUT);
         motors.set_modes(Modes::new(|_| 3));
         assert!(!motors.pass(100_000, false, TIMEOUT));

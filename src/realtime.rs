@@ -1,6 +1,6 @@
 //! Real-time characters: single bytes that act wherever they stand in the stream.
 //!
-//! The receive interrupt takes them out, so they never reach a line and never get a response.
+//! The receive interrupt takes them out of the stream, so they never become part of a line and never get a response.
 
 /// `!`: feedhold.
 pub const HOLD: u8 = 1 << 0;
@@ -15,30 +15,30 @@ pub const KILL: u8 = 1 << 4;
 /// ENQ: asks for `{"ack":true}`.
 pub const ENQUIRY: u8 = 1 << 5;
 
-/// Beside [`RESUME`]: its place in the stream is not known, for the receive ring was full.
+/// Set together with [`RESUME`]: the place of the `~` in the stream is not known, because the receive ring was full.
 pub const UNPLACED: u8 = 1 << 6;
 
-/// No character that asks for something: XON has come, and what was held back may leave.
+/// Not a request: XON has arrived, and output that was held back may be sent.
 pub const LET_GO: u8 = 1 << 7;
 
-/// Characters whose place in the stream counts: there the receive ring gets a
+/// Characters whose place in the stream counts. The receive ring gets a mark at that place:
 /// [`CUT`](crate::hal::serial::CUT) or [`GO`](crate::hal::serial::GO).
 pub const PLACED: u8 = FLUSH | KILL | RESUME | RESET;
 
-/// The characters that are pending when one more comes: who says hold does not say resume any more.
+/// Adds a character to the pending ones. A hold cancels a pending resume.
 #[inline(always)]
 pub const fn with(pending: u8, character: u8) -> u8 {
     let pending = if character & HOLD != 0 { pending & !RESUME } else { pending };
     pending | character
 }
 
-/// The bit of a real-time character, 0 for any other byte.
+/// Returns the bit of a real-time character, 0 for any other byte.
 ///
-/// The receive interrupt of the AVR has its twin in assembly (`hal/avr/uart/interrupts.rs`); the transcripts, which
-/// run on both, hold the two together.
+/// The receive interrupt of the AVR contains the same function in assembly (`hal/avr/uart/interrupts.rs`). The
+/// transcripts run on both and check that the two agree.
 #[inline(always)]
 pub const fn bit(byte: u8) -> u8 {
-    // Most bytes of G-code are letters, digits and dots: one test lets them pass.
+    // Most bytes of G-code are letters, digits and dots. This one comparison excludes them.
     if byte > b'%' {
         return if byte == b'~' { RESUME } else { 0 };
     }
@@ -52,43 +52,46 @@ pub const fn bit(byte: u8) -> u8 {
     }
 }
 
-/// The first of the characters of overrides, and the one behind the last. They, and [`JOG_END`], are parts of letters
-/// in UTF-8 too: they are none behind a byte above [`ASCII`].
+/// The first override character. The override characters and [`JOG_END`] may also be part of a UTF-8 sequence, so they
+/// do not count behind a byte above [`ASCII`].
 pub const FIRST: u8 = 0x90;
-/// See [`FIRST`].
+/// The byte behind the last override character.
 pub const END: u8 = 0x9E;
-/// The highest byte that is a letter of its own.
+/// The highest byte that is a character by itself in UTF-8.
 pub const ASCII: u8 = 0x7F;
 
 /// Ends a jog, and does nothing else.
 pub const JOG_END: u8 = 0x85;
 
-/// Begins the steps anew, from 100 %.
+/// The code, counted from [`FIRST`], that sets the feed override to 100 %. The four codes behind it change the
+/// override.
 pub const FULL: u8 = 0;
-/// [`FULL`] of the spindle: the second of the two ranges of steps.
+/// The code that sets the spindle override to 100 %. The four codes behind it change the override.
 const SPINDLE: u8 = 9;
 
-/// What characters ask of the overrides, and of a jog, since it was taken last: however many there are, it is as much.
+/// The override requests, and the request to end a jog, since they were last taken. Its size does not depend on the
+/// number of characters.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Asked {
-    /// By how many percent feed and spindle are to be more, or less.
+    /// The changes of the feed and the spindle override, percent.
     pub percent: [i8; 2],
-    /// From 100 %, for feed (1) and spindle (2); and the traverse, in [`TRAVERSE`]: 1 for 100 %, 2 for 50, 3 for 25; and
-    /// [`NO_JOG`].
+    /// Bits 0 (feed) and 1 (spindle): `percent` counts from 100 % instead of the present override. The bits of
+    /// [`TRAVERSE`]: the traverse override, 1 for 100 %, 2 for 50 %, 3 for 25 %, 0 for no change. And [`NO_JOG`].
     pub fixed: u8,
 }
 
-/// Bits of [`Asked::fixed`].
+/// The bits of [`Asked::fixed`] that hold the traverse override.
 pub const TRAVERSE: u8 = 0x0C;
-/// A jog is to end.
+/// The bit of [`Asked::fixed`] that asks for the end of a jog.
 pub const NO_JOG: u8 = 0x10;
 
 impl Asked {
-    /// No character has come.
+    /// The value when no character has come.
     pub const NOTHING: Self = Self { percent: [0; 2], fixed: 0 };
 
-    /// With one more character, if it is one of these. The receive interrupt of the AVR has its twin in assembly.
+    /// Adds one more character. `None` if it is neither an override character nor [`JOG_END`]. The receive interrupt of
+    /// the AVR contains the same function in assembly.
     pub fn with(mut self, byte: u8) -> Option<Self> {
         if byte == JOG_END {
             self.fixed |= NO_JOG;

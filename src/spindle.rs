@@ -1,29 +1,31 @@
-//! What the spindle's outputs are to be: the decisions, without any pin.
+//! Spindle and coolant: decides the state of their outputs. Touches no pin.
 //!
-//! [`Spindle`] is what the settings `p1`, `sp` and `co` say, and the override. From it, from the outputs that a
-//! program has switched ([`outputs`]) and from S follows what part of its period the pulse-width output is high
-//! ([`Spindle::share`]), in one function, so that S, an override and a setting that changes lead to the same. S is
-//! pulled to the range of its direction, and stays what it was told.
+//! [`Spindle`] holds the settings `p1`, `sp` and `co`, and the spindle override. [`Spindle::share`] computes the duty
+//! cycle of the PWM output: the part of its period during which the output is high. It depends on the [`Spindle`], on
+//! the outputs that a program has switched on ([`outputs`]) and on S. This one function serves every cause, so a change
+//! of S, of the override or of a setting always gives a consistent output. The function limits S to the range of the
+//! direction. S itself keeps the programmed value.
 //!
-//! [`divide`] makes a timer's numbers of a frequency. Owned by exec and thread mode (`tasks::spindle`). Units: turns
-//! per minute, thousandths of a period, ms. Cost of a share: 2,500 cycles.
+//! [`divide`] computes a timer's prescaler and count from a frequency. Exec and thread mode share the [`Spindle`]
+//! (`tasks::spindle`). Units: turns per minute, thousandths of a period, ms. Cost of a share: 2,500 cycles.
 
 use crate::boards::outputs::{self, COUNTERCLOCKWISE, SPINDLE};
 use crate::config::{Owner, Setting};
 
-/// Rows of `p1` in the order of its table, with those of the other direction so many behind.
+/// Row numbers in the settings table of `p1`. Rows 1 to 4 are the range of clockwise, rows 5 to 8 that of
+/// counterclockwise.
 const FREQUENCY: u8 = 0;
 const OFF: u8 = 9;
-/// Rows of `sp` in the order of its table.
+/// Row numbers in the settings table of `sp`.
 const PAUSES: u8 = 0;
 const SPIN_UP: u8 = 1;
 const ENABLE_HIGH: u8 = 2;
 const CLOCKWISE_HIGH: u8 = 3;
 
-/// All of a period.
+/// A whole period, in thousandths.
 pub const WHOLE: u16 = 1_000;
 
-/// The speeds of a direction, and what part of the period belongs to each.
+/// The lowest and the highest speed of a direction, and the duty cycle at each, in thousandths.
 #[derive(Clone, Copy, Debug, Default)]
 struct Range {
     low: f32,
@@ -32,45 +34,45 @@ struct Range {
     high_share: u16,
 }
 
-/// What is known of the spindle and the coolant.
+/// The settings of spindle and coolant, and the spindle override.
 #[derive(Clone, Copy, Debug)]
 pub struct Spindle {
     ranges: [Range; 2],
-    /// While it does not turn.
+    /// The duty cycle while the spindle does not turn, in thousandths.
     off: u16,
-    /// By what S is multiplied, in thousandths.
+    /// The spindle override: the factor of S, in thousandths.
     factor: u16,
-    /// How long moves wait when it has been started or turned round, ms.
+    /// How long moves wait after the spindle has been started or reversed, ms.
     spin_up: u16,
-    /// Outputs that are off in a feedhold, as bits, and [`STOPPED`].
+    /// The outputs that are switched off in a feedhold, as bits, and the bit [`STOPPED`].
     pauses: u8,
     /// Outputs that are on when they are low, as bits.
     low: u8,
 }
 
-/// A bit of [`Spindle::pauses`]: the sender has stopped the spindle in the hold that is on. No output has this bit.
+/// A bit of [`Spindle::pauses`]: the sender has stopped the spindle during the present hold. No output has this bit.
 const STOPPED: u8 = 0x80;
 
-/// What a setting has changed.
+/// The effect of a changed setting.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Changed {
     /// The outputs stay as they are.
     Nothing,
-    /// The outputs change to what they are to be now.
+    /// The outputs have to be computed and set again.
     Outputs,
-    /// The frequency changes to this, thousandths of a Hz.
+    /// The PWM frequency changes to this value, thousandths of a Hz.
     Frequency(u32),
 }
 
 #[small]
 impl Spindle {
-    /// A spindle without settings. All zeros but for the factor.
+    /// Returns a spindle without settings: everything is 0, except that the override is 100 %.
     pub const fn new() -> Self {
         let range = Range { low: 0.0, high: 0.0, low_share: 0, high_share: 0 };
         Self { ranges: [range; 2], off: 0, factor: 1_000, spin_up: 0, pauses: 0, low: 0 }
     }
 
-    /// Takes over the value of a setting, scaled as kept.
+    /// Takes over the value of a setting, in the scale in which the settings keep it.
     pub fn set(&mut self, setting: Setting, value: i32) -> Changed {
         match setting.owner() {
             Owner::Pwm => return self.set_pwm(setting.index(), value),
@@ -107,18 +109,19 @@ impl Spindle {
         Changed::Outputs
     }
 
-    /// The speed that turns at `most` under the override, or slower.
+    /// Limits `speed`, so that the spindle turns at `most` at the fastest after the override is applied.
     pub fn limited(&self, speed: f32, most: f32) -> f32 {
         let most = most * 1e3 / f32::from(self.factor);
         if speed < most { speed } else { most }
     }
 
-    /// Multiplies S by so many thousandths from now on. Whether that is new.
+    /// Sets the override in thousandths. Returns whether it has changed.
     pub fn set_factor(&mut self, thousandths: u16) -> bool {
         core::mem::replace(&mut self.factor, thousandths) != thousandths
     }
 
-    /// The part of the period that the output is high, in thousandths: with outputs that are `on`, and S.
+    /// Returns the duty cycle of the PWM output, in thousandths. `on` are the outputs that a program has switched on,
+    /// and `speed` is S.
     pub fn share(&self, on: u8, speed: f32) -> f32 {
         let [clockwise, counterclockwise] = &self.ranges;
         let range = if on & COUNTERCLOCKWISE == 0 { clockwise } else { counterclockwise };
@@ -137,28 +140,29 @@ impl Spindle {
         }
     }
 
-    /// The outputs among those that are `on` which stay on while a feedhold is on.
+    /// Returns the outputs in `on` that stay on during a feedhold.
     pub fn held(&self, on: u8) -> u8 {
         let stopped = if self.pauses & STOPPED != 0 { SPINDLE | COUNTERCLOCKWISE } else { 0 };
         on & !(self.pauses | stopped)
     }
 
-    /// Stops the spindle while the feedhold is on, or has it turn again.
+    /// Toggles whether the sender has stopped the spindle during the feedhold.
     pub fn pause(&mut self) {
         self.pauses ^= STOPPED;
     }
 
-    /// The feedhold is over.
+    /// Ends a stop by the sender, because the feedhold is over.
     pub fn go_on(&mut self) {
         self.pauses &= !STOPPED;
     }
 
-    /// Outputs that are on when they are low, as bits.
+    /// Returns the outputs that are on when they are low, as bits.
     pub fn low(&self) -> u8 {
         self.low
     }
 
-    /// How long moves wait when the outputs have changed so, ms.
+    /// Returns how long moves wait after the outputs have changed from `before` to `on`, ms. 0 unless the spindle has
+    /// been started or reversed.
     pub fn spin_up(&self, before: u8, on: u8) -> u16 {
         let turns = SPINDLE | COUNTERCLOCKWISE;
         if on & SPINDLE != 0 && (before ^ on) & turns != 0 { self.spin_up } else { 0 }
@@ -177,8 +181,8 @@ fn choose(bits: &mut u8, which: u8, on: bool) {
     *bits = if on { *bits | which } else { *bits & !which };
 }
 
-/// What a 16-bit timer that counts up and down again divides the clock by: the number of its prescaler, from 1 for
-/// none, and the count at which it turns round. What is too slow for it is as slow as it can be.
+/// Computes the prescaler and the top count of a 16-bit timer that counts up and down, for a PWM frequency. Prescaler 1
+/// stands for no division. A frequency that is too low for the timer gives the lowest possible one.
 #[small]
 pub fn divide(clock_hz: u32, millihertz: u32) -> (u8, u16) {
     let mut counts = clock_hz as f32 * 500.0 / millihertz as f32;
@@ -317,7 +321,7 @@ mod tests {
             let (prescaler, top) = divide(16_000_000, millihertz);
             let counts = 8e9 / ratios[usize::from(prescaler)] / f64::from(millihertz);
             assert!((f64::from(top) - counts).abs() <= 0.502, "{millihertz} {prescaler} {top}");
-            // No coarser than need be.
+            // The prescaler is no greater than it has to be.
             assert!(prescaler == 1 || top > 8_190, "{millihertz} {prescaler} {top}");
             assert!(top > 2);
         }

@@ -1,6 +1,6 @@
-//! Statuses: what comes of a line, and what a fault is called.
+//! Statuses: the results of lines, and the names of faults.
 //!
-//! Numbers and texts are the dialects': each spells a status in its own way (`protocol`).
+//! A status has no number and no text here. Each dialect has its own (`protocol`).
 
 /// The outcome of a line, or of an internal operation.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -9,7 +9,7 @@
 pub enum Status {
     Ok,
     Error,
-    /// Not now: the line is tried again. No sender gets to see it.
+    /// The line cannot be carried out yet and is tried again later. Never sent to a sender.
     Again,
     Noop,
     Terminated,
@@ -122,10 +122,10 @@ pub enum Status {
 }
 
 impl Status {
-    /// How many there are.
+    /// The number of statuses.
     pub const COUNT: usize = Status::ProbeTooShort as usize + 1;
 
-    /// Whether it says why an axis, which exceptions name, could not be homed.
+    /// Whether the status says why an axis could not be homed. Exception reports with such a status name the axis.
     pub fn names_axis(self) -> bool {
         let says = self as u8;
         let homing = Status::HomingFailed as u8..=Status::HomingClosed as u8;

@@ -1,25 +1,26 @@
-//! Switches: from the levels of pins to what is believed of them, without any pin.
+//! Switches: debounces the levels of input pins. Touches no pin.
 //!
-//! The hardware has someone look at all pins at once, and each sample says when the next one is due. An edge
-//! asks for a first sample after [`FIRST_US`]; two samples in a row that agree, [`SOON_US`] apart, are believed. So
+//! `hal` samples all pins at once, and each sample says when the next one is due. An edge asks for a first sample after
+//! [`FIRST_US`]. A new level is accepted if two samples in a row, [`SOON_US`] apart, agree on it. From this follows:
 //!
-//! - a pulse shorter than [`SOON_US`] is never believed, one longer than both times always;
-//! - a switch is believed that long and [`FIRST_US`] after its edge, if nothing else has happened in the last [`LATER_US`], and
-//!   after 300 us in any case;
-//! - it is not asked again for [`LOCK_MS`] after that, so that its bouncing is one event, and then believed
-//!   as it stands.
+//! - A pulse shorter than [`SOON_US`] is never accepted. A pulse longer than [`FIRST_US`] and [`SOON_US`] together
+//!   always is.
+//! - A change is accepted [`FIRST_US`] + [`SOON_US`] after its edge if nothing else has happened in the last
+//!   [`LATER_US`], and after 300 us in any case.
+//! - After a change the switch is locked: it is ignored for [`LOCK_MS`], so that its bouncing is one event. Afterwards
+//!   its level is accepted as it is then.
 //!
-//! Where noise keeps coming, samples that found nothing are followed by a pause: it costs at most a fifth of
-//! the CPU. While no switch moves nobody looks. Sets of switches are bits, as in
+//! Under continuous noise, a sample that found no change is followed by a pause, so that sampling takes at most a fifth
+//! of the CPU. While no pin changes there are no samples. Sets of switches are bits, as in
 //! [`inputs`](crate::boards::inputs).
 
-/// From an edge to a sample, microseconds.
+/// Time from an edge to the first sample, microseconds.
 pub const FIRST_US: u32 = 1;
-/// From there to the next; a chip that is fast enough takes it sooner.
+/// Time from the first sample to the second, microseconds. The RP2040 is fast enough for a shorter time.
 pub const SOON_US: u32 = 10;
-/// Between samples while a switch is locked, and after one that found nothing.
+/// Time between samples while a switch is locked, and after a sample that found no change, microseconds.
 pub const LATER_US: u32 = 125;
-/// How long a switch that has changed is not asked again; up to twice that if others change meanwhile.
+/// How long a switch is locked after a change, ms. A change of another switch starts the time anew.
 pub const LOCK_MS: u32 = 10;
 
 const LOCK_LOOKS: u8 = (LOCK_MS * 1_000 / LATER_US) as u8;
@@ -27,7 +28,7 @@ const LOCK_LOOKS: u8 = (LOCK_MS * 1_000 / LATER_US) as u8;
 /// When the next sample is due.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Next {
-    /// After an edge.
+    /// [`FIRST_US`] after the next edge.
     Edge,
     /// In [`SOON_US`].
     Soon,
@@ -35,53 +36,57 @@ pub enum Next {
     Later,
 }
 
-/// What is believed.
+/// The debounced state of all switches.
 #[derive(Clone, Debug)]
 pub struct Switches {
+    /// The switches that are worked, after debouncing.
     worked: u16,
-    /// What the last sample found.
+    /// The switches that the last sample found worked.
     last: u16,
-    /// Changed lately.
+    /// The switches that are locked because they have changed lately.
     locked: u16,
-    /// Samples until these are asked again.
+    /// Samples until the locked switches are free again.
     left: u8,
-    /// The last sample found nothing, and is not followed by a pause any more.
+    /// A sample has found no change and asked for a pause. If the next sample finds no change either, it waits for an
+    /// edge.
     paused: bool,
 }
 
 impl Switches {
-    /// No switch is active.
+    /// Returns the state in which no switch is worked.
     pub const fn new() -> Self {
         Self { worked: 0, last: 0, locked: 0, left: 0, paused: false }
     }
 
-    /// The switches that are worked.
+    /// Returns the switches that are worked, after debouncing.
     pub fn worked(&self) -> u16 {
         self.worked
     }
 
-    /// Believes what a sample finds, without more ado: at power-up, and when switches are told anew.
+    /// Accepts the levels of a sample without debouncing: at power-up, and when the settings of the switches have
+    /// changed.
     pub fn adopt(&mut self, now: u16) {
         *self = Self { worked: now, last: now, ..Self::new() };
     }
 
-    /// Whether a sample that finds the switches `now` worked wants another.
+    /// Whether a sample that finds the switches `now` worked has to be confirmed by another.
     pub fn is_news(&self, now: u16) -> bool {
         (now ^ self.worked) & !self.locked != 0
     }
 
-    /// The first of two samples, of which the second decides.
+    /// Notes the first of two samples. The second one decides.
     pub fn note(&mut self, now: u16) {
         self.last = now;
     }
 
-    /// The switches that have changed, if this is the second sample that finds the switches `now` worked.
+    /// Returns the switches that have changed, given a second sample that finds the switches `now` worked.
     #[inline(always)]
     pub fn changed(&self, now: u16) -> u16 {
         (now ^ self.worked) & !(now ^ self.last) & !self.locked
     }
 
-    /// A sample finds the switches `now` worked. Returns those that have changed, and when to look again.
+    /// Evaluates a sample that finds the switches `now` worked. Returns the switches that have changed, and when the
+    /// next sample is due.
     pub fn sample(&mut self, now: u16) -> (u16, Next) {
         let changed = self.changed(now);
         self.last = now;
@@ -122,8 +127,8 @@ mod tests {
     use proptest::prelude::*;
     use std::vec::Vec;
 
-    /// Looks at a level of one switch, given as times of its edges (us), as often as it wants to be looked
-    /// at. Returns the events: when, and the level.
+    /// Samples one switch, whose edges are at the given times (us), whenever a sample is due. Returns the changes: the
+    /// time and the new level.
     fn watched(edges: &[u32], until: u32) -> Vec<(u32, bool)> {
         let level = |at| edges.iter().filter(|e| **e <= at).count() % 2 == 1;
         let (mut switches, mut events) = (Switches::new(), Vec::new());
@@ -133,7 +138,7 @@ mod tests {
             at = match next {
                 Next::Soon => at + SOON_US,
                 Next::Later => at + LATER_US,
-                // One that came since the last sample asks for another.
+                // An edge since the last sample asks for another sample.
                 Next::Edge => match edge.find(|e| *e > at) {
                     Some(edge) => edge + FIRST_US,
                     None => return events,

@@ -1,18 +1,18 @@
-//! Arcs as chords.
+//! Arcs: approximates an arc by chords.
 //!
-//! A [`Walk`] turns the vector from the centre to the start (the spoke) by an angle that grows evenly,
-//! and adds the centre. The angle is a binary fraction of a turn in a `u32`, so whole turns wrap and
-//! nothing drifts; sine and cosine are evaluated anew for every chord, so no error grows along the
-//! arc: a point is within 1 um of the circle up to a radius of a few metres, and the last point is
-//! the target itself. All other axes advance evenly; each point is worked out from the start, so no
-//! error grows there either.
+//! A [`Walk`] rotates the *spoke*, the vector from the centre to the start, by an angle that grows evenly, and adds the
+//! centre. The angle is a binary fraction of a turn in a `u32`, so whole turns wrap and nothing drifts. Sine and cosine
+//! are evaluated anew for every chord, so errors do not accumulate along the arc. A point is within 1 um of the circle
+//! up to a radius of a few metres, and the last point is the target itself. All other axes advance evenly. Each point
+//! is computed from the start, so errors do not accumulate there either.
 //!
-//! Where the radius at the end differs from that at the start (by what the interpreter tolerates),
-//! the radius changes evenly along the arc.
+//! If the radius at the end differs from the radius at the start, within the tolerance of the interpreter, the radius
+//! changes evenly along the arc.
 //!
-//! The chords lie inside the arc for one part and outside for the other, so that their mean distance from the
-//! centre is the radius: all ends but the first and the last are outside by two thirds of the sagitta. A chord may
-//! then have a sagitta of 1.44 times the tolerance. The limit is the first chord, whose start is on the arc itself.
+//! Each chord lies partly inside and partly outside the arc, so that the mean distance of the path from the centre is
+//! the radius. For this all chord ends except the first and the last are outside the arc by two thirds of the sagitta.
+//! A chord may then have a sagitta of 1.44 times the tolerance. The first chord sets this limit, because its start is
+//! on the arc.
 //!
 //! Cost on AVR: [`Extent::of`] and [`Walk::new`] 14,000 cycles; a chord 8,700, and 600 for each other axis that moves.
 
@@ -24,36 +24,40 @@ use super::command::Arc;
 use crate::math;
 use crate::units::{Length, PerAxis};
 
-/// Chords are not made shorter than this: 0.05 mm, in units.
+/// The least length of a chord: 0.05 mm, in units.
 const MIN_CHORD: f32 = 500.0;
-/// A change of radius below this (0.2 um) is left to the last chord.
+/// A change of radius up to this (0.2 um) is left to the last chord.
 const SAME_RADIUS: f32 = 2.0;
-/// Binary fractions in a turn.
+/// The number of binary fractions in a turn, 2^32.
 const TURN: f32 = 4_294_967_296.0;
-/// The sagitta of a chord that leaves its arc by 1.
+/// The sagitta of a chord, as a multiple of its deviation from the arc.
 const SAGITTA: f32 = 1.44;
 
-/// How far the chords of an arc have come. The arc and its target stay where they are: see [`Chords`].
+/// The progress along the chords of an arc. The arc and its target are not part of it and are passed to each call. See
+/// also [`Chords`].
 #[derive(Clone, Copy, Debug)]
 pub struct Walk {
     start: PerAxis<Length>,
-    /// From the centre to the start.
+    /// The vector from the centre to the start, moved outwards by two thirds of the sagitta.
     spoke: [f32; 2],
-    /// By what part of itself the radius grows along the arc.
+    /// The growth of the radius along the whole arc, as a part of the radius at the start.
     growth: f32,
-    /// How far the spoke has turned, and turns with each chord, in binary fractions of a turn.
+    /// The angle by which the spoke has turned, in binary fractions of a turn.
     angle: u32,
+    /// The angle of one chord, in binary fractions of a turn.
     step: u32,
-    /// Chords done, of how many, and the part of the arc that each is.
+    /// The number of chords that are done.
     done: u32,
+    /// The number of all chords.
     count: u32,
+    /// The part of the arc that one chord spans.
     part: f32,
 }
 
-/// How large an arc is. All lengths in units.
+/// The size of an arc. All lengths are in units.
 #[derive(Clone, Copy, Debug)]
 pub struct Extent {
-    /// From start to end, as a part of a turn, 0 to 1.
+    /// The angle from start to end, as a part of a turn, 0 to 1.
     part: f32,
     /// Radius at the start and at the end.
     radii: [f32; 2],
@@ -64,7 +68,7 @@ pub struct Extent {
 }
 
 impl Extent {
-    /// The extent of the arc from `start` to `target`.
+    /// Returns the extent of the arc from `start` to `target`.
     #[inline(never)]
     #[small]
     pub fn of(start: &PerAxis<Length>, target: &PerAxis<Length>, arc: &Arc) -> Self {
@@ -75,25 +79,25 @@ impl Extent {
         Self { part, radii, planar, length }
     }
 
-    /// Length of the path, in mm.
+    /// Returns the length of the path, in mm.
     pub fn length(&self) -> f32 {
         self.length * 1e-4
     }
 
-    /// The least radius, in mm.
+    /// Returns the least radius, in mm.
     pub fn radius(&self) -> f32 {
         self.radii[0].min(self.radii[1]) * 1e-4
     }
 
-    /// Length of the path over that in the plane, 1 or more.
+    /// Returns the ratio of the length of the path to its length in the plane, 1 or more.
     pub fn slope(&self) -> f32 {
         if self.planar > 0.0 { self.length / self.planar } else { 1.0 }
     }
 
-    /// How many chords keep within `tolerance` mm of the arc and are not longer than `longest` mm.
+    /// Returns the number of chords that keep within `tolerance` mm of the arc and are not longer than `longest` mm.
     ///
-    /// A chord of sagitta s is 2 sqrt(s (2 r - s)) long. Never longer than the radius: a full circle then
-    /// has seven chords, whatever the tolerance.
+    /// A chord of sagitta s is 2 sqrt(s (2 r - s)) long. A chord is never longer than the radius, so that a full circle
+    /// has at least seven chords with any tolerance.
     #[inline(never)]
     #[small]
     fn count(&self, tolerance: f32, longest: f32) -> u32 {
@@ -103,19 +107,19 @@ impl Extent {
         let chord =
             if sagitta < radius { chord.min(longest * UNITS).max(MIN_CHORD) } else { radius };
         let chord = chord.min(radius);
-        // Casts saturate, and take 0 / 0 for 0.
+        // The cast saturates, and gives 0 for 0 / 0.
         let count = self.planar / chord;
         let whole = count as u32;
         let whole = if (whole as f32) < count { whole.saturating_add(1) } else { whole };
-        // A single chord has both ends on the arc, and leaves it by all of its sagitta.
+        // A single chord has both ends on the arc, so it deviates by all of its sagitta.
         let alone = whole == 1 && count * (SAGITTA * 0.84) > 1.0 && self.planar > MIN_CHORD;
         if alone { 2 } else { whole.clamp(1, i32::MAX as u32) }
     }
 }
 
 impl Walk {
-    /// The arc from `start` to `target`, of this extent; the chords leave it by `tolerance` mm at most, and are
-    /// not longer than `longest` mm.
+    /// Returns the walk along the arc from `start`, which has this extent. The chords deviate from the arc by
+    /// `tolerance` mm at most, and are not longer than `longest` mm.
     #[inline(never)]
     #[small]
     pub fn new(
@@ -128,10 +132,11 @@ impl Walk {
         let count = extent.count(tolerance, longest);
         let [radius, end_radius] = extent.radii;
         let grows = (end_radius - radius).abs() > SAME_RADIUS && radius > 0.0;
-        // A whole turn saturates to a hair less; the last chord makes up for it.
+        // A whole turn saturates to slightly less than a turn. The last chord makes up for it, because it ends at the
+        // target.
         let turned = u64::from(arc.extra_turns) << 32 | u64::from((extent.part * TURN) as u32);
         let step = (turned / u64::from(count)) as u32;
-        // Two thirds of the sagitta, r angle^2 / 8; the next term of the series counts from half a radian on.
+        // Two thirds of the sagitta, which is r angle^2 / 8. The next term of the series matters from half a radian on.
         let angle = step as f32 * (TAU / TURN);
         let square = angle * angle;
         let outside = 1.0 + square * (1.0 / 12.0 + square * (1.0 / 240.0));
@@ -147,7 +152,7 @@ impl Walk {
         }
     }
 
-    /// The end of the next chord; `None` when there is none.
+    /// Returns the end of the next chord. `None` after the last chord.
     pub fn next(&mut self, arc: &Arc, target: &PerAxis<Length>) -> Option<PerAxis<Length>> {
         if self.done >= self.count {
             return None;
@@ -168,7 +173,7 @@ impl Walk {
         Some(point)
     }
 
-    /// The axes outside the plane, `done` being the part of the way that is behind.
+    /// Returns a point with the coordinates of the axes outside the plane. `done` is the part of the arc that is done.
     fn others(&self, target: &PerAxis<Length>, done: f32) -> PerAxis<Length> {
         let mut point = self.start;
         for (at, target) in point.iter_mut().zip(target) {
@@ -180,9 +185,9 @@ impl Walk {
         point
     }
 
-    /// The two coordinates in the plane.
+    /// Returns the two coordinates in the plane.
     fn in_plane(&self, arc: &Arc, done: f32) -> [Length; 2] {
-        // Signed: a float is the more precise the smaller it is.
+        // The angle is taken as signed, because a float is more precise the smaller it is.
         let angle = self.angle as i32 as f32 * (TAU / TURN);
         let (sin, cos) = (math::sin(angle), math::cos(angle));
         let [x, y] = self.spoke;
@@ -206,7 +211,7 @@ pub struct Chords<'a> {
 }
 
 impl<'a> Chords<'a> {
-    /// The arc from `start` to `target`; the chords leave it by `tolerance` mm at most.
+    /// Returns the chords of the arc from `start` to `target`. They deviate from it by `tolerance` mm at most.
     pub fn new(
         start: &PerAxis<Length>,
         target: &'a PerAxis<Length>,
@@ -218,12 +223,12 @@ impl<'a> Chords<'a> {
         Self { arc, target, length: extent.length(), walk }
     }
 
-    /// Length of the whole path (arc, or helix), in mm.
+    /// Returns the length of the whole path (arc, or helix), in mm.
     pub fn length(&self) -> f32 {
         self.length
     }
 
-    /// Number of chords in all.
+    /// Returns the number of all chords.
     pub fn total(&self) -> u32 {
         self.walk.count
     }
@@ -242,7 +247,7 @@ impl Iterator for Chords<'_> {
     }
 }
 
-/// Whether an arc ends, in its plane, where it began: it is then a full circle.
+/// Whether an arc ends in its plane where it began. It is then a full circle.
 pub fn closes(start: &PerAxis<Length>, target: &PerAxis<Length>, arc: &Arc) -> bool {
     [arc.first, arc.second].iter().all(|axis| {
         let axis = usize::from(*axis);
@@ -250,7 +255,7 @@ pub fn closes(start: &PerAxis<Length>, target: &PerAxis<Length>, arc: &Arc) -> b
     })
 }
 
-/// From the centre to a point, in units.
+/// Returns the vector from the centre to a point, in units.
 pub(super) fn spoke(point: &PerAxis<Length>, arc: &Arc) -> [f32; 2] {
     let [first, second] = arc.center;
     [(arc.first, first), (arc.second, second)].map(|(axis, center)| {
@@ -259,7 +264,7 @@ pub(super) fn spoke(point: &PerAxis<Length>, arc: &Arc) -> [f32; 2] {
     })
 }
 
-/// The angle from start to end, as a part of a turn, 0 to 1; further turns not counted.
+/// Returns the angle from start to end, as a part of a turn, 0 to 1. Further turns are not counted.
 pub(super) fn part(start: &PerAxis<Length>, target: &PerAxis<Length>, arc: &Arc) -> f32 {
     if closes(start, target, arc) {
         return 1.0;
@@ -267,16 +272,17 @@ pub(super) fn part(start: &PerAxis<Length>, target: &PerAxis<Length>, arc: &Arc)
     turned(spoke(start, arc), spoke(target, arc), arc.clockwise)
 }
 
-/// The angle from one spoke to another in the sense of the arc, as a part of a turn, 0 to 1.
+/// Returns the angle from one spoke to another in the direction of the arc, as a part of a turn, 0 to 1.
 pub(super) fn turned(from: [f32; 2], to: [f32; 2], clockwise: bool) -> f32 {
-    // From the difference, which is exact: short arcs of large radius keep their precision.
+    // Computed from the difference of the spokes, which is exact, so that short arcs of large radius keep their
+    // precision.
     let cross = from[0] * (to[1] - from[1]) - from[1] * (to[0] - from[0]);
     let dot = from[0] * to[0] + from[1] * to[1];
     let angle = math::atan2(if clockwise { -cross } else { cross }, dot) * (1.0 / TAU);
     if angle > 0.0 { angle } else { angle + 1.0 }
 }
 
-/// How far an axis goes, in units.
+/// Returns how far an axis goes, in units.
 fn way(start: &PerAxis<Length>, target: &PerAxis<Length>, axis: u8) -> f32 {
     let at = |point: &PerAxis<Length>| point.get(usize::from(axis)).map_or(0.0, |at| at.0 as f32);
     at(target) - at(start)
@@ -313,7 +319,7 @@ mod tests {
         let points: Vec<_> = chords.collect();
         assert_eq!(points.len(), 15);
         assert_eq!(points[14], target);
-        // A third of the way, and 9.1 um outside: two thirds of the sagitta.
+        // This point is a third of the way along the arc, and 9.1 um outside: two thirds of the sagitta.
         assert_eq!(points[4][..2], [Length(86_682), Length(50_046)]);
         for (i, at) in points.iter().enumerate() {
             let even = (i as i32 + 1) * 60_000;
@@ -344,7 +350,7 @@ mod tests {
         }
     }
 
-    /// Chords of 0.86 rad lie as much inside as outside too.
+    /// Coarse chords of 0.86 rad have the right mean distance from the centre too.
     #[test]
     fn the_mean_distance_of_coarse_chords_is_the_radius() {
         let (start, target) = (point(10_000, 0, 0, 0), point(4_395, -8_982, 0, 0));

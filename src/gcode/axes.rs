@@ -1,4 +1,4 @@
-//! What the words of an axis mean: its mode, and lengths as angles.
+//! The meaning of axis words, which depends on the mode of the axis. Converts lengths to angles in radius mode.
 
 use kerf_macros::small;
 
@@ -10,7 +10,7 @@ use super::setup::{AxisMode, Setup};
 use crate::status::Status;
 use crate::units::{FIRST_ROTARY, Length};
 
-/// The length that a word gives, whatever the axis.
+/// Returns the length that a word gives, without regard to the mode of an axis.
 #[inline(never)]
 #[small]
 pub(super) fn length(word: &Decimal, units: Units) -> Result<Exact, Status> {
@@ -20,7 +20,7 @@ pub(super) fn length(word: &Decimal, units: Units) -> Result<Exact, Status> {
     }
 }
 
-/// What the word of an axis says; `None` if the axis is disabled.
+/// Returns the value of an axis word. `None` if the axis is disabled.
 pub(super) fn value(
     word: &Decimal,
     axis: u8,
@@ -30,7 +30,7 @@ pub(super) fn value(
     match setup.mode(axis) {
         AxisMode::Disabled => Ok(None),
         AxisMode::Radius => angle(length(word, units)?, setup.radius(axis)).map(Some),
-        // Degrees are degrees in all units.
+        // Degrees do not depend on G20 and G21.
         _ if usize::from(axis) >= FIRST_ROTARY => word.mm().map(Some),
         _ => length(word, units).map(Some),
     }
@@ -38,16 +38,15 @@ pub(super) fn value(
 
 /// Units of angle for a unit of length at a radius of 1 nm (10^6 * 180 / pi), times [`SCALE`].
 const UNITS: i64 = 3_666_929_889;
-/// Leaves [`UNITS`] 32 bits, and so a product with any length 63.
+/// With this scale [`UNITS`] has 32 bits, so its product with any length fits 63 bits.
 const SCALE: i64 = 64;
 /// The scale of [`Exact::rest`].
 const REST: i64 = 10_000;
 
-/// The angle at which an arc of this `length` is seen from the centre of a circle of `radius` nm; 110
-/// beyond the range.
+/// Returns the angle of an arc of this `length` on a circle of `radius` nm. Error 110 beyond the range.
 ///
-/// In integers and with the rest, so that incremental moves add up. Three 64-bit divisions: 15,000
-/// cycles on AVR.
+/// The computation uses integers and the remainder of the length, so that incremental moves add up exactly. Cost: three
+/// 64-bit divisions, 15,000 cycles on AVR.
 #[inline(never)]
 #[small]
 fn angle(length: Exact, radius: u32) -> Result<Exact, Status> {

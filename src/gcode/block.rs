@@ -1,7 +1,8 @@
-//! One line, read but not yet carried out: its codes by modal group, its numbers by letter.
+//! A block: one line that has been read but not yet carried out. It has the codes by modal group, and the numbers by
+//! letter.
 //!
-//! While it is read it collects what its codes take and need, so that [`Block::check`] can refuse it
-//! before anything is done. Lives on the stack for the time of one line.
+//! While a line is read, the block collects which words its codes take and need. With these sets [`Block::check`] can
+//! refuse the line before anything is done. A block is on the stack for the time of one line.
 
 use heapless::Vec;
 use nom::Offset;
@@ -18,15 +19,15 @@ use crate::capability::Capability;
 use crate::status::Status;
 use crate::units;
 
-/// The most words with a number that a line may have. No codes take more together: an arc with all axes, its offsets and P, and besides G43, G96,
-/// F, S, T and N.
+/// The most words with a number that a line may have. No combination of codes takes more words. The longest is an arc
+/// with all axes, its offsets and P, together with G43, G96, F, S, T and N.
 const MOST: usize = 16;
 
 /// The parts of a line.
 pub struct Block {
     pub non_modal: Option<NonModal>,
     motion: Option<MotionMode>,
-    /// G80, which may stand beside another code of its group: `G0 G80 G90` is how many programs begin.
+    /// G80. It may stand beside another code of its group, because many programs begin with `G0 G80 G90`.
     cancel: Option<()>,
     pub plane: Option<Plane>,
     pub distance: Option<Distance>,
@@ -45,27 +46,29 @@ pub struct Block {
     pub spindle: Option<Turn>,
     pub coolant: Option<Coolant>,
     pub overrides: Option<OverrideCode>,
-    /// The words that its codes take, those that two of them take, and those that they need, as sets.
+    /// The words that the codes of the line take, as a set.
     taken: u32,
+    /// The words that more than one code of the line takes, as a set.
     taken_twice: u32,
+    /// The words that the codes of the line need, as a set.
     needed: u32,
-    /// The motion it asks for, once it has been checked.
+    /// The motion that the line asks for. Set by [`Block::check`].
     does: Option<MotionMode>,
-    /// The words it has, as a set.
+    /// The words that the line has, as a set.
     present: u32,
-    /// Their numbers, in the order of the line.
+    /// The slots and numbers of the words, in the order of the line.
     values: Vec<(u8, Decimal), MOST>,
-    /// Begins with a slash: block delete.
+    /// Whether the line begins with a slash (block delete).
     pub slashed: bool,
     /// Where in the line the text of a message lies.
     pub message: Option<(u8, u8)>,
-    /// Has a comment.
+    /// Whether the line has a comment.
     pub commented: bool,
 }
 
 impl Block {
-    /// An empty line.
-    // Where it is to be, or it would be copied there.
+    /// Returns an empty block.
+    // Inlined, so that the block is built in its final place. Otherwise it would be copied there.
     #[inline(always)]
     pub fn new() -> Self {
         Self {
@@ -101,7 +104,7 @@ impl Block {
         }
     }
 
-    /// Reads a line into an empty block. One that begins with a slash is read no further if `deletes`.
+    /// Reads a line into an empty block. If `deletes` is true, a line that begins with a slash is not read any further.
     pub fn read(&mut self, line: &[u8], deletes: bool) -> Result<(), Status> {
         if line.len() > u8::MAX as usize {
             return Err(Status::InputTooLong);
@@ -115,16 +118,16 @@ impl Block {
                 }
                 (rest, _) = lexer::blanks(after).map_err(status)?;
             }
-            // The ends of a program file.
+            // A `%` alone on a line marks the beginning and the end of a program file.
             Some((b'%', after)) if after.iter().all(|&byte| lexer::is_blank(byte)) => return Ok(()),
             _ => {}
         }
         self.items(line, rest)
     }
 
-    /// Reads the items of a line, of which `rest` is the part to read.
-    // By itself it has a small stack frame, which AVR reaches in one instruction; inlined into a frame
-    // of more than 64 bytes every access would take five more.
+    /// Reads the items of a line. `rest` is the part of the line that is still to be read.
+    // Not inlined: the function has a small stack frame of its own, which AVR accesses in one instruction. Inlined into
+    // a frame of more than 64 bytes, every access would take five more instructions.
     #[inline(never)]
     fn items(&mut self, line: &[u8], mut rest: &[u8]) -> Result<(), Status> {
         while !rest.is_empty() {
@@ -199,7 +202,7 @@ impl Block {
             return Err(Status::WordRepeated);
         }
         self.present |= bit;
-        // With more of them one is of no use.
+        // A line with more words than [`MOST`] has at least one that no code takes.
         self.values.push((slot, value)).map_err(|_| Status::WordUnused)
     }
 
@@ -212,25 +215,26 @@ impl Block {
         }
     }
 
-    /// Whether any word of a set is there.
+    /// Whether the line has any word of a set.
     pub fn has(&self, set: u32) -> bool {
         self.present & set != 0
     }
 
-    /// The number in a slot that most lines have not: quick, if the slot is a constant.
+    /// Returns the number in a slot that most lines do not use. `None` if the line does not have the word. Fast if the
+    /// slot is a constant.
     #[inline(always)]
     pub fn rare(&self, slot: u8) -> Option<&Decimal> {
         if self.has(words::bit(slot)) { self.get(slot) } else { None }
     }
 
-    /// The number in a slot.
+    /// Returns the number in a slot. `None` if the line does not have the word.
     #[inline(never)]
     #[small]
     pub fn get(&self, slot: u8) -> Option<&Decimal> {
         self.values.iter().find(|word| word.0 == slot).map(|word| &word.1)
     }
 
-    /// X is a diameter: its number becomes the radius.
+    /// Converts the X word from a diameter to a radius.
     #[inline(never)]
     #[small]
     pub fn halve_x(&mut self) {
@@ -239,23 +243,23 @@ impl Block {
         }
     }
 
-    /// The axis words, in the order of the line.
+    /// Returns the axis words, in the order of the line.
     pub fn axes(&self) -> impl Iterator<Item = (u8, &Decimal)> {
         let words = self.values.iter().map(|(slot, value)| (*slot, value));
         words.filter(|(slot, _)| usize::from(*slot) < units::AXES)
     }
 
-    /// M104 to M190, whose S and T are its own.
+    /// Whether the line has one of M104 to M190. Its S and T are then no spindle speed and no tool.
     pub fn heats(&self) -> bool {
         Capability::Printer.is_built_in() && matches!(self.non_modal, Some(NonModal::Heat(_)))
     }
 
-    /// M6.
+    /// Whether the line has M6.
     pub fn changes_tool(&self) -> bool {
         self.tool_change.is_some()
     }
 
-    /// Whether it may change more than modes, the feed, and the position of the axes that it names.
+    /// Whether the line may change more than modes, the feed, and the position of the axes that it names.
     pub fn is_rare(&self) -> bool {
         self.non_modal.is_some()
             || self.tool_length.is_some()
@@ -267,30 +271,31 @@ impl Block {
             || self.has(words::bit(words::S) | words::bit(words::T))
     }
 
-    /// G80.
+    /// Whether the line has G80.
     pub fn cancels(&self) -> bool {
         self.cancel.is_some()
     }
 
-    /// The motion of its codes: G80 gives way to any other.
+    /// Returns the motion code of the line. Any other motion code takes precedence over G80.
     pub fn own_motion(&self) -> Option<MotionMode> {
         self.motion.or(self.cancel.map(|()| MotionMode::None))
     }
 
-    /// The motion that the line asks for, once it has been checked: that of its code, else the one in force if
-    /// words are left for it.
+    /// Returns the motion that the line asks for, after [`Block::check`]: the motion of its own code, otherwise the
+    /// motion in force if words are left for it, otherwise `None`.
     pub fn does(&self) -> Option<MotionMode> {
         self.does
     }
 
-    /// Refuses words that no code takes or that two codes want, and codes without their words; `modal` is the
-    /// motion in force.
+    /// Refuses words that no code takes, words that two codes take, and codes without the words that they need. `modal`
+    /// is the motion in force.
     #[inline(never)]
     pub fn check(&mut self, modal: MotionMode) -> Result<(), Status> {
         self.does = self.own_motion();
         let mut twice = self.present & self.taken_twice;
         let mut unused = self.present & !(self.taken | words::ALWAYS);
-        // Words are for the motion in force, unless the line has another or its axes are for another code.
+        // The remaining words belong to the motion in force, unless the line has a motion code or another code takes
+        // its axes.
         if self.does.is_none() && self.taken & AXES == 0 {
             let takes = codes::taken_by(modal);
             if unused & takes != 0 {
@@ -305,7 +310,7 @@ impl Block {
         }
     }
 
-    /// Why the line is refused for these words, or that it is not.
+    /// Returns the status with which the line is refused for these words. `None` if it is accepted.
     #[inline(never)]
     fn refusal(&self, twice: u32, unused: u32, missing: u32) -> Option<Status> {
         match () {
@@ -320,7 +325,7 @@ impl Block {
     }
 }
 
-/// Fills a modal group, which takes one code a line: false if it had one.
+/// Stores a code in its modal group. Returns false if the line already had a code of this group.
 fn first<T>(group: &mut Option<T>, code: T) -> bool {
     group.replace(code).is_none()
 }

@@ -1,4 +1,4 @@
-//! Which circle the words of a G2 or G3 line describe, and whether they describe one.
+//! G2 and G3: computes the circle that the words of a line describe, or refuses the line if they describe none.
 
 use kerf_macros::small;
 
@@ -20,7 +20,7 @@ use crate::units::{Length, PerAxis};
 const MIN_RADIUS: i32 = 10;
 /// The largest R: 150 m, which keeps its square in 64 bits.
 const MAX_RADIUS: i32 = 1_500_000_000;
-/// Radii at start and end always may differ by this much (5 um) ...
+/// The radii at start and end may always differ by this much (5 um) ...
 const SLACK: f32 = 50.0;
 /// ... or by this part of the radius ...
 const SLACK_PART: f32 = 0.001;
@@ -31,7 +31,7 @@ const MAX_SLACK: f32 = 10_000.0;
 const ARC_WORDS: u32 = words::AXES | OFFSETS | bit(R) | bit(P);
 
 impl State {
-    /// G2 and G3.
+    /// Carries out G2 and G3.
     #[inline(never)]
     pub(super) fn arc(
         &mut self,
@@ -48,7 +48,7 @@ impl State {
         if [first, second].iter().any(|axis| setup.mode(*axis) == AxisMode::Disabled) {
             return Err(Status::AxisDisabled);
         }
-        // Posts write K0 in G17; only a way out of the plane is no arc.
+        // Postprocessors write K0 with G17, which is harmless. Only an offset out of the plane is refused.
         if block.has(bit_of(I + linear)) && !block.get(I + linear).is_some_and(Decimal::is_zero) {
             return Err(Status::ArcSpecification);
         }
@@ -76,7 +76,7 @@ impl State {
         Ok(())
     }
 
-    /// R, in units; negative for the long way round.
+    /// Returns R in units; it is negative for the long way round. `None` without R.
     fn radius(&self, block: &Block, first: u8, second: u8) -> Result<Option<Length>, Status> {
         let Some(word) = block.get(R) else { return Ok(None) };
         if block.has(bit_of(I + first) | bit_of(I + second)) {
@@ -93,8 +93,8 @@ impl State {
         }
     }
 
-    /// The centre from I, J, K, which count from the start with G91.1, from the origin with G90.1, in every
-    /// distance mode.
+    /// Returns the centre from I, J and K. They are measured from the start with G91.1, and from the work origin with
+    /// G90.1. G90 and G91 do not matter.
     #[small]
     fn center_form(
         &self,
@@ -129,8 +129,8 @@ impl State {
     }
 }
 
-/// Whether some point of the circle may be beyond the range of lengths: it is not, if the sides of the
-/// radius' triangle are not.
+/// Whether some point of the circle may be beyond the range of lengths. The test replaces the radius by the sum of its
+/// components along the two axes, which is never smaller.
 #[small]
 fn may_be_too_far(start: &PerAxis<Length>, arc: &Arc) -> bool {
     let from = in_plane(start, arc);
@@ -140,7 +140,8 @@ fn may_be_too_far(start: &PerAxis<Length>, arc: &Arc) -> bool {
     [first, second].iter().any(|at| at.0.saturating_abs().saturating_add(radius) == i32::MAX)
 }
 
-/// Whether some axis goes farther than a length can be, which its advance along an arc is worked out from.
+/// Whether some axis goes farther than a length can express. The advance of an axis along an arc is computed from this
+/// distance.
 #[inline(never)]
 #[small]
 fn is_far(start: &PerAxis<Length>, target: &PerAxis<Length>) -> bool {
@@ -152,7 +153,7 @@ fn is_far(start: &PerAxis<Length>, target: &PerAxis<Length>) -> bool {
     false
 }
 
-/// P: full turns.
+/// Returns P, the number of full turns. 0 without P.
 #[small]
 fn turns(block: &Block) -> Result<u16, Status> {
     match block.get(P) {
@@ -165,8 +166,8 @@ fn turns(block: &Block) -> Result<u16, Status> {
     }
 }
 
-/// Refuses a centre from which start and end are not equally far, or in the same direction though
-/// they differ.
+/// Refuses a centre from which start and end are not equally far. Refuses also a centre that sees start and end in the
+/// same direction although they differ.
 fn check_radii(arc: &Arc, start: &PerAxis<Length>, target: &PerAxis<Length>) -> Result<(), Status> {
     let [from, to] = [arc::spoke(start, arc), arc::spoke(target, arc)];
     let radius = math::sqrt(from[0] * from[0] + from[1] * from[1]);
@@ -182,11 +183,11 @@ fn check_radii(arc: &Arc, start: &PerAxis<Length>, target: &PerAxis<Length>) -> 
     Ok(())
 }
 
-/// The centre from R: on the perpendicular through the middle of the chord, at the distance
+/// Returns the centre from R. It lies on the perpendicular through the middle of the chord, at the distance
 /// h = sqrt(r^2 - (chord / 2)^2).
 ///
-/// The difference of squares is formed exactly, in 64 bits, or the centre of a half circle would be
-/// off by the square root of a rounding error.
+/// The difference of squares is computed exactly, in 64 bits. Otherwise the centre of a half circle would be off by the
+/// square root of a rounding error.
 #[small]
 fn radius_form(
     start: &PerAxis<Length>,
@@ -202,13 +203,14 @@ fn radius_form(
     let square = |x: i32| i64::from(x) * i64::from(x);
     let chord_squared = square(chord[0]).saturating_add(square(chord[1]));
     let excess = 4 * square(radius.0) - chord_squared;
-    // Half a chord up to 5 um longer than R, or a twentieth of it, passes for a half circle; always what rounding makes of the ends.
+    // If half the chord is longer than R by up to 5 um and up to a twentieth of R, the arc is taken as a half circle.
+    // At least one unit is tolerated, which is the rounding error of the ends.
     let size = radius.0.abs();
     let slack = (size / 20).clamp(1, SLACK as i32);
     if excess < -8 * i64::from(slack) * i64::from(size) {
         return Err(Status::ArcRadiusTolerance);
     }
-    // 2 h / chord. To the left of the chord lies the centre of the short way counter-clockwise.
+    // 2 h / chord. For the short way counter-clockwise the centre lies to the left of the chord.
     let ratio = root(excess.max(0) as u64) / root(chord_squared as u64);
     let left = if arc.clockwise == (radius.0 < 0) { 0.5 } else { -0.5 };
     let across = |component: i32| math::round(component as f32 * ratio * left);
@@ -217,7 +219,7 @@ fn radius_form(
     Ok([first, second])
 }
 
-/// Square root of an integer of any size, as precise as a float is.
+/// Returns the square root of an integer of any size, with the precision of a float.
 fn root(mut square: u64) -> f32 {
     let mut scale = 1.0;
     while square > u64::from(u32::MAX) {
@@ -227,7 +229,7 @@ fn root(mut square: u64) -> f32 {
     math::sqrt(square as u32 as f32) * scale
 }
 
-/// The two coordinates in the plane of an arc.
+/// Returns the two coordinates of a point in the plane of an arc.
 #[inline(never)]
 fn in_plane(point: &PerAxis<Length>, arc: &Arc) -> [Length; 2] {
     [arc.first, arc.second].map(|axis| point.get(usize::from(axis)).copied().unwrap_or_default())

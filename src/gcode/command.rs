@@ -1,8 +1,7 @@
-//! What one line of G-code asks of the machine: canonical commands, in millimetres and machine coordinates.
+//! Canonical commands: what one line of G-code asks of the machine, in millimetres and machine coordinates.
 //!
-//! The interpreter fills one [`Commands`] for a line; [`steps`](super::steps) takes them apart in the order
-//! of the fields, which is the RS274 order of execution. Everything modal (units, distance mode,
-//! offsets, planes) has been resolved.
+//! The interpreter fills one [`Commands`] for a line. [`steps`](super::steps) carries its fields out in their order,
+//! which is the RS274 order of execution. Everything modal (units, distance mode, offsets, planes) has been resolved.
 
 use super::decimal::Exact;
 use super::heating::Heat;
@@ -19,9 +18,9 @@ pub const N_MAX: u32 = 0xFF_FFFF;
 pub struct Commands {
     /// The N word, 0 if the line has none; at most [`N_MAX`].
     pub line: u32,
-    /// M6: this tool is in the spindle.
+    /// M6: this tool is in the spindle from now on.
     pub tool: Option<u8>,
-    /// M3, M4, M5, or S while it turns.
+    /// M3, M4, M5, or S while the spindle turns.
     pub spindle: Option<Spindle>,
     /// M7, M8, M9: the coolants that run, bits of [`Coolant`](super::modal::Coolant).
     pub coolant: Option<u8>,
@@ -29,12 +28,12 @@ pub struct Commands {
     pub overrides: Option<Change>,
     /// G4: stand still for this many milliseconds.
     pub dwell_ms: Option<u32>,
-    /// What its axes do, if anything.
+    /// What the axes do, if anything.
     pub motion: Motion,
-    /// G61.1 is in force: moves end at rest. By itself it is nothing to carry out.
+    /// G61.1 is in force: moves end at standstill. Without a move this asks for nothing.
     pub exact_stop: bool,
-    /// G64, of a straight move: short ones within this tolerance of a line may be made one, in units of [`Length`] and one more. 0 under
-    /// G61 and G61.1: none are.
+    /// G64, for a straight move: successive short moves may be merged into one if they stay within a tolerance. The
+    /// value is the tolerance in units of [`Length`] plus one. 0 with G61 and G61.1: moves are not merged.
     pub blend: u8,
     /// M0, M1, M2, M30, M60.
     pub stop: Stop,
@@ -46,15 +45,15 @@ impl Commands {
         matches!(self.motion, Motion::None) && self.is_motion_alone()
     }
 
-    /// Whether it has nothing to do but a straight move.
+    /// Whether the line asks for one straight move and for nothing else.
     pub fn is_straight(&self) -> bool {
         matches!(self.motion, Motion::Traverse { .. } | Motion::Feed { .. })
             && self.is_motion_alone()
     }
 
-    /// Whether it has nothing to do but to move.
+    /// Whether the line asks for nothing besides its motion. Also true if there is no motion.
     pub fn is_motion_alone(&self) -> bool {
-        // In full, so that a new part is not forgotten here.
+        // All fields are listed, so that a new field cannot be forgotten here.
         let Commands {
             line: _,
             tool,
@@ -75,21 +74,21 @@ impl Commands {
             && *stop == Stop::None
     }
 
-    /// Empties it, by a call.
+    /// Empties the commands. Not inlined, unlike `clear_here`.
     #[inline(never)]
     #[small]
     pub fn clear(&mut self) {
         self.clear_here();
     }
 
-    /// Empties it, touching nothing but the tags: it is large.
+    /// Empties the commands. Writes only the tags, because the whole structure is large.
     #[inline(always)]
     pub(super) fn clear_here(&mut self) {
         self.motion = Motion::None;
         self.clear_beside_motion();
     }
 
-    /// Empties it but for the motion.
+    /// Empties everything except the motion.
     #[inline(always)]
     pub(super) fn clear_beside_motion(&mut self) {
         self.line = 0;
@@ -107,57 +106,58 @@ impl Commands {
 /// How the spindle is to turn.
 #[derive(Clone, Copy, Default, Debug, PartialEq)]
 pub struct Spindle {
-    /// Which way.
+    /// The direction, or off.
     pub turn: Turn,
-    /// S, in turns per minute.
+    /// S: turns per minute, or m/min with G96. [`Surface`] then gives the turns.
     pub speed: f32,
 }
 
-/// G96: the spindle turns as fast as a surface speed asks for at the radius where X is.
+/// G96: a constant surface speed. The spindle speed follows from it and from the radius at which X is.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Surface {
-    /// m/min; more than 0 while it is in force.
+    /// The surface speed, m/min. More than 0 while it is in force.
     pub speed: f32,
-    /// The most, turns a minute; 0 for [`FASTEST`].
+    /// The highest spindle speed, turns a minute; 0 for [`FASTEST`].
     pub limit: u16,
     /// The machine coordinate X of the axis of rotation.
     pub origin: Length,
 }
 
-/// The most turns a minute that a surface speed asks for, at the axis of rotation too.
+/// The highest spindle speed without a limit, turns a minute. It applies at the axis of rotation, where the radius is
+/// 0.
 const FASTEST: f32 = 65_535.0;
 
-/// From m/min to turns a minute at a radius of one unit: 10^7 units are a m, and a turn is 2 pi radii.
+/// Factor from m/min to turns a minute at a radius of one unit: 10^7 units are 1 m, and a circumference is 2 pi radii.
 const TURNS: f32 = 1e7 / core::f32::consts::TAU;
 
 impl Surface {
-    /// Not in force.
+    /// The value while no surface speed is in force.
     pub const NONE: Self = Self { speed: 0.0, limit: 0, origin: Length::ZERO };
 
-    /// Whether it is in force.
+    /// Whether the surface speed is in force.
     pub fn is_on(&self) -> bool {
         self.speed.to_bits() != 0
     }
 
-    /// The most turns a minute.
+    /// Returns the highest spindle speed, turns a minute.
     pub fn most(&self) -> f32 {
         if self.limit == 0 { FASTEST } else { self.limit.into() }
     }
 
-    /// How fast the spindle turns with X there, machine coordinates; turns a minute. Cost on AVR: 1,100 cycles.
+    /// Returns the spindle speed with X at `x`, machine coordinates. In turns a minute. Cost on AVR: 1,100 cycles.
     #[inline(never)]
     #[small]
     pub fn turns(&self, x: Length) -> f32 {
         let most = self.most();
         let radius = x.0.abs_diff(self.origin.0);
         let turns = self.speed * TURNS;
-        // Compared as a product: nothing is divided by 0.
+        // The comparison is of products, so that a radius of 0 is no division by 0.
         let radius = radius as f32;
         if turns < most * radius { turns / radius } else { most }
     }
 }
 
-/// What axes do. Targets are machine coordinates.
+/// The motion of the axes. Targets are machine coordinates.
 #[derive(Clone, Copy, Default, Debug, PartialEq)]
 pub enum Motion {
     /// No motion.
@@ -191,27 +191,27 @@ pub enum Motion {
         /// Where to in the end.
         target: PerAxis<Length>,
     },
-    /// G38.2 to G38.5: straight at the feed rate, until the probe says stop.
+    /// G38.2 to G38.5: straight at the feed rate, until the probe makes or loses contact.
     Probe {
-        /// Where to at most.
+        /// Where the move ends without contact.
         target: PerAxis<Length>,
         /// How fast.
         feed: Feed,
-        /// Which of them.
+        /// Which of the four codes.
         mode: MotionMode,
     },
     /// G33 and G33.1: straight, in step with the spindle.
     Thread {
         /// Where to.
         target: PerAxis<Length>,
-        /// How far the axis that moves farthest goes in a turn.
+        /// How far the axis that moves farthest goes in a turn of the spindle.
         lead: Length,
-        /// G33.1: the spindle turns round there, and they come back in step.
+        /// G33.1: the spindle reverses at the target, and the axes come back in step with it.
         returns: bool,
     },
-    /// G76.
+    /// G76: a thread in several passes.
     ThreadCycle(ThreadCycle),
-    /// G73, G81 to G89.
+    /// G73, G81 to G89: a canned cycle.
     Cycle(Cycle),
     /// G28.2, G28.4: the homing cycle.
     Home {
@@ -220,21 +220,21 @@ pub enum Motion {
         /// Whether the position is set to what the switches say.
         set: bool,
     },
-    /// `{jogx:..}`: a traverse by itself.
+    /// `{jogx:..}`: a jog, which is a traverse.
     Jog {
         /// Where to.
         target: PerAxis<Length>,
     },
-    /// `{chk:1}`, `{chk:0}`: from here on lines are checked only, or carried out again.
+    /// `{chk:1}` and `{chk:0}`: from here on lines are only checked, or are carried out again.
     Check,
-    /// From here on moves follow the plane of the bed, or do not.
+    /// From here on moves follow the plane of the bed (true), or do not.
     #[cfg(feature = "bed-plane")]
     FollowBed(bool),
     /// M104 to M190: heaters and the fan.
     Heat(Heat),
-    /// G28.3: no motor moves; the present position is called this.
+    /// G28.3: sets the present position. No motor moves.
     SetPosition {
-        /// All axes; those that the line does not name are where they were.
+        /// The new coordinates of all axes. Axes that the line does not name keep theirs.
         position: PerAxis<Length>,
     },
 }
@@ -260,38 +260,38 @@ pub struct Arc {
     pub linear: u8,
     /// Centre, machine coordinates, of the first and second axis.
     pub center: [Length; 2],
-    /// G2.
+    /// Whether the arc is clockwise (G2).
     pub clockwise: bool,
     /// Full turns beyond the arc itself; for a full circle (endpoint = start) 0 means one turn.
     pub extra_turns: u16,
 }
 
-/// A canned cycle: one or more holes along the axis across the plane. Machine coordinates.
+/// A canned cycle: one or more holes, drilled along the axis across the plane. Machine coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cycle {
-    /// Which one.
+    /// The code of the cycle.
     pub mode: MotionMode,
-    /// The holes lie in this plane.
+    /// The plane in which the holes lie.
     pub plane: Plane,
-    /// Where the holes are counted from, along the first and second axis of the plane.
+    /// The reference point, along the first and second axis of the plane.
     pub from: [Exact; 2],
-    /// From there to the first hole, and from one hole to the next.
+    /// The distance from the reference point to the first hole, and from each hole to the next.
     pub pitch: [Exact; 2],
     /// How many holes; at least 1.
     pub holes: u16,
-    /// R: feeding begins here.
+    /// R: the level at which feeding begins.
     pub retract: Length,
     /// The bottom of the hole.
     pub bottom: Length,
-    /// Where the axis is left: at `retract`, or above it.
+    /// The level at which the tool leaves a hole: `retract`, or above it.
     pub clear: Length,
-    /// Q: the depth of a peck; more than 0 for cycles that peck.
+    /// Q: the depth of a peck. More than 0 in cycles that peck.
     pub peck: Length,
     /// P: how long to dwell at the bottom.
     pub dwell_ms: u32,
-    /// G87: how far beside the hole the tool goes in and out.
+    /// G87: how far beside the hole the tool enters and leaves.
     pub aside: [Length; 2],
-    /// G87: where the bore ends.
+    /// G87: the level at which the bore ends.
     pub top: Length,
     /// How fast to feed.
     pub feed: Feed,
@@ -299,7 +299,7 @@ pub struct Cycle {
     pub spindle: Spindle,
 }
 
-/// What ends or interrupts a program.
+/// How a line stops or ends the program.
 #[derive(Clone, Copy, Default, Debug, PartialEq, Eq)]
 pub enum Stop {
     /// No stop.

@@ -1,7 +1,7 @@
-//! Canned cycles: from the words of a line to the holes it asks for (RS274/NGC 3.5.16).
+//! Canned cycles: converts the words of a line to the holes that it asks for (RS274/NGC 3.5.16).
 //!
-//! What is done at each hole is in `steps`. R, the depth, Q and P stay in force (`sticky`). With G91 the
-//! holes are counted from the present place, R from the present height, and the depth from R.
+//! The operations at each hole are in `steps`. R, the depth, Q and P stay in force (`sticky`). With G91 the holes are
+//! measured from the present place, R from the present height, and the depth from R.
 
 use kerf_macros::small;
 
@@ -18,7 +18,7 @@ use crate::units::Length;
 
 #[small]
 impl State {
-    /// G73, G81 to G89; `before` is the motion mode of the line before.
+    /// Carries out G73, G81 to G89. `before` is the motion mode of the previous line.
     #[inline(never)]
     #[small]
     pub(super) fn cycle(
@@ -33,9 +33,9 @@ impl State {
         let plane = self.modal.plane;
         let [first, second, across] = plane.axes();
         let here = self.at(across);
-        // Of a line that is refused all of this is undone.
+        // If the line is refused, the caller undoes all of this.
         self.sticky.on(block, mode, before, plane, self.modal.units, here)?;
-        // In its place from the beginning: it is too large to be carried about.
+        // Built in its final place, because it is too large to be copied.
         out.motion = Motion::Cycle(blank(mode, plane, self.spindle()));
         let Motion::Cycle(cycle) = &mut out.motion else { return Err(Status::InternalError) };
         self.levels(here, across, cycle)?;
@@ -52,7 +52,7 @@ impl State {
         self.end_at_last(cycle)
     }
 
-    /// The machine is at the last hole then.
+    /// Moves the model to the last hole, where the cycle ends.
     #[inline(never)]
     #[small]
     fn end_at_last(&mut self, cycle: &Cycle) -> Result<(), Status> {
@@ -94,7 +94,7 @@ impl State {
         if turns { Ok(()) } else { Err(Status::SpindleMustTurn) }
     }
 
-    /// R, the bottom, and the height between holes, machine coordinates.
+    /// Sets R, the bottom, and the height between holes, in machine coordinates.
     #[inline(never)]
     fn levels(&self, here: Length, across: u8, cycle: &mut Cycle) -> Result<(), Status> {
         let words = &self.sticky;
@@ -120,8 +120,8 @@ impl State {
         Ok(())
     }
 
-    /// Where holes are counted from along an axis, and from one to the next: nothing with G90, where all of
-    /// them are at the word.
+    /// Sets the reference point along an axis, and the pitch from hole to hole. With G90 the pitch is 0, so that all
+    /// holes are at the place that the word gives.
     #[inline(never)]
     fn row(
         &self,
@@ -147,7 +147,7 @@ impl State {
         Ok(())
     }
 
-    /// G87: I, J, K.
+    /// Carries out I, J and K of G87.
     #[inline(never)]
     fn back_bore(&self, cycle: &mut Cycle) -> Result<(), Status> {
         let [first, second, across] = self.modal.plane.axes();
@@ -176,7 +176,7 @@ impl State {
     }
 }
 
-/// A cycle of which nothing is known yet.
+/// Returns a cycle whose words have not been read yet.
 #[inline(never)]
 #[small]
 fn blank(mode: MotionMode, plane: Plane, spindle: Spindle) -> Cycle {
@@ -199,7 +199,7 @@ fn blank(mode: MotionMode, plane: Plane, spindle: Spindle) -> Cycle {
     }
 }
 
-/// L: how many holes.
+/// Returns L, the number of holes.
 #[inline(never)]
 #[small]
 fn holes(block: &Block) -> Result<u16, Status> {
@@ -208,7 +208,7 @@ fn holes(block: &Block) -> Result<u16, Status> {
     holes.filter(|holes| *holes > 0).ok_or(Status::LWordInvalid)
 }
 
-/// Q, for the cycles that peck.
+/// Returns Q for the cycles that peck, 0 for all others.
 #[inline(never)]
 #[small]
 fn peck(mode: MotionMode, words: &Sticky) -> Result<Length, Status> {
@@ -219,7 +219,7 @@ fn peck(mode: MotionMode, words: &Sticky) -> Result<Length, Status> {
     if peck > Length::ZERO { Ok(peck) } else { Err(Status::QWordInvalid) }
 }
 
-/// P, for the cycles that dwell; tapping may.
+/// Returns P in milliseconds. Cycles that dwell need P. For all others it is optional, and 0 without P.
 #[inline(never)]
 #[small]
 fn dwell_ms(mode: MotionMode, words: &Sticky) -> Result<u32, Status> {
@@ -238,15 +238,15 @@ fn dwell_ms(mode: MotionMode, words: &Sticky) -> Result<u32, Status> {
 
 #[small]
 impl Cycle {
-    /// Where a hole is, counted from 1; `None` beyond the range of a length.
+    /// Returns the place of a hole in the plane. Holes are counted from 1. `None` beyond the range of a length.
     pub(super) fn hole(&self, number: u16) -> Option<[Value; 2]> {
         let along = |from: Value, pitch: Value| {
             let number = i32::from(number);
-            // 16 by 15 bits, and 15.
+            // Fits 32 bits: a product of 16 by 15 bits, plus 15 bits.
             let rest = i32::from(from.rest) + number * i32::from(pitch.rest);
             let carry = (rest + HALF).div_euclid(2 * HALF);
-            // In 64 bits: on AVR `checked_mul` of an `i32` calls a routine that writes 32 bits where the
-            // compiler has left 16 for it.
+            // In 64 bits, because `checked_mul` of an `i32` is faulty on AVR: it calls a routine that writes 32 bits
+            // where the compiler has reserved 16.
             let way = i64::from(pitch.units.0) * i64::from(number) + i64::from(carry);
             let units = from.units.checked_add(Length(i32::try_from(way).ok()?))?;
             Some(Value { units, rest: (rest - carry * 2 * HALF) as i16 })
@@ -256,5 +256,5 @@ impl Cycle {
     }
 }
 
-/// Half a unit, in the scale of a rest.
+/// Half a unit, in the scale of [`Value::rest`].
 const HALF: i32 = 5_000;

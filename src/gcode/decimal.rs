@@ -1,8 +1,8 @@
 //! Exact decimals, and their conversions.
 //!
-//! A number is kept as written, in three pieces that need no wide arithmetic: the whole part, four
-//! decimals (the resolution of [`Length`]) and four more (what rounding and the residue of
-//! incremental moves need). Decimals beyond the eighth are ignored: in inches that is 0.25 nm.
+//! A number is kept as written, in three parts that need no wide arithmetic: the whole part, four decimals (the
+//! resolution of [`Length`]), and four more decimals for rounding and for the residue of incremental moves. Decimals
+//! beyond the eighth are ignored: in inches that is 0.25 nm.
 
 use crate::status::Status;
 use crate::units::Length;
@@ -10,22 +10,22 @@ use crate::units::Length;
 /// A decimal number, exact to eight decimals. Zero is never negative.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Decimal {
-    /// Left of the point.
+    /// The digits left of the point.
     pub whole: u32,
     /// The first four decimals, 0 to 9999.
     pub frac: u16,
     /// The next four decimals, 0 to 9999.
     pub tail: u16,
-    /// Less than zero.
+    /// Whether the number is less than zero.
     pub negative: bool,
 }
 
-/// A length together with what rounding took from it: `units` + `rest` / 10,000 units.
+/// A length and the remainder of its rounding: `units` + `rest` / 10,000 units.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Exact {
-    /// Rounded to the nearest unit, halves away from zero.
+    /// The length, rounded to the nearest unit, halves away from zero.
     pub units: Length,
-    /// What is left, -5000 to 5000 ten-thousandths of a unit.
+    /// The remainder, -5000 to 5000 ten-thousandths of a unit.
     pub rest: i16,
 }
 
@@ -33,8 +33,8 @@ pub struct Exact {
 const REST: i16 = 10_000;
 
 impl Exact {
-    /// With `carried` added to the rest, as an incremental move does with what the last one left.
-    /// Both rests are at most half a unit, so their sum carries one unit at most.
+    /// Adds `carried` to the remainder, as an incremental move does with the residue of the previous move. Both are at
+    /// most half a unit, so their sum carries one unit at most. `None` beyond the range.
     pub fn carry(self, carried: i16) -> Option<Exact> {
         let rest = self.rest + carried;
         let (step, rest) = match rest {
@@ -47,11 +47,11 @@ impl Exact {
 }
 
 impl Decimal {
-    /// The number as millimetres or degrees.
+    /// Converts the number as millimetres or degrees.
     #[inline(always)]
     pub fn mm(&self) -> Result<Exact, Status> {
-        // Most lengths are below 65 m and have four decimals at most: nothing to round, and a product
-        // of 16 bits by 16.
+        // Most lengths are below 65 m and have at most four decimals. They need no rounding, and a product of 16 by 16
+        // bits.
         match u16::try_from(self.whole) {
             Ok(whole) if self.tail == 0 => {
                 let units = u32::from(whole) * Length::PER_MM as u32 + u32::from(self.frac);
@@ -70,16 +70,17 @@ impl Decimal {
         self.exact(self.whole * Length::PER_MM as u32 + u32::from(self.frac), self.tail)
     }
 
-    /// The number as inches, exact to seven decimals.
+    /// Converts the number as inches, exact to seven decimals.
     ///
-    /// 254,000 units per inch, piece by piece: a fourth decimal is 25.4 units, a seventh 0.0254. Cost on AVR: 400 cycles;
-    /// with more than four decimals two 32-bit divisions more, 1,200.
+    /// An inch is 254,000 units. The three parts are converted one by one: one ten-thousandth is 25.4 units, the
+    /// seventh decimal counts 0.0254 units. Cost on AVR: 400 cycles; with more than four decimals two 32-bit divisions
+    /// more, 1,200.
     #[inline(never)]
     pub fn inch(&self) -> Result<Exact, Status> {
         if self.whole > (i32::MAX / Length::PER_INCH) as u32 {
             return Err(Status::OutOfRange);
         }
-        // 0.4 units for each: 16 bits.
+        // The 0.4 of 25.4 units for each ten-thousandth. The product fits 16 bits.
         let tenths = self.frac * 4;
         let (parts, left) = (tenths / 10, tenths % 10);
         let units = self.whole * Length::PER_INCH as u32 + u32::from(self.frac) * 25;
@@ -92,7 +93,7 @@ impl Decimal {
         self.exact(units, rest)
     }
 
-    /// Rounds and signs a magnitude of `units` + `rest` / 10,000.
+    /// Rounds a magnitude of `units` + `rest` / 10,000, and gives it the sign of the number.
     #[inline(always)]
     fn exact(&self, units: u32, rest: u16) -> Result<Exact, Status> {
         let up = rest >= 5_000;
@@ -105,7 +106,7 @@ impl Decimal {
         })
     }
 
-    /// The half of it, exact to eight decimals.
+    /// Returns half of the number, exact to eight decimals.
     #[small]
     pub fn half(self) -> Self {
         const CARRY: u16 = REST as u16 / 2;
@@ -116,14 +117,14 @@ impl Decimal {
         Self { whole, frac, tail, negative }
     }
 
-    /// Whether it is 0.
+    /// Whether the number is 0.
     #[inline(never)]
     #[small]
     pub fn is_zero(&self) -> bool {
         self.whole == 0 && self.frac == 0 && self.tail == 0
     }
 
-    /// The number as a whole number: 110 if negative, 102 with decimals.
+    /// Returns the number as a whole number. Error 110 if it is negative, error 102 if it has decimals.
     #[inline(never)]
     #[small]
     pub fn integer(&self) -> Result<u32, Status> {
@@ -134,7 +135,8 @@ impl Decimal {
         }
     }
 
-    /// The number as that of a G or M code: 28 and 3 of `G28.3`. `None` if no code has such a number: the highest is 999.9.
+    /// Returns the whole part and the tenths, as in the number of a G or M code: 28 and 3 of `G28.3`. `None` if it
+    /// cannot be the number of a code: the highest is 999.9.
     pub fn code(&self) -> Option<(u16, u8)> {
         let whole = u16::try_from(self.whole).ok().filter(|whole| *whole < 1_000)?;
         let tenth = if self.frac == 0 { 0 } else { (self.frac / 1_000) as u8 };
@@ -142,7 +144,7 @@ impl Decimal {
         (exact && !self.negative).then_some((whole, tenth))
     }
 
-    /// The number as seconds, in milliseconds: 163 if negative, 110 beyond 32 bits.
+    /// Converts the number from seconds to milliseconds. Error 163 if it is negative, error 110 beyond 32 bits.
     #[inline(never)]
     #[small]
     pub fn milliseconds(&self) -> Result<u32, Status> {
@@ -154,7 +156,7 @@ impl Decimal {
         whole.map(|whole| whole + part).ok_or(Status::OutOfRange)
     }
 
-    /// Rounded to a float: for feeds, never for positions.
+    /// Rounds the number to a float. For feeds, never for positions.
     #[inline(never)]
     #[small]
     pub fn to_f32(self) -> f32 {

@@ -1,11 +1,11 @@
 //! The digits of a plain number, for the fast path: up to four decimals, no blanks, no sign.
 //!
-//! Cost on AVR: 22 cycles a digit, and 80 for a number; of the loop the compiler makes twice as much.
+//! Cost on AVR: 22 cycles a digit, and 80 for a number. A loop in Rust would take twice as long.
 
 use crate::hal::text::Cursor;
 
-/// A number below 65,530: the whole, and the decimals as ten-thousandths. More digits are left, where
-/// no word can begin with them. `None` without any digit.
+/// Reads a number below 65,530. Returns the whole part, and the decimals as ten-thousandths. Further digits are not
+/// read; no word can begin with them. `None` without any digit.
 #[inline(always)]
 pub fn decimal(cursor: &mut Cursor) -> Option<(u16, u16)> {
     let (mut whole, missing) = cursor.four();

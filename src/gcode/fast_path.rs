@@ -1,11 +1,11 @@
-//! The fast path: a line of the usual kind, read and carried out in one pass: axis words, with G0 or G1, F and N, while lengths
-//! are in millimetres.
+//! The fast path: reads and carries out a usual line in one pass. A usual line has axis words, and perhaps G0 or G1, F
+//! and N, while lengths are in millimetres.
 //!
-//! [`Interpreter::interpret`](super::Interpreter::interpret) asks here first. Any other line is declined before anything has changed,
-//! and goes through `lexer`, `block` and `motion`, which say what is wrong with it, too. The result is
-//! theirs to the bit: a property of `tests` holds the two against each other.
+//! [`Interpreter::interpret`](super::Interpreter::interpret) tries the fast path first. The fast path declines any
+//! other line before the state has changed. `lexer`, `block` and `motion` then interpret the line, and say what is
+//! wrong with it. Both paths give the same result to the bit: a property test in `tests` compares them.
 //!
-//! Of a printing host lines have E for A, with five decimals, and G0 is G1: that is [`Writer::Prints`].
+//! Lines of a printing host have E instead of A, with five decimals, and G0 means G1: see [`Writer::Prints`].
 //!
 //! Cost on AVR: `X10.375` 1,250 cycles, `G1 X12.345 Y-3.21 F1500` 3,300 (`tests/sim/tests/interpreter.rs`).
 
@@ -22,49 +22,52 @@ use crate::hal::arithmetic::product;
 use crate::hal::text::Cursor;
 use crate::units::{AXES, FIRST_ROTARY, Length, PerAxis};
 
-/// What tells upper from lower case.
+/// The bit that distinguishes lower from upper case.
 const CASE: u8 = 0x20;
-/// Whether there is a dialect of printing hosts.
+/// Whether the image has a dialect of printing hosts.
 const PRINTS: bool = cfg!(feature = "dialect-reprap");
-/// What no line has where a word may begin: reading ends there.
+/// A byte that cannot begin a word. A parser of a number puts it in place of the next byte to make the line be
+/// declined.
 const BAD: u8 = 0x7F;
-/// Words that were seen: an axis has the bit of its number, N and F have these. G is in `mode`.
+/// Bits of `Words::seen`. An axis has the bit of its number; N and F have the bits below. G is in `Words::mode`.
 const AXES_SEEN: u8 = (1 << AXES) - 1;
 const N_SEEN: u8 = 1 << 6;
 const F_SEEN: u8 = 1 << 7;
 
-/// Who has written a line.
+/// The kind of sender that has written a line.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Writer {
-    /// It may have an N word.
+    /// A sender whose lines may have an N word.
     Numbers,
-    /// It may not.
+    /// A sender whose lines may not have an N word.
     Plain,
-    /// A printing host, and there is no N word either.
+    /// A printing host. Its lines may not have an N word.
     Prints,
 }
 
-/// A line that is being read, and what it has said so far.
+/// A line that is being read, and the words that have been read so far.
 struct Words<'a> {
-    /// Where in the line reading is.
+    /// The place in the line up to which it has been read.
     at: Cursor<'a>,
     text: &'a [u8],
+    /// The words that have been read, as bits.
     seen: u8,
     mode: Option<MotionMode>,
     feed: f32,
     line: u32,
-    /// A printing host has written it.
+    /// Whether a printing host has written the line.
     prints: bool,
-    /// Of a relative E word: what rounding took from those before.
+    /// What rounding has taken from previous E words, if the E word is relative.
     carried: Option<i16>,
-    /// What rounding takes from the E word.
+    /// What rounding takes from the E word of this line.
     rest: i16,
 }
 
 impl State {
-    /// Carries a line out by the fast path: with [`Interpreter::interpret`](super::Interpreter::interpret) it would be `Ok`,
-    /// without a comment, and a move. If it is none: false, and nothing done, but the motion in `out` may have changed. A line of a printing host
-    /// is one that is written for the interpreter already but for E and G0.
+    /// Carries a line out by the fast path. This happens only for a move without a comment for which
+    /// [`Interpreter::interpret`](super::Interpreter::interpret) would return `Ok`. Any other line is declined: the
+    /// function returns false and has changed nothing, except perhaps the motion in `out`. A line of a printing host
+    /// has to be in the form of the interpreter already, except for E and G0.
     #[inline(never)]
     pub fn fast_path(
         &mut self,
@@ -75,7 +78,7 @@ impl State {
     ) -> bool {
         let modal = &self.modal;
         let prints = PRINTS && writer == Writer::Prints;
-        // Most of the others end in a comment.
+        // Most lines that are not for the fast path end in a comment.
         if line.last() == Some(&b')') {
             return false;
         }
@@ -99,7 +102,7 @@ impl State {
             _ if prints && self.printing.distance().is_some() => return false,
             Distance::Absolute => &self.origin,
             Distance::Incremental if self.residue.iter().all(|rest| *rest == 0) => &self.position,
-            // What rounding has taken would have to be carried on.
+            // The residue of rounding would have to be added.
             Distance::Incremental => return false,
         };
         if prints {
@@ -125,14 +128,16 @@ impl State {
             && self.carry_out(&words, out)
     }
 
-    /// Whether all that a line from here has to be asked is where it ends, for steps to be counted: so it is on a CoreXY machine, where
-    /// nothing else bounds them. Fine motors are left to the others.
+    /// Whether only the end of a move still has to be checked against [`Setup::reach`]. This is the case in an image
+    /// for CoreXY if the present position is within reach. In other images a machine with a reach is left to the slow
+    /// path.
     #[inline(always)]
     fn reaches(&self, setup: &impl Setup) -> bool {
         Capability::CoreXy.is_built_in() && is_near(&self.position, setup)
     }
 
-    /// What words are measured from, those of the extruder from where it is.
+    /// Returns what the words are measured from, for a line whose E word is relative: the origin, but for the extruder
+    /// its present position.
     #[inline(never)]
     fn with_own_extruder(&self) -> PerAxis<Length> {
         let mut from = self.origin;
@@ -155,7 +160,7 @@ impl State {
             MotionMode::Feed if feed.to_bits() != 0 && units == Units::Mm => {}
             _ => return false,
         }
-        // From here on nothing fails.
+        // Nothing can fail from here on.
         self.modal.motion = mode;
         (self.feed, self.feed_units) = (feed, units);
         self.line = words.line;
@@ -177,7 +182,8 @@ impl State {
         true
     }
 
-    /// Goes to the target on the `named` axes; the others stay, and the target is there, too.
+    /// Moves the model to `target` on the `named` axes. The other axes stay, and their `target` is set to their
+    /// position.
     #[inline(always)]
     fn go(&mut self, mut named: u8, target: &mut PerAxis<Length>) {
         let axes = self.position.iter_mut().zip(&mut self.residue).zip(target);
@@ -192,7 +198,7 @@ impl State {
     }
 }
 
-/// Whether words of the `named` axes are positions, anywhere.
+/// Whether the words of all `named` axes are plain positions without travel limits.
 fn are_usual(mut named: u8, setup: &impl Setup) -> bool {
     let mut axis = 0;
     while named != 0 {
@@ -208,7 +214,8 @@ fn are_usual(mut named: u8, setup: &impl Setup) -> bool {
     true
 }
 
-/// Where a line's target is put together: it need not be copied then, and of most lines before there is such a place.
+/// Returns the place in `motion` in which the target of the line is built, so that it need not be copied. The previous
+/// line has mostly left a `Motion::Feed` there, which is reused.
 #[inline(always)]
 fn target_of(motion: &mut Motion) -> Option<&mut PerAxis<Length>> {
     if !matches!(motion, Motion::Feed { .. }) {
@@ -224,15 +231,15 @@ impl<'a> Words<'a> {
     #[inline(always)]
     fn new(text: &'a [u8], numbered: bool) -> Self {
         let seen = if numbered { 0 } else { N_SEEN };
-        // A byte 0 would pass for the end of the line.
+        // A line that ends in a byte 0 is declined. The byte would be taken for the end of the line.
         let byte = if text.last() == Some(&0) { BAD } else { b' ' };
         let (prints, carried, rest) = (false, None, 0);
         let at = Cursor::new(byte, text);
         Words { at, text, seen, mode: None, feed: 0.0, line: 0, prints, carried, rest }
     }
 
-    /// Reads the line, whose lengths count from `from`; where it goes on the axes that it names is put into `target`, machine coordinates. False
-    /// if it is not for the fast path.
+    /// Reads the line. Its lengths are measured from `from`, and the machine coordinates of the named axes are put into
+    /// `target`. Returns false if the line is not for the fast path.
     #[inline(always)]
     fn read(&mut self, from: &PerAxis<Length>, target: &mut PerAxis<Length>) -> bool {
         loop {
@@ -241,7 +248,7 @@ impl<'a> Words<'a> {
                 b'X'..=b'Z' => letter - b'X',
                 b'A'..=b'C' => letter - b'A' + FIRST_ROTARY as u8,
                 b'E' if PRINTS && self.prints => EXTRUDER as u8,
-                // A blank is that without `CASE`, too.
+                // A blank without the bit `CASE` is 0 as well.
                 0 if self.at.byte == b' ' => {
                     self.at.step();
                     continue;
@@ -273,7 +280,7 @@ impl<'a> Words<'a> {
         }
     }
 
-    /// A word that is none of an axis. False if it is not for the fast path.
+    /// Reads a G, F or N word. Returns false if the word is not for the fast path.
     #[inline(never)]
     fn other(&mut self, letter: u8) -> bool {
         self.at.step();
@@ -295,7 +302,7 @@ impl<'a> Words<'a> {
         true
     }
 
-    /// What a G word says. `None` if it is not for the fast path: neither 0 nor 1, of one digit or behind a zero.
+    /// Reads the number of a G word, 0 or 1, with or without a leading zero. `None` if it is any other number.
     #[inline(never)]
     fn mode(&mut self) -> Option<MotionMode> {
         let digit = self.at.byte;
@@ -315,7 +322,8 @@ impl<'a> Words<'a> {
         }
     }
 
-    /// A number in ten-thousandths. One that is not for the fast path leaves `BAD` to be read.
+    /// Reads a number and returns it in ten-thousandths. If the number is not for the fast path, `BAD` is the next
+    /// byte.
     #[inline(never)]
     fn number(&mut self) -> i32 {
         let negative = self.at.byte == b'-';
@@ -323,17 +331,18 @@ impl<'a> Words<'a> {
             self.at.step();
         }
         let (whole, frac) = self.decimal();
-        // 65,535.9999 at most: that fits.
+        // Fits: the number is 65,535.9999 at most.
         let value = (product(whole, 10_000) + u32::from(frac)) as i32;
         if negative { -value } else { value }
     }
 
-    /// Where in the line the byte behind the current one is.
+    /// Returns the index in the line of the byte behind the current one.
     fn next(&self) -> usize {
         self.text.len().saturating_sub(self.at.left().into())
     }
 
-    /// An E word, whose first four decimals have been read, with a fifth one and what those before have left.
+    /// Completes an E word whose first four decimals have been read. Adds the fifth decimal, and for a relative E word
+    /// what rounding has taken from previous ones.
     #[inline(never)]
     fn filament(&mut self, value: Length) -> Length {
         let mut by = Exact { units: value, rest: 0 };
@@ -352,7 +361,7 @@ impl<'a> Words<'a> {
         by.units
     }
 
-    /// With the fifth decimal; a sixth is left, where no word can begin with it.
+    /// Adds the fifth decimal. A sixth one is not read: no word can begin with a digit, so the line is declined.
     fn fifth(&mut self, value: Length) -> Exact {
         let digit = i16::from(self.at.byte - b'0');
         self.at.step();
@@ -366,7 +375,7 @@ impl<'a> Words<'a> {
         Exact { units: Length(value.0 + step), rest }
     }
 
-    /// The number of an F word.
+    /// Reads the number of an F word.
     #[inline(never)]
     fn feed(&mut self) -> f32 {
         let Ok(value) = u32::try_from(self.number()) else {
@@ -386,7 +395,7 @@ impl<'a> Words<'a> {
         number.unwrap_or_default()
     }
 
-    /// A whole number below ten million. One that is longer is not for the fast path: its next digit is no letter.
+    /// Reads a whole number below ten million. A longer number is declined, because its next digit is no letter.
     #[inline(never)]
     fn integer(&mut self) -> u32 {
         let mut value = 0;

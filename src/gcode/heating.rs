@@ -1,7 +1,8 @@
-//! What a line asks of heaters and fans: M104 to M190, of an image with [`Capability::Printer`].
+//! Heaters and fans: M104 to M190, in an image with [`Capability::Printer`].
 //!
-//! A line has one of these codes and no move: senders of printers write them so. S is a temperature in degrees Celsius, or how fast the
-//! fan is, 0 to 255. T and P say which hot end and which fan: there is one of each, 0.
+//! A line may have only one of these codes, and no move. Senders for printers write lines in this way. S is a
+//! temperature in degrees Celsius, or the speed of the fan, 0 to 255. T selects the hot end and P the fan. There is one
+//! of each, number 0.
 
 use super::block::Block;
 use super::codes::HeatCode;
@@ -12,7 +13,7 @@ use super::words::{P, R, S, T};
 use crate::capability::Capability;
 use crate::status::Status;
 
-/// What is heated or turned.
+/// The heater or fan that a line is for.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[repr(u8)]
 pub enum Part {
@@ -27,7 +28,7 @@ pub enum Part {
     Fan = 3,
 }
 
-/// What motion waits for.
+/// The condition that motion waits for.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Wait {
     /// No wait.
@@ -35,20 +36,21 @@ pub enum Wait {
     Nothing,
     /// Waits until the heater is at its target or hotter.
     Hot,
-    /// Waits until the heater is at its target, from above as well.
+    /// Waits until the heater is at its target, also while it cools down.
     Reached,
     /// Waits until the factors of the heater have been found (M303).
     Tuned,
 }
 
-/// What a line asks for.
+/// The request of a line.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Heat {
-    /// The part that is heated.
+    /// The heater or the fan.
     pub part: Part,
-    /// What it is to be from here on: eighths of a degree Celsius, 0 for off; of the fan 0 to 255. `None` leaves it.
+    /// The new target: eighths of a degree Celsius with 0 for off, or the speed of the fan, 0 to 255. `None` leaves it
+    /// as it is.
     pub to: Option<u16>,
-    /// What motion waits for then.
+    /// What motion waits for afterwards.
     pub wait: Wait,
 }
 
@@ -57,12 +59,12 @@ impl Heat {
     pub const OFF: Self = Self { part: Part::All, to: Some(0), wait: Wait::Nothing };
 }
 
-/// How fast a fan is at most.
+/// The highest speed of a fan.
 const FULL: u32 = 255;
 
 #[small]
 impl State {
-    /// M104 to M190.
+    /// Carries out M104 to M190.
     #[inline(never)]
     pub(super) fn heat(
         block: &Block,
@@ -96,14 +98,15 @@ impl State {
     }
 }
 
-/// M104, M140.
+/// Carries out M104 and M140.
 #[small]
 fn set(block: &Block, setup: &impl Setup, part: Part) -> Result<Heat, Status> {
     let to = temperature(block, S, setup, part)?.ok_or(Status::SWordMissing)?;
     Ok(Heat { part, to: Some(to), wait: Wait::Nothing })
 }
 
-/// M109, M190: S waits while it heats, R while it cools as well, neither for what has been set.
+/// Carries out M109 and M190. With S motion waits while the heater heats up, with R while it cools down as well.
+/// Without both motion waits for the target that has been set before.
 #[small]
 fn reach(block: &Block, setup: &impl Setup, part: Part) -> Result<Heat, Status> {
     let (s, r) = (temperature(block, S, setup, part)?, temperature(block, R, setup, part)?);
@@ -114,7 +117,7 @@ fn reach(block: &Block, setup: &impl Setup, part: Part) -> Result<Heat, Status> 
     }
 }
 
-/// The temperature of a word, if it is there, in eighths of a degree.
+/// Returns the temperature of a word in eighths of a degree. `None` without the word.
 #[inline(never)]
 #[small]
 fn temperature(
@@ -125,7 +128,7 @@ fn temperature(
 ) -> Result<Option<u16>, Status> {
     let Some(word) = block.get(slot) else { return Ok(None) };
     let thousandths = word.milliseconds().map_err(|_| Status::OutOfRange)?;
-    // Up to 8,000 degrees, which no heater takes.
+    // Limited to 8,000 degrees, which no heater accepts, so that eighths fit 16 bits.
     let eighths = (thousandths.min(8_000_000) + 62) / 125;
     let eighths = eighths as u16;
     if eighths > 0 {
@@ -137,7 +140,7 @@ fn temperature(
     Ok(Some(eighths))
 }
 
-/// How fast the fan is to be: all it can without S.
+/// Returns the speed of the fan. Without S it is the highest speed.
 #[small]
 fn fan(block: &Block) -> Result<u16, Status> {
     if block.get(P).is_some_and(|word| !word.is_zero()) {

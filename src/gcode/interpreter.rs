@@ -1,16 +1,16 @@
-//! The interpreter: one line of G-code in, canonical commands out, modal state and position kept.
+//! The interpreter: takes one line of G-code, returns canonical commands, and keeps the modal state and the position.
 //!
-//! Called by the task that reads lines; never waits. A line that is refused changes nothing. The
-//! position is the programmed one, ahead of the machine by whatever is queued.
+//! The parser task calls it. It never waits. A line that is refused changes nothing. The position is the programmed
+//! one: it is ahead of the machine by the moves that are queued.
 //!
 //! Order of execution (RS274/NGC section 3.8): feed mode, F, S, T, M6, spindle, coolant, overrides, dwell,
 //! plane, units, tool length, coordinate system, path, distance, retract, group 0, motion, stop. One
 //! departure: the units come first, so that F is in the units of its own line. LinuxCNC and TinyG read
-//! `G20 F10` in the units of the line before, which is 25.4 times too fast or too slow, and which their
-//! users keep reporting.
+//! `G20 F10` in the units of the previous line, which is 25.4 times too fast or too slow. Their users keep
+//! reporting this as a bug.
 //!
-//! Cost on AVR: of a usual line see `fast_path`; of others, words and comments included, at most 6,000 cycles for
-//! a typical G1, in inches too (`tests/sim/tests/interpreter.rs`).
+//! Cost on AVR: for a usual line see `fast_path`. For a typical G1 off the fast path, in millimetres or inches and
+//! with all its words and comments, at most 6,000 cycles (`tests/sim/tests/interpreter.rs`).
 
 use super::block::Block;
 use super::codes::NonModal;
@@ -26,18 +26,19 @@ use crate::capability::Capability;
 use crate::status::Status;
 use crate::units::{AXES, Length, PerAxis};
 
-/// What a line was, besides commands.
+/// What a line contained besides commands.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Info {
-    /// Where in the line the text of its `(MSG ...)` lies: first byte, and the byte behind the last.
+    /// Where in the line the text of its `(MSG ...)` lies: the index of the first byte, and of the byte behind the
+    /// last.
     pub message: Option<(u8, u8)>,
-    /// A slash deleted the line: to be answered with [`Status::Noop`].
+    /// Whether a slash deleted the line. The answer to such a line is [`Status::Noop`].
     pub deleted: bool,
-    /// There was a comment.
+    /// Whether the line had a comment.
     pub commented: bool,
 }
 
-/// The state of the G-code interpreter, and who keeps its tables.
+/// The state of the G-code interpreter, and the keeper of its tables.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Interpreter<T = Ram> {
     pub(super) state: State,
@@ -45,35 +46,35 @@ pub struct Interpreter<T = Ram> {
 }
 
 impl Interpreter {
-    /// At power-up: everything 0; G80 and the usual modes.
+    /// Returns an interpreter at power-up: everything is 0, and G80 and the usual modes are in force.
     pub const fn new() -> Self {
         Self::with(Ram::new())
     }
 }
 
 impl<T> Interpreter<T> {
-    /// An interpreter at power-up whose tables are kept elsewhere.
+    /// Returns an interpreter at power-up whose tables are kept by `tables`.
     pub const fn with(tables: T) -> Self {
         Self { state: State::new(&Defaults::USUAL), tables }
     }
 }
 
 impl<T: Tables> Interpreter<T> {
-    /// Starts in the modes that the machine starts in.
+    /// Puts the default modes of the machine in force.
     pub fn start(&mut self, setup: &impl Setup) {
         self.state.modal = Modal::new(&setup.defaults());
-        // Nothing else shifts the origin yet, so that the sum is within the range.
+        // Nothing else shifts the origin yet, so the sum cannot leave the range.
         self.restore_origin();
     }
 
-    /// G0 is in force unless another motion mode is: where grbl's dialect begins.
+    /// Puts G0 in force if no motion mode is in force, as at the start of grbl's dialect.
     pub fn begin_with_rapids(&mut self) {
         if self.state.modal.motion == MotionMode::None {
             self.state.modal.motion = MotionMode::Traverse;
         }
     }
 
-    /// What a reset of grbl does besides the end of a program: G0, T0, S0, no tool length.
+    /// Does what a reset of grbl does in addition to the end of a program: G0, T0, S0, no tool length.
     #[inline(never)]
     #[small]
     pub fn reset(&mut self) {
@@ -81,13 +82,13 @@ impl<T: Tables> Interpreter<T> {
         state.modal.motion = MotionMode::Traverse;
         (state.selected, state.speed) = (0, 0.0);
         for axis in 0..AXES as u8 {
-            // The sum of what is left is within the range.
+            // Cannot fail: without the tool length the sum is within the range.
             let _ = state.set_tool_length(axis, Length::ZERO);
         }
     }
 
-    /// Sets a value of a row as G10 does: it is in force when this returns. [`Status::Again`] as of
-    /// [`Self::interpret`]; after an error everything is what it was.
+    /// Sets one value of a table row, as G10 does. The value is in force when this returns. After an error nothing has
+    /// changed. For [`Status::Again`] see [`Self::interpret`].
     #[inline(never)]
     pub fn set(&mut self, row: TableRow, axis: u8, value: Length) -> Result<(), Status> {
         let mut values = self.tables.row(row);
@@ -101,17 +102,18 @@ impl<T: Tables> Interpreter<T> {
         Ok(())
     }
 
-    /// Sets the tool length on one axis, machine coordinates, as G43.1 does; lines that are interpreted later go by it.
+    /// Sets the tool length on one axis, in machine coordinates, as G43.1 does. It applies to the lines that are
+    /// interpreted from now on.
     #[small]
     pub fn set_tool_length(&mut self, axis: u8, length: Length) -> Result<(), Status> {
         self.state.set_tool_length(axis, length)
     }
 
-    /// Interprets one line without its terminator, for a machine that is `setup` so.
+    /// Interprets one line without its terminator. `setup` describes the machine.
     ///
-    /// `Ok`: `out` is what the machine has to do, and the state has advanced as if it had done so.
-    /// `Err`: the state is what it was, and `out` empty. [`Status::Again`]: the tables are not ready for the line,
-    /// which is to be tried again.
+    /// After `Ok`, `out` contains what the machine has to do, and the state has advanced as if that were done. After
+    /// `Err`, the state is unchanged and `out` is empty. [`Status::Again`] says that the tables are not ready for the
+    /// line: the caller tries it again later.
     pub fn interpret(
         &mut self,
         line: &[u8],
@@ -124,7 +126,7 @@ impl<T: Tables> Interpreter<T> {
         self.slow_path(line, setup, out)
     }
 
-    /// Carries a line out by the fast path: see [`State::fast_path`].
+    /// Carries a line out by the fast path. Returns false if the fast path declines the line: see [`State::fast_path`].
     pub fn fast_path(
         &mut self,
         line: &[u8],
@@ -135,7 +137,8 @@ impl<T: Tables> Interpreter<T> {
         self.state.fast_path(line, writer, setup, out)
     }
 
-    /// Interprets a line as [`Self::interpret`] does, without trying [`Self::fast_path`] first. Call it when that has declined the line.
+    /// Interprets a line as [`Self::interpret`] does, without trying [`Self::fast_path`] first. Call it when the fast
+    /// path has declined the line.
     #[inline(never)]
     pub fn slow_path(
         &mut self,
@@ -154,8 +157,8 @@ impl<T: Tables> Interpreter<T> {
         Ok(Info { message, deleted: slashed && deletes, commented })
     }
 
-    /// Interprets the words of a jog: a move at their feed rate, in their units and distance mode or those in force, after which everything
-    /// modal is as it was.
+    /// Interprets the words of a jog: one feed move. The words have to give the feed rate. They may give units and a
+    /// distance mode, else those in force apply. The modal state is the same afterwards as before.
     #[inline(never)]
     #[small]
     pub fn jog(
@@ -169,7 +172,7 @@ impl<T: Tables> Interpreter<T> {
         block.read(words, false)?;
         block.check(MotionMode::Feed)?;
         self.halve(&mut block);
-        // Of what is rare a jog has G53 alone, which is a matter of its move.
+        // The only rare code in a jog is G53, which affects nothing but the move.
         if block.is_rare() && block.non_modal != Some(NonModal::MachineCoordinates) {
             return Err(Status::GcodeUnsupported);
         }
@@ -183,7 +186,7 @@ impl<T: Tables> Interpreter<T> {
         done.map(|()| Info::default())
     }
 
-    /// Makes a radius of the X word if it is a diameter, for whatever it is used.
+    /// Converts the X word from a diameter to a radius if G7 is in force, whatever the word is used for.
     #[inline(always)]
     fn halve(&self, block: &mut Block) {
         let mode = block.x_mode.unwrap_or(self.state.modal.x_mode);
@@ -205,7 +208,8 @@ impl<T: Tables> Interpreter<T> {
         self.execute_common(block, setup, out)
     }
 
-    /// Executes a block of modes, the feed, and the position of the axes that it names, or nothing of it.
+    /// Executes a block that changes only modes, the feed and the position of its axes. If the block is refused, undoes
+    /// all of it.
     #[inline(never)]
     fn execute_common(
         &mut self,
@@ -223,7 +227,8 @@ impl<T: Tables> Interpreter<T> {
         done
     }
 
-    /// Executes a block that may change more than modes, the feed and the position of its axes.
+    /// Executes a block that may change more than modes, the feed and the position of its axes. If the block is
+    /// refused, undoes all of it.
     #[inline(never)]
     #[small]
     fn execute_rare(
@@ -256,7 +261,7 @@ impl<T: Tables> Interpreter<T> {
         done
     }
 
-    /// The origin by what it is the sum of, which was within the range before.
+    /// Computes the origin again as the sum of its parts. The sum was within the range before, so this cannot fail.
     #[inline(never)]
     #[small]
     fn restore_origin(&mut self) {
@@ -265,8 +270,8 @@ impl<T: Tables> Interpreter<T> {
     }
 }
 
-/// What a block of moves and modes may change of the state, as it was: all of it would take 1,500 cycles
-/// to copy.
+/// A copy of those parts of the state that a block of moves and modes may change. A copy of the whole state would take
+/// 1,500 cycles.
 struct Before {
     modal: Modal,
     feed: f32,
@@ -296,8 +301,9 @@ impl Before {
     }
 }
 
-/// What a block of any kind may change, but for the words of a cycle, which `State` sees to, and the origin:
-/// the less of it there is the better, for the deepest stack is below it.
+/// A copy of those parts of the state that any block may change, except the words of a canned cycle, which `State`
+/// restores itself, and the origin, which is computed again. It is kept small because the deepest stack is reached
+/// while it exists.
 struct RareBefore {
     usual: Before,
     homed: u8,
@@ -329,8 +335,8 @@ impl RareBefore {
     }
 }
 
-/// Modes and words of the program, as they were before lines were checked: what [`Offsets`] do not have. Position and the words of canned
-/// cycles are not kept.
+/// Modes and words of the program before check mode began. Together with [`Offsets`] this is all that is kept; the
+/// position and the words of canned cycles are not.
 #[derive(Clone, Copy, Debug)]
 pub struct Modes {
     modal: Modal,
@@ -344,7 +350,7 @@ pub struct Modes {
     tool: u8,
 }
 
-/// Offsets that are in no table, as they were before lines were checked.
+/// The offsets that are in no table, as they were before check mode began.
 #[derive(Clone, Copy, Debug)]
 pub struct Offsets {
     shift: PerAxis<Length>,
@@ -354,7 +360,7 @@ pub struct Offsets {
 
 #[small]
 impl<T: Tables> Interpreter<T> {
-    /// What lines that are only checked may change, to [give it back](Self::give_back) afterwards.
+    /// Returns what lines in check mode may change. [`Self::give_back`] restores it afterwards.
     #[inline(never)]
     pub fn keep(&self) -> (Modes, Offsets) {
         let State { modal, feed, feed_units, line, homed, speed, limit, selected, tool, .. } =
@@ -366,8 +372,8 @@ impl<T: Tables> Interpreter<T> {
         )
     }
 
-    /// Everything is as it was kept, and the machine at this place. A canned cycle that was in force is not any more; nor is an axis
-    /// homed that has lost its place meanwhile.
+    /// Restores what [`Self::keep`] has returned, and moves the model to `place`, where the machine is. A canned cycle
+    /// that was in force is cancelled. An axis that has lost its home meanwhile is not homed.
     #[inline(never)]
     pub fn give_back(&mut self, modes: &Modes, offsets: &Offsets, place: &PerAxis<Length>) {
         let state = &mut self.state;
@@ -388,34 +394,34 @@ impl<T: Tables> Interpreter<T> {
     }
 }
 
-/// What reports read, and what the machine corrects.
+/// Getters for reports, and setters for what the machine itself changes.
 impl<T> Interpreter<T> {
-    /// The modes in force.
+    /// Returns the modes in force.
     pub fn modal(&self) -> &Modal {
         &self.state.modal
     }
 
-    /// End of the last move, machine coordinates.
+    /// Returns the end of the last move, machine coordinates.
     pub fn position(&self) -> &PerAxis<Length> {
         &self.state.position
     }
 
-    /// Machine coordinates of the work origin: work position = machine position - this.
+    /// Returns the machine coordinates of the work origin: work position = machine position - work offset.
     pub fn work_offset(&self) -> &PerAxis<Length> {
         &self.state.origin
     }
 
-    /// G92, whether or not it is in force.
+    /// Returns the offsets of G92, whether or not they are in force.
     pub fn shift(&self) -> &PerAxis<Length> {
         &self.state.shift
     }
 
-    /// The tool length in force, on each axis; a part of the work offset.
+    /// Returns the tool length in force, on each axis. It is a part of the work offset.
     pub fn tool_length(&self) -> &PerAxis<Length> {
         &self.state.tool_length
     }
 
-    /// F in mm/min (or mm a turn); 0 if none is in force, as always with G93.
+    /// Returns F in mm/min, or mm a turn with G95. 0 if none is in force, as always with G93.
     pub fn feed_rate(&self) -> f32 {
         match self.state.feed_units {
             Units::Inch => self.state.feed * 25.4,
@@ -423,73 +429,74 @@ impl<T> Interpreter<T> {
         }
     }
 
-    /// S, in turns per minute.
+    /// Returns S: turns per minute, or m/min with G96.
     pub fn spindle_speed(&self) -> f32 {
         self.state.speed
     }
 
-    /// G96, if it is in force.
+    /// Returns the surface speed of G96. `None` with G97.
     pub fn surface(&self) -> Option<Surface> {
         self.state.surface()
     }
 
-    /// The coordinate system: 1, which is G54, to 9, which is G59.3.
+    /// Returns the coordinate system in force: 1 for G54, to 9 for G59.3.
     pub fn coordinate_system(&self) -> u8 {
         self.state.modal.system + 1
     }
 
-    /// Whether the line before asked for the length of a tool that has none, so that 0 is in force. Asked once.
+    /// Whether a line has asked for the length of a tool without a length, so that 0 is in force. Resets the answer.
     pub fn take_lack(&mut self) -> bool {
         core::mem::take(&mut self.state.lacks_length)
     }
 
-    /// The tool in the spindle; 0 for none.
+    /// Returns the tool in the spindle, 0 for none.
     pub fn tool(&self) -> u8 {
         self.state.tool
     }
 
-    /// The tool of the last T.
+    /// Returns the tool of the last T word.
     pub fn selected_tool(&self) -> u8 {
         self.state.selected
     }
 
-    /// Whether an axis is homed: soft limits are for such axes alone.
+    /// Whether an axis is homed. Soft limits apply to homed axes only.
     pub fn is_homed(&self, axis: u8) -> bool {
         self.state.homed & 1 << axis != 0
     }
 
-    /// No axis is homed any more.
+    /// Marks all axes as not homed.
     pub fn forget_homes(&mut self) {
         self.state.homed = 0;
     }
 
-    /// An axis is homed, or no more.
+    /// Sets whether an axis is homed.
     pub fn set_homed(&mut self, axis: u8, homed: bool) {
         let bit = 1 << axis;
         self.state.homed = self.state.homed & !bit | if homed { bit } else { 0 };
     }
 
-    /// The axis that could not be homed last: refused, or on the way.
+    /// Returns the axis whose homing failed last, because the line was refused or during the homing cycle.
     pub fn blamed(&self) -> u8 {
         self.state.blamed
     }
 
-    /// An axis could not be homed.
+    /// Records the axis whose homing has failed.
     pub fn blame(&mut self, axis: u8) {
         self.state.blamed = axis;
     }
 
-    /// No motion mode is in force any more, as after G28.2.
+    /// Cancels the motion mode, as G28.2 does.
     pub fn cancel_motion(&mut self) {
         self.state.modal.motion = MotionMode::None;
     }
 
-    /// The N word of the last line, 0 if it had none.
+    /// Returns the N word of the last line, 0 if the line had none.
     pub fn line(&self) -> u32 {
         self.state.line
     }
 
-    /// Spindle and coolant are so: commands to switch them have been dropped. S of a spindle that is off stays.
+    /// Takes over the actual state of spindle and coolant, after commands that would have switched them were dropped.
+    /// If the spindle is off, S stays.
     pub fn set_outputs(&mut self, spindle: &Spindle, surface: Option<&Surface>, coolant: u8) {
         let state = &mut self.state;
         state.modal.spindle = spindle.turn;
@@ -502,7 +509,7 @@ impl<T> Interpreter<T> {
         state.modal.coolant = coolant;
     }
 
-    /// The coolants that run are these: not a line has switched them.
+    /// Sets the coolants that run, after something other than a line of the program has switched them.
     pub fn set_coolant(&mut self, coolant: u8) {
         self.state.modal.coolant = coolant;
     }

@@ -1,7 +1,7 @@
-//! Words and comments, with `nom`: `G01 X-1.5 (comment) ; comment`.
+//! The lexer: reads words and comments, with `nom`: `G01 X-1.5 (comment) ; comment`.
 //!
-//! Blanks may stand anywhere, inside numbers too (RS274). The parsers are leaves called
-//! one after the other, not trees of combinators: on AVR every level would copy what it returns.
+//! Blanks may stand anywhere, inside numbers too (RS274). The parsers are called one after the other and not combined
+//! into trees, because on AVR every level of combinators would copy what it returns.
 
 use nom::branch::alt;
 use nom::bytes::complete::take_till;
@@ -15,7 +15,7 @@ use super::decimal::Decimal;
 use super::number::decimal;
 use crate::status::Status;
 
-/// Why bytes are no word.
+/// The reason why bytes are no word.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Fault(pub Status);
 
@@ -31,7 +31,7 @@ impl ParseError<&[u8]> for Fault {
     }
 }
 
-/// An error that no other alternative can mend.
+/// Returns an error that ends parsing, without trying other alternatives.
 pub fn failure(status: Status) -> nom::Err<Fault> {
     nom::Err::Failure(Fault(status))
 }
@@ -45,12 +45,12 @@ pub enum Item<'a> {
     Comment(&'a [u8]),
 }
 
-/// White space within a line.
+/// Whether a byte is white space within a line.
 pub fn is_blank(byte: u8) -> bool {
     matches!(byte, b' ' | b'\t' | b'\r')
 }
 
-/// Skips white space. `nom`'s `take_while` takes three times as long to find that there is none.
+/// Skips white space. If there is none, `nom`'s `take_while` takes three times as long.
 pub fn blanks(input: &[u8]) -> Lexed<'_, ()> {
     let mut rest = input;
     while let Some((&byte, after)) = rest.split_first()
@@ -61,9 +61,9 @@ pub fn blanks(input: &[u8]) -> Lexed<'_, ()> {
     Ok((rest, ()))
 }
 
-/// The next item, and the blanks behind it.
+/// Reads the next item and the blanks behind it.
 ///
-/// 101 where no item can begin, 102 for a letter without a number.
+/// Error 101 where no item can begin, error 102 for a letter without a number.
 #[inline(always)]
 pub fn item(input: &[u8]) -> Lexed<'_, Item<'_>> {
     match input.first() {
@@ -79,7 +79,7 @@ fn word(input: &[u8]) -> Lexed<'_, Item<'_>> {
     Ok((input, Item::Word(letter, number)))
 }
 
-/// A letter, in upper case. `nom`'s own would make a 32-bit character of it.
+/// Reads a letter and returns it in upper case. `nom`'s own parser would convert it to a 32-bit character.
 #[inline(always)]
 fn letter(input: &[u8]) -> Lexed<'_, u8> {
     match input.split_first() {
@@ -89,14 +89,15 @@ fn letter(input: &[u8]) -> Lexed<'_, u8> {
 }
 
 #[inline(never)]
-/// `( ... )`, closed or not, or `;` to the end of the line.
+/// Reads a comment: `( ... )`, closed or not, or `;` to the end of the line.
 fn comment(input: &[u8]) -> Lexed<'_, Item<'_>> {
     let inline = delimited(char('('), take_till(|byte| byte == b')'), opt(char(')')));
     let trailing = preceded(char(';'), rest);
     terminated(map(alt((inline, trailing)), Item::Comment), blanks).parse(input)
 }
 
-/// The text behind `MSG` in a comment that has one, from the first byte after it (or its comma).
+/// Returns the text of a comment behind `MSG`, and behind the comma if one follows. `None` if the comment does not
+/// begin with `MSG`.
 pub fn message(comment: &[u8]) -> Option<&[u8]> {
     let (text, _) = blanks(comment).ok()?;
     let (mark, text) = text.split_at_checked(3)?;
@@ -109,7 +110,7 @@ mod tests {
     use super::*;
     use std::vec::Vec;
 
-    /// The items of a line as text, or the refusal.
+    /// Returns the items of a line as text, or the error.
     fn items(line: &str) -> Result<Vec<(char, std::string::String)>, Status> {
         let (mut rest, _) = blanks(line.as_bytes()).unwrap();
         let mut found = Vec::new();

@@ -1,9 +1,9 @@
-//! Soft limits: whether a move stays within the travel of the axes that are homed. And whether its steps can be
-//! counted ([`Setup::reach`]).
+//! Soft limits: checks that a move stays within the travel of the homed axes, and that its steps can be counted
+//! ([`Setup::reach`]).
 //!
-//! Asked for each move before anything is planned; positions are machine coordinates. An axis that a
-//! line does not move is not looked at, so that one beyond its travel does not lock the others. Cost on
-//! AVR: 200 cycles for each axis that moves; an arc 25,000 more.
+//! Each move is checked before it is planned. Positions are machine coordinates. Soft limits are checked only for the
+//! axes that a line moves, so that an axis beyond its travel does not block the others. Cost on AVR: 200 cycles for
+//! each axis that moves; an arc 25,000 more.
 
 use kerf_macros::small;
 
@@ -16,10 +16,10 @@ use crate::math::round;
 use crate::status::Status;
 use crate::units::{Length, PerAxis};
 
-/// An arc may bulge this far over a limit (1 um), and by this part of its radius: so exact is a float.
+/// An arc may exceed a limit by 1 um plus the part [`SLACK_PART`] of its radius. That is the precision of a float.
 const SLACK: f32 = 10.0;
 const SLACK_PART: f32 = 2e-7;
-/// How far a point may be from the origin: 1 um short of what a length can hold.
+/// The least and the greatest coordinate of a point of an arc: 1 um inside the range of a length.
 const RANGE: (Length, Length) = (Length(10 - i32::MAX), Length(i32::MAX - 10));
 
 /// Refuses (220) a move from `start` that leaves the travel of an axis whose bit in `homed` is set.
@@ -34,8 +34,8 @@ pub(super) fn check(
     check_within(start, motion, &Limits { homed: Some(homed), setup })
 }
 
-/// Refuses (110) a move from or to a place where steps cannot be counted, or by way of one. Axes that do not move count as well:
-/// G28.3 tells them where they are.
+/// Refuses (110) a move that begins at, ends at or passes through a place where steps cannot be counted. Axes that do
+/// not move are checked as well, because G28.3 sets their position without a move.
 #[inline(never)]
 #[small]
 pub(super) fn check_reach(
@@ -60,7 +60,7 @@ pub(super) fn check_reach(
     if near { Ok(()) } else { Err(Status::OutOfRange) }
 }
 
-/// Whether steps can be counted there.
+/// Whether steps can be counted at a place.
 #[inline(never)]
 #[small]
 pub fn is_near(place: &PerAxis<Length>, setup: &impl Setup) -> bool {
@@ -73,14 +73,15 @@ pub fn is_near(place: &PerAxis<Length>, setup: &impl Setup) -> bool {
     true
 }
 
-/// Which limits: the travel of the axes that are homed, or how far steps can be counted.
+/// The limits that a move is checked against.
 struct Limits<'a, S> {
+    /// `Some`: the travel of these axes, as bits. `None`: how far steps can be counted.
     homed: Option<u8>,
     setup: &'a S,
 }
 
 impl<S: Setup> Limits<'_, S> {
-    /// The limits of an axis, if it has any.
+    /// Returns the limits of an axis. `None` if it has none.
     #[inline(never)]
     #[small]
     fn of(&self, axis: u8) -> Option<(Length, Length)> {
@@ -128,7 +129,7 @@ fn check_within(
     check_straight(start, target, limits)
 }
 
-// The deepest stack is below it.
+// Inlined, because the deepest stack is reached in the functions below this one.
 #[inline(always)]
 #[small]
 fn check_arc(
@@ -159,7 +160,7 @@ fn check_straight(
     Ok(())
 }
 
-/// The first and the last pass, of which the others lie between.
+/// Checks the first and the last pass. All others lie between them.
 #[inline(never)]
 #[small]
 fn check_threads(
@@ -177,7 +178,7 @@ fn check_threads(
     Ok(())
 }
 
-/// The first and the last hole, with what is done beside them, from the highest to the lowest point.
+/// Checks the first and the last hole and the places beside them, and the highest and the lowest point of the cycle.
 #[inline(never)]
 #[small]
 fn check_cycle(
@@ -201,8 +202,9 @@ fn check_cycle(
     if all { Ok(()) } else { Err(Status::SoftLimit) }
 }
 
-/// Whether the points of an arc that lie farthest out in its plane are within the limits, `both` of its first and
-/// second axis, or [`RANGE`]; its end is not looked at. A helix advances evenly, so that its end is the farthest point along its axis.
+/// Whether the outermost points of an arc in its plane are within the limits of its first and second axis (`both`), or
+/// within [`RANGE`] if `both` is `None`. The end of the arc is not checked here. The linear axis of a helix needs no
+/// check either: it advances evenly, so the end is its farthest point.
 #[inline(never)]
 #[small]
 pub(super) fn arc_is_within(
@@ -250,7 +252,7 @@ mod tests {
     use proptest::prelude::*;
     use std::format;
 
-    /// X, Y, Z from 0 to 100 mm; A from -10 degrees on.
+    /// A machine with X, Y and Z from 0 to 100 mm, and A from -10 degrees without an upper end.
     struct Cube;
 
     impl Setup for Cube {
@@ -334,7 +336,7 @@ mod tests {
 
     #[test]
     fn arcs_over_all_of_their_way() {
-        // These touch at most.
+        // These arcs touch the limits at most.
         for line in [
             "G2 I25",
             "G3 I-25",
@@ -359,7 +361,7 @@ mod tests {
         ] {
             assert_eq!(run(&[&format!("{line} F100")]), Err(Status::SoftLimit), "{line}");
         }
-        // From the wall along the wall: up is in, down is out.
+        // Both arcs begin and end on the limit X0. G3 bulges to the inside, G2 to the outside.
         assert_eq!(run(&["G0 X0 Y20", "G3 X0 Y40 R10 F9"]), Ok(()));
         assert_eq!(run(&["G0 X0 Y20", "G2 X0 Y40 R10 F9"]), Err(Status::SoftLimit));
     }
@@ -393,7 +395,7 @@ mod tests {
                     at < -margin || at > 1_000_000 + margin
                 })
             };
-            // Who starts outside may come back.
+            // A move that starts outside may come back.
             if beyond(&start, -50) {
                 return Ok(());
             }

@@ -1,4 +1,4 @@
-//! G-code: from the bytes of a line to canonical commands.
+//! G-code: converts the bytes of a line to canonical commands.
 //!
 //! ```text
 //! bytes -> lexer (words) -> block (codes sorted by modal group, values by letter)
@@ -6,7 +6,7 @@
 //!                                   Commands with an arc -> arc (chords) -> planner
 //! ```
 //! A plain move takes none of these steps: `fast_path` reads and carries it out in one pass.
-//! [`codes`] is the language: one table row per code. Everything here is pure and never waits.
+//! [`codes`] defines the language, with one table row per code. Everything here is pure and never waits.
 
 pub mod arc;
 mod axes;

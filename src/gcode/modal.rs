@@ -4,7 +4,7 @@
 
 use crate::capability::Capability;
 
-/// Group 1: what axis words alone do.
+/// Group 1: what axis words do on a line without a motion code.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub enum MotionMode {
@@ -18,7 +18,7 @@ pub enum MotionMode {
     CounterclockwiseArc = 3,
     /// G80.
     None = 4,
-    /// G38.2: until the probe touches; it must.
+    /// G38.2: until the probe makes contact. No contact is an error.
     ProbeTowards = 5,
     /// G81.
     Drill = 6,
@@ -40,11 +40,11 @@ pub enum MotionMode {
     BoreDwell = 14,
     /// G73.
     ChipBreak = 15,
-    /// G38.3: until the probe touches; it may not.
+    /// G38.3: until the probe makes contact. No contact is no error.
     ProbeTowardsQuietly = 16,
-    /// G38.4: until the probe lets go; it must.
+    /// G38.4: until the probe loses contact. Lasting contact is an error.
     ProbeAway = 17,
-    /// G38.5: until the probe lets go; it may not.
+    /// G38.5: until the probe loses contact. Lasting contact is no error.
     ProbeAwayQuietly = 18,
     /// G33, G32: in step with the spindle.
     Thread = 19,
@@ -55,15 +55,15 @@ pub enum MotionMode {
 }
 
 impl MotionMode {
-    /// How many there are.
+    /// The number of motion modes.
     pub const COUNT: usize = 22;
 
-    /// G73, G81 to G89. Never in an image without them.
+    /// Whether this is G73 or one of G81 to G89. Always false in an image without canned cycles.
     pub fn is_cycle(self) -> bool {
         Capability::Cycles.is_built_in() && self.capability() == Some(Capability::Cycles)
     }
 
-    /// What an image needs to have for it.
+    /// Returns the capability that an image needs for this mode. `None` if every image has it.
     #[inline(always)]
     pub const fn capability(self) -> Option<Capability> {
         match self as u8 {
@@ -74,7 +74,7 @@ impl MotionMode {
         }
     }
 
-    /// Whether this image has it.
+    /// Whether this image has this mode.
     #[inline(always)]
     pub const fn is_built_in(self) -> bool {
         match self.capability() {
@@ -84,7 +84,7 @@ impl MotionMode {
     }
 }
 
-/// Group 2: where arcs lie.
+/// Group 2: the plane of arcs and canned cycles.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub enum Plane {
@@ -97,7 +97,8 @@ pub enum Plane {
 }
 
 impl Plane {
-    /// First and second axis, counter-clockwise from one to the other, and the axis across.
+    /// Returns the first and the second axis of the plane, and the axis across it. Counter-clockwise is from the first
+    /// towards the second axis.
     pub fn axes(self) -> [u8; 3] {
         match self {
             Plane::Xy => [0, 1, 2],
@@ -121,7 +122,7 @@ pub enum Distance {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub enum ArcDistance {
-    /// G90.1: from where X, Y and Z are.
+    /// G90.1: from the work origin.
     Absolute = 0,
     /// G91.1: from the start of the arc.
     Incremental = 1,
@@ -135,7 +136,7 @@ pub enum FeedMode {
     InverseTime = 0,
     /// G94.
     PerMinute = 1,
-    /// G95: for each turn of the spindle.
+    /// G95: F is the feed for each turn of the spindle.
     PerTurn = 2,
 }
 
@@ -145,7 +146,7 @@ pub enum FeedMode {
 pub enum SpeedMode {
     /// G97: turns a minute.
     Turns = 0,
-    /// G96: the speed of the surface that is cut, m/min, or feet a minute with G20.
+    /// G96: the surface speed, m/min, or feet a minute with G20.
     Surface = 1,
 }
 
@@ -159,7 +160,7 @@ pub enum XMode {
     Diameter = 1,
 }
 
-/// Group 6: the length of 1.
+/// Group 6: the unit of lengths.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub enum Units {
@@ -177,13 +178,13 @@ pub enum PathMode {
     Exact = 0,
     /// G61.1: a stop at the end of each move.
     ExactStop = 1,
-    /// G64: short moves that lie on a line may be made one (`motion::chain`).
+    /// G64: short moves that lie on a line may be merged into one (`motion::chain`).
     Continuous = 2,
 }
 
-/// How far from the path G64 may take short moves if it does not say: 1 um, in units of [`Length`](crate::units::Length).
+/// The tolerance of G64 without P: 1 um, in units of [`Length`](crate::units::Length).
 pub const TOLERANCE: u8 = 10;
-/// The most that it can say.
+/// The greatest tolerance that G64 can set.
 pub const TOLERANCE_MAX: u8 = 254;
 
 /// Group 7 of the M codes: how the spindle turns.
@@ -199,7 +200,7 @@ pub enum Turn {
     Counterclockwise = 2,
 }
 
-/// Group 8 of the M codes: what each of them adds to the coolants that run, as bits; M9 takes all.
+/// Group 8 of the M codes: the coolant that each code switches on, as a bit. M9 switches all off.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub enum Coolant {
@@ -211,61 +212,61 @@ pub enum Coolant {
     Flood = 2,
 }
 
-/// Group 10: where a canned cycle ends along its axis.
+/// Group 10: the level at which a canned cycle leaves a hole.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub enum Retract {
-    /// G98: where the axis was before the first cycle, if that is above R.
+    /// G98: the level of the axis before the first cycle, if it is above R; else R.
     Initial = 0,
-    /// G99: at R.
+    /// G99: R.
     ToR = 1,
 }
 
-/// All of them.
+/// The modes of all groups.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Modal {
-    /// Group 1.
+    /// Group 1: motion.
     pub motion: MotionMode,
-    /// Group 2.
+    /// Group 2: the plane.
     pub plane: Plane,
-    /// Group 3.
+    /// Group 3: the distance mode.
     pub distance: Distance,
-    /// Group 4.
+    /// Group 4: the distance mode of I, J and K.
     pub arc_distance: ArcDistance,
-    /// Group 5.
+    /// Group 5: the feed mode.
     pub feed_mode: FeedMode,
-    /// Group 6.
+    /// Group 6: the units.
     pub units: Units,
-    /// Group 10.
+    /// Group 10: the retract level of canned cycles.
     pub retract: Retract,
-    /// Group 14.
+    /// Group 14: the meaning of S.
     pub speed_mode: SpeedMode,
-    /// Group 15.
+    /// Group 15: the meaning of X words.
     pub x_mode: XMode,
-    /// Group 12: 0 to 8 for G54 to G59.3.
+    /// Group 12: the coordinate system, 0 to 8 for G54 to G59.3.
     pub system: u8,
-    /// Group 13.
+    /// Group 13: the path mode.
     pub path: PathMode,
-    /// G64 P: how far from the path short moves may be taken, in units of [`Length`](crate::units::Length).
+    /// G64 P: how far merged moves may deviate from the path, in units of [`Length`](crate::units::Length).
     pub tolerance: u8,
-    /// Group 7 of the M codes.
+    /// Group 7 of the M codes: the spindle.
     pub spindle: Turn,
     /// The coolants that run, bits of [`Coolant`].
     pub coolant: u8,
 }
 
-/// The modes in which the machine starts, and to which M2 and M30 return: settings.
+/// The settings for the modes in which the machine starts, and to which M2 and M30 return.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Defaults {
-    /// `gpl`.
+    /// The setting `gpl`.
     pub plane: Plane,
-    /// `gun`.
+    /// The setting `gun`.
     pub units: Units,
-    /// `gco`: 0 to 8 for G54 to G59.3.
+    /// The setting `gco`: 0 to 8 for G54 to G59.3.
     pub system: u8,
-    /// `gpa`.
+    /// The setting `gpa`.
     pub path: PathMode,
-    /// `gdi`.
+    /// The setting `gdi`.
     pub distance: Distance,
 }
 
@@ -281,13 +282,13 @@ impl Defaults {
 }
 
 impl Modal {
-    /// See [`Commands::blend`](super::command::Commands::blend).
+    /// Returns the value for [`Commands::blend`](super::command::Commands::blend).
     #[inline(always)]
     pub fn blend(&self) -> u8 {
         if self.path == PathMode::Continuous { self.tolerance + 1 } else { 0 }
     }
 
-    /// At power-up: the defaults, and G8 G80 G91.1 G94 G97 G98 M5 M9.
+    /// Returns the modes at power-up: the defaults, and G8 G80 G91.1 G94 G97 G98 M5 M9.
     pub const fn new(defaults: &Defaults) -> Self {
         let Defaults { plane, units, system, path, distance } = *defaults;
         Self {

@@ -1,4 +1,4 @@
-//! Group 1: from axis words to a target, and from F to a feed.
+//! Group 1: computes the target of a move from the axis words, and its feed from F.
 
 use super::axes;
 use super::block::Block;
@@ -13,12 +13,12 @@ use crate::capability::Capability;
 use crate::status::Status;
 use crate::units::{FIRST_ROTARY, Length};
 
-/// A probing move has to be this long: 0.254 mm, in units (RS274/NGC 3.5.9).
+/// The least length of a probing move: 0.254 mm, in units (RS274/NGC 3.5.9).
 const PROBE_MIN: u32 = 2_540;
 
 impl State {
-    /// The move of a line, if it has one: axis words move in the mode in force, unless another code
-    /// has taken them.
+    /// Carries out the move of a line, if it has one. Axis words without a motion code move in the mode in force,
+    /// unless another code has taken them.
     #[inline(never)]
     pub(super) fn motion(
         &mut self,
@@ -47,12 +47,12 @@ impl State {
             MotionMode::Thread => self.thread(block, false, setup, out),
             MotionMode::RigidTap => self.thread(block, true, setup, out),
             MotionMode::ThreadCycle => self.thread_cycle(block, setup, out),
-            // Cycles go their own way.
+            // Canned cycles are carried out by `cycle_motion`.
             _ => Err(Status::InternalError),
         }
     }
 
-    /// The canned cycle of a line that has one.
+    /// Carries out the canned cycle of a line.
     #[inline(never)]
     #[small]
     pub(super) fn cycle_motion(
@@ -94,7 +94,7 @@ impl State {
         out: &mut Commands,
     ) -> Result<(), Status> {
         let moved = self.advance(block, absolute, setup)?;
-        // Of rotary axes alone, F is the degrees per minute, in all units.
+        // If only rotary axes move, F is in degrees per minute, with G20 too.
         let feed = self.rate(block, moved.rotary && !moved.linear)?;
         if block.has(AXES) {
             out.motion = Motion::Feed { target: self.position, feed };
@@ -102,7 +102,7 @@ impl State {
         Ok(())
     }
 
-    /// G38.2 to G38.5 (RS274/NGC 3.5.9).
+    /// Carries out G38.2 to G38.5 (RS274/NGC 3.5.9).
     #[inline(never)]
     #[small]
     fn probe(
@@ -129,7 +129,7 @@ impl State {
         let start = self.position;
         self.advance(block, false, setup)?;
         let target = self.position;
-        // The longest axis stands for the way: within a factor of 1.7.
+        // The longest distance of an axis stands for the length of the move. It is right within a factor of 1.7.
         let way = |(a, b): (&Length, &Length)| a.0.abs_diff(b.0);
         if start.iter().zip(&target).map(way).max().unwrap_or(0) < PROBE_MIN {
             return Err(Status::ProbeTooShort);
@@ -138,7 +138,8 @@ impl State {
         Ok(())
     }
 
-    /// Moves the model by the axis words; `absolute`: to machine coordinates.
+    /// Moves the model by the axis words. With `absolute` they are machine coordinates. Returns the kinds of axes that
+    /// move.
     #[inline(never)]
     pub(super) fn advance(
         &mut self,
@@ -190,13 +191,13 @@ impl State {
         Ok(moved)
     }
 
-    /// The feed of a move; 142 if there is none.
+    /// Returns the feed of a move, or error 142 if none is in force. `rotary` says that only rotary axes move.
     pub(super) fn rate(&self, block: &Block, rotary: bool) -> Result<Feed, Status> {
         let rate = match self.modal.feed_mode {
             FeedMode::InverseTime => block.get(F).map_or(0.0, |value| value.to_f32()),
             _ => self.feed,
         };
-        // Neither negative nor NaN, so the bits tell as much as a comparison, and cost less.
+        // The rate is neither negative nor NaN, so a comparison of its bits with 0 is right, and cheaper.
         if rate.to_bits() == 0 {
             return Err(Status::FeedrateMissing);
         }
@@ -213,7 +214,7 @@ impl State {
         }
     }
 
-    /// G95: at the speed that the spindle has been told.
+    /// Converts a feed of G95 to a feed per minute at the commanded speed of the spindle.
     #[inline(never)]
     fn per_turn(&self, rate: f32) -> Result<Feed, Status> {
         if self.modal.spindle == Turn::Off {
@@ -228,7 +229,7 @@ impl State {
     }
 }
 
-/// Which kinds of axes a line moves.
+/// The kinds of axes that a line moves.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Moved {
     linear: bool,

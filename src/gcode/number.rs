@@ -1,4 +1,4 @@
-//! The numbers of a G-code line, as they are written.
+//! Parsers for the numbers of a G-code line.
 
 use core::slice;
 
@@ -6,8 +6,8 @@ use super::decimal::Decimal;
 use super::lexer::{Lexed, blanks, failure, is_blank};
 use crate::status::Status;
 
-/// A number: sign, digits, point, digits; blanks anywhere, at least one digit, no exponent. Takes the
-/// blanks behind it too.
+/// Reads a number: sign, digits, point, digits, with blanks anywhere, at least one digit, and no exponent. Reads the
+/// blanks behind the number too.
 ///
 /// Cost on AVR: 100 cycles, and 20 for a digit. With blanks inside, or more than four digits on either
 /// side of the point, 300 more, and 50 for a digit.
@@ -19,8 +19,8 @@ pub fn decimal(input: &[u8]) -> Lexed<'_, Decimal> {
     }
 }
 
-/// A number without blanks, with one to four digits left of the point and at most four right of it;
-/// `None` for whatever else may stand there.
+/// Reads a number without blanks, with one to four digits left of the point and at most four right of it. `None` for
+/// any other input.
 #[inline(always)]
 fn usual(input: &[u8]) -> Option<(&[u8], Decimal)> {
     let mut at = input.iter();
@@ -38,7 +38,7 @@ fn usual(input: &[u8]) -> Option<(&[u8], Decimal)> {
     if rest.first().is_some_and(|&byte| is_blank(byte)) {
         (rest, _) = blanks(rest).ok()?;
     }
-    // More digits, or what is none of a number: the other parser will know.
+    // More digits follow, or a byte that no word can begin with. `any` handles these cases.
     if rest.first().is_some_and(|&byte| byte < b'A' && byte != b'(') {
         return None;
     }
@@ -46,7 +46,7 @@ fn usual(input: &[u8]) -> Option<(&[u8], Decimal)> {
     Some((rest, Decimal { whole: whole.into(), frac, tail: 0, negative }))
 }
 
-/// Reads one to four digits, two at a time, for AVR multiplies bytes.
+/// Reads one to four digits, in pairs, because AVR multiplies bytes.
 #[inline(always)]
 fn usual_whole(at: &mut slice::Iter<u8>) -> Option<u16> {
     let first = digit(at)?;
@@ -57,7 +57,7 @@ fn usual_whole(at: &mut slice::Iter<u8>) -> Option<u16> {
     Some(u16::from(high) * 100 + u16::from(pair(third, fourth)))
 }
 
-/// Up to four decimals, as ten-thousandths.
+/// Reads up to four decimals and returns them as ten-thousandths.
 #[inline(always)]
 fn usual_fraction(at: &mut slice::Iter<u8>) -> u16 {
     let Some(first) = digit(at) else { return 0 };
@@ -81,7 +81,7 @@ fn digit(at: &mut slice::Iter<u8>) -> Option<u8> {
     Some(digit)
 }
 
-/// Any number.
+/// Reads a number of any form.
 #[cold]
 #[inline(never)]
 #[small]
@@ -100,7 +100,7 @@ fn any(input: &[u8]) -> Lexed<'_, Decimal> {
     Ok((rest, value))
 }
 
-/// Reads the digits left of the point. How many there are: 5 stands for more. `None` beyond 32 bits.
+/// Reads the digits left of the point. Returns their number, where 5 stands for 5 or more. `None` beyond 32 bits.
 #[small]
 fn whole(rest: &mut &[u8], value: &mut Decimal) -> Option<u8> {
     let (start, mut count) = four(rest);
@@ -117,7 +117,7 @@ fn whole(rest: &mut &[u8], value: &mut Decimal) -> Option<u8> {
     Some(count)
 }
 
-/// Reads the digits right of the point. How many there are: 4 stands for more.
+/// Reads the digits right of the point. Returns their number, where 4 stands for 4 or more.
 #[small]
 fn fraction(rest: &mut &[u8], value: &mut Decimal) -> u8 {
     let (digits, count) = four(rest);
@@ -130,11 +130,11 @@ fn fraction(rest: &mut &[u8], value: &mut Decimal) -> u8 {
     count
 }
 
-/// Up to four digits, and how many there were.
+/// Reads up to four digits. Returns their value and their number.
 #[small]
 fn four(rest: &mut &[u8]) -> (u16, u8) {
     let (mut value, mut count) = (0, 0);
-    // A copy, which stays in registers.
+    // A local copy stays in registers.
     let mut at = *rest;
     while count < 4 {
         let Some(digit) = next_digit(&mut at) else { break };
@@ -145,7 +145,7 @@ fn four(rest: &mut &[u8]) -> (u16, u8) {
     (value, count)
 }
 
-/// Ten-thousandths, from the first `count` decimals.
+/// Converts the value of the first `count` decimals to ten-thousandths.
 fn aligned(digits: u16, count: u8) -> u16 {
     match count {
         0 => 0,
@@ -156,13 +156,13 @@ fn aligned(digits: u16, count: u8) -> u16 {
     }
 }
 
-/// Takes the next digit, and the blanks before it in any case.
+/// Takes the next digit, if one is next. Blanks before it are skipped in any case.
 #[inline(always)]
 fn next_digit(rest: &mut &[u8]) -> Option<u8> {
     next_if(rest, |byte| byte.is_ascii_digit()).map(|byte| byte - b'0')
 }
 
-/// Takes the next byte if it is `wanted`, and the blanks before it in any case.
+/// Takes the next byte if it is `wanted`. Blanks before it are skipped in any case.
 #[inline(always)]
 fn next_if(rest: &mut &[u8], wanted: impl Fn(u8) -> bool) -> Option<u8> {
     while let Some((&byte, after)) = rest.split_first() {
@@ -182,7 +182,7 @@ fn next_if(rest: &mut &[u8], wanted: impl Fn(u8) -> bool) -> Option<u8> {
 pub(super) mod tests {
     use super::*;
 
-    /// The number that is all of a text.
+    /// Returns the number, if the whole text is one.
     pub fn read(text: &str) -> Decimal {
         let (rest, value) = decimal(text.as_bytes()).expect(text);
         assert!(rest.is_empty(), "{text}");

@@ -1,8 +1,8 @@
-//! Where the work origin is: coordinate systems (G54 to G59.3, G10), G92 and its kin, tool lengths.
+//! The work origin: coordinate systems (G54 to G59.3, G10), G92 and its variants, tool lengths.
 //!
-//! Machine coordinates of the origin = coordinate system + G92, if that is in force + tool length. The sum is
-//! kept in [`State::origin`], so that moves add one number; the coordinate system in force is that sum without the
-//! other two, so that the tables are asked for other systems only.
+//! Machine coordinates of the origin = coordinate system + G92, if that is in force + tool length. [`State::origin`]
+//! holds the sum, so that a move adds only one number. The coordinate system in force is this sum minus the other two
+//! parts, so the tables are read only for other systems.
 
 use kerf_macros::small;
 
@@ -20,20 +20,20 @@ use crate::units::{self, FIRST_ROTARY, Length, PerAxis};
 
 #[small]
 impl State {
-    /// The coordinate system in force.
+    /// Returns the coordinate system in force.
     fn system_in_force(&self) -> PerAxis<Length> {
         let mut system = self.origin;
         for (system, (shift, tool)) in
             system.iter_mut().zip(self.shift.iter().zip(&self.tool_length))
         {
             let shift = if self.shifted { shift.0 } else { 0 };
-            // The sum was within the range, so that this is where it began.
+            // The sum was within the range, so subtracting its parts gives the coordinate system again.
             system.0 = system.0.wrapping_sub(tool.0).wrapping_sub(shift);
         }
         system
     }
 
-    /// A coordinate system, from 0.
+    /// Returns a coordinate system. `number` counts from 0.
     pub(super) fn system(&self, number: u8, tables: &impl Tables) -> PerAxis<Length> {
         match number == self.modal.system {
             true => self.system_in_force(),
@@ -41,7 +41,7 @@ impl State {
         }
     }
 
-    /// Adds the origin up anew, of a coordinate system and what is in the state.
+    /// Computes the origin from a coordinate system and the offsets in the state.
     pub(super) fn update_origin(&mut self, system: &PerAxis<Length>) -> Result<(), Status> {
         let parts = system.iter().zip(&self.shift).zip(&self.tool_length);
         for (origin, ((system, shift), tool)) in self.origin.iter_mut().zip(parts) {
@@ -52,7 +52,7 @@ impl State {
         Ok(())
     }
 
-    /// Tool length and coordinate system.
+    /// Carries out the codes of tool length and coordinate system.
     #[inline(never)]
     #[small]
     pub(super) fn offsets(
@@ -87,7 +87,7 @@ impl State {
         self.update_origin(&system)
     }
 
-    /// The tool length on one axis, as G43.1 sets it.
+    /// Sets the tool length on one axis, as G43.1 does.
     pub(super) fn set_tool_length(&mut self, axis: u8, new: Length) -> Result<(), Status> {
         let axis = usize::from(axis);
         let parts = self.origin.get_mut(axis).zip(self.tool_length.get_mut(axis));
@@ -98,9 +98,9 @@ impl State {
         Ok(())
     }
 
-    /// The lengths of tool H; without H, of the tool in the spindle. Those of an empty spindle are 0, and so are
-    /// those of a tool up to [`NUMBERED`] that the tables lack: the line may have a move, and a program is not to
-    /// be refused in its midst. [`State::lacks_length`] says so.
+    /// Returns the lengths of tool H, or without H of the tool in the spindle. They are 0 for an empty spindle, and for
+    /// a tool up to [`NUMBERED`] that the tables do not have. The latter is no error, because a program should not be
+    /// refused in its middle; [`State::lacks_length`] is set instead.
     #[small]
     fn tool_named(
         &mut self,
@@ -117,7 +117,7 @@ impl State {
         Ok(tables.row(row))
     }
 
-    /// Group 0, but for the moves to stored positions.
+    /// Carries out the codes of group 0, except the moves to stored positions.
     #[inline(never)]
     #[small]
     pub(super) fn non_modal(
@@ -158,7 +158,7 @@ impl State {
         self.update_origin(&system)
     }
 
-    /// G92: the position is called the axis words, in work coordinates.
+    /// Carries out G92: the axis words become the work coordinates of the present position.
     fn shift_here(&mut self, block: &Block, setup: &impl Setup) -> Result<(), Status> {
         let system = self.system_in_force();
         if !self.shifted {
@@ -175,7 +175,7 @@ impl State {
         self.update_origin(&system)
     }
 
-    /// G28.3: the position is called the axis words, in machine coordinates.
+    /// Carries out G28.3: the axis words become the machine coordinates of the present position.
     fn redefine_position(
         &mut self,
         block: &Block,
@@ -192,7 +192,7 @@ impl State {
         Ok(())
     }
 
-    /// G28.2 and G28.4. No motion mode is left in force.
+    /// Carries out G28.2 and G28.4. No motion mode is in force afterwards.
     fn home(
         &mut self,
         block: &Block,
@@ -215,7 +215,7 @@ impl State {
         Ok(())
     }
 
-    /// G10.
+    /// Carries out G10.
     fn set_data(
         &mut self,
         block: &Block,
@@ -227,7 +227,7 @@ impl State {
         let number = integer(P).and_then(|number| u8::try_from(number).ok());
         match (integer(L), number) {
             (Some(l @ (2 | 20)), Some(number)) if number <= SYSTEMS => {
-                // 0 is the system in force.
+                // P0 is the system in force.
                 let system = number.checked_sub(1).unwrap_or(self.modal.system);
                 self.set_system(block, system, l == 20, tables, setup, edit)
             }
@@ -240,8 +240,8 @@ impl State {
         }
     }
 
-    /// G10 L2: a coordinate system has its origin at the axis words; L20: where the position, in
-    /// it, is called the axis words.
+    /// Carries out G10 L2: the axis words become the origin of a coordinate system. With L20 (`here`) the origin is
+    /// moved so that the axis words become the coordinates of the present position in the system.
     fn set_system(
         &mut self,
         block: &Block,
@@ -270,8 +270,8 @@ impl State {
         Ok(())
     }
 
-    /// G10 L1: a tool is as long as the axis words; L10: as long as makes the position be called the axis
-    /// words once it is in force.
+    /// Carries out G10 L1: the axis words become the lengths of a tool. With L10 (`here`) the lengths are chosen so
+    /// that the axis words become the coordinates of the present position once the lengths are in force.
     fn set_tool(
         &mut self,
         block: &Block,
@@ -299,8 +299,8 @@ impl State {
         Ok(())
     }
 
-    /// The offset that, beside the `others` along an axis, makes the position be called `value`. No `others` are
-    /// a sum beyond the range.
+    /// Returns the offset along an axis that, added to the other offsets `others`, makes `value` the coordinate of the
+    /// present position. `others` is `None` if their sum is beyond the range.
     #[inline(never)]
     fn offset_here(
         &self,
@@ -312,7 +312,7 @@ impl State {
         left.and_then(|left| left.checked_sub(value)).ok_or(Status::OutOfRange)
     }
 
-    /// Does something for each axis word, but those of disabled axes.
+    /// Calls `each` for each axis word, except for the words of disabled axes.
     #[inline(never)]
     fn each_word(
         &mut self,
@@ -328,9 +328,9 @@ impl State {
         Ok(())
     }
 
-    /// G28 and G30: a traverse to the stored position, of the named axes and by way of where the words
-    /// say; of all axes without words. Where nothing was stored that is machine zero, which is a place on a homed
-    /// axis alone: a linear axis that is not homed has the line refused.
+    /// Carries out G28 and G30: a traverse to the stored position. With axis words only the named axes move, first to
+    /// where the words say. Without words all axes move. If no position was ever stored, the target is machine zero.
+    /// Machine zero is known only on homed axes, so the line is refused if a linear axis that would move is not homed.
     #[inline(never)]
     pub(super) fn go_stored(
         &mut self,
@@ -366,7 +366,7 @@ impl State {
     }
 }
 
-/// G4: P seconds.
+/// Returns the dwell of G4 in milliseconds, from P in seconds.
 #[small]
 pub(super) fn dwell_ms(block: &Block) -> Result<u32, Status> {
     block.get(P).ok_or(Status::PWordMissing)?.milliseconds()

@@ -1,8 +1,7 @@
-//! Overrides: how much faster or slower than programmed the machine is to be, and whether that counts.
+//! Overrides: factors that make the machine faster or slower than programmed. Each can be on or off.
 //!
-//! [`Overrides`] is the state. It is changed by [`Change`]s, whoever asks for one: M48 to M51 in their place in
-//! the stream of moves, requests and real-time characters at once (`tasks::overrides`). Factors are
-//! thousandths.
+//! [`Overrides`] is the state, and a [`Change`] changes it. M48 to M51 apply at their place in the stream of moves.
+//! Requests and real-time characters apply at once (`tasks::overrides`). Factors are thousandths.
 
 /// What can be overridden.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -23,8 +22,9 @@ impl Override {
         if self as u8 == Self::Traverse as u8 { 1_000 } else { 2_000 }
     }
 
-    /// The factor that it gets if it is to be set to this; `None` if it may not be. Feeds and traverses of 0 are
-    /// carried out a thousand times slower, so that a program that asks for it comes to its end.
+    /// Returns the factor that the override gets when `factor` is asked for. `None` if `factor` is out of range. A
+    /// factor of 0 becomes 1 thousandth for feeds and traverses, so that a program that asks for 0 still comes to its
+    /// end.
     pub fn checked(self, factor: u32) -> Option<u16> {
         let least = if self == Self::Spindle { LEAST } else { 0 };
         let factor = u16::try_from(factor).ok()?;
@@ -32,65 +32,65 @@ impl Override {
     }
 }
 
-/// The least factor of the spindle, and the least that real-time characters ask for.
+/// The least factor of the spindle override, and the least factor that real-time characters set.
 pub const LEAST: u16 = 50;
 /// The override of 100 %, in thousandths.
 pub const FULL: u16 = 1_000;
 
-/// All of them, as bits.
+/// All overrides, as bits.
 const ALL: u8 = 7;
-/// A bit beside those: feed rates are as programmed whatever overrides are.
+/// Another bit of [`Overrides::on`]: feed rates are as programmed, without regard to the feed override.
 #[cfg(feature = "drivers")]
 const FIXED: u8 = 8;
 
-/// What becomes of overrides.
+/// A change of overrides.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Change {
-    /// Which, as bits.
+    /// The overrides that change, as bits.
     which: u8,
-    /// Whether they count from now on.
+    /// Whether the overrides are on from now on.
     on: bool,
-    /// The factor that they get, 0 for the one that they have.
+    /// The new factor of the overrides. 0 keeps the factor of each.
     factor: u16,
 }
 
 #[small]
 impl Change {
-    /// M48, and what the end of a program does.
+    /// The change by M48, and by the end of a program.
     pub const ALL_ON: Self = Self { which: ALL, on: true, factor: 0 };
-    /// M49.
+    /// The change by M49.
     pub const ALL_OFF: Self = Self { which: ALL, on: false, factor: 0 };
 
-    /// On, or off, with the factor that it has.
+    /// Returns a change that switches an override on or off and keeps its factor.
     pub const fn switch(which: Override, on: bool) -> Self {
         Self::new(which, on, 0)
     }
 
-    /// On or not, with a [checked](Override::checked) factor.
+    /// Returns a change that switches an override on or off and sets a [checked](Override::checked) factor.
     pub const fn new(which: Override, on: bool, factor: u16) -> Self {
         Self { which: 1 << which as u8, on, factor }
     }
 
-    /// On, with a [checked](Override::checked) factor.
+    /// Returns a change that switches an override on and sets a [checked](Override::checked) factor.
     pub const fn to(which: Override, factor: u16) -> Self {
         Self::new(which, true, factor)
     }
 }
 
-/// The overrides.
+/// The state of all overrides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Overrides {
     factors: [u16; 3],
-    /// The overrides that count, as bits.
+    /// The overrides that are on, as bits.
     on: u8,
 }
 
 #[small]
 impl Overrides {
-    /// At power-up: all on, and nothing is overridden.
+    /// The state at power-up: all overrides are on, with a factor of 100 %.
     pub const NONE: Self = Self { factors: [FULL; 3], on: ALL };
 
-    /// Changes them.
+    /// Applies a change.
     #[inline(never)]
     pub fn change(&mut self, change: Change) {
         if change.on {
@@ -107,17 +107,17 @@ impl Overrides {
         }
     }
 
-    /// The factor that has been set, whether or not it counts.
+    /// Returns the factor that has been set, whether the override is on or off.
     pub fn factor(&self, which: Override) -> u16 {
         self.factors.get(which as usize).copied().unwrap_or(FULL)
     }
 
-    /// Whether it counts.
+    /// Whether an override is on.
     pub fn is_on(&self, which: Override) -> bool {
         self.on & 1 << which as u8 != 0
     }
 
-    /// What rates are multiplied by: the factor, or nothing if it does not count.
+    /// Returns the factor by which rates are multiplied: the factor that has been set, or 100 % if the override is off.
     pub fn in_force(&self, which: Override) -> u16 {
         #[cfg(feature = "drivers")]
         if which == Override::Feed && self.on & FIXED != 0 {
@@ -126,7 +126,8 @@ impl Overrides {
         if self.is_on(which) { self.factor(which) } else { FULL }
     }
 
-    /// Has feed rates be as programmed, or not any more, whatever changes meanwhile.
+    /// Suspends the feed override, so that feed rates are as programmed, or ends this. Changes in the meantime are
+    /// kept.
     #[cfg(feature = "drivers")]
     pub fn fix_feed(&mut self, fixed: bool) {
         if fixed {
@@ -136,7 +137,7 @@ impl Overrides {
         }
     }
 
-    /// Whether rates are as programmed.
+    /// Whether all rates are as programmed.
     pub fn is_none(&self) -> bool {
         [Override::Feed, Override::Traverse, Override::Spindle]
             .iter()

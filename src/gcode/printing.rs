@@ -1,6 +1,8 @@
-//! The extruder of a printer, the A axis: relative or not by itself, more or less filament than programmed, and no end to it.
+//! The extruder of a printer, which is the A axis. It differs from other axes in three ways: it may have its own
+//! distance mode (M82, M83), it may extrude more or less filament than programmed (M221), and its position may grow
+//! without an end.
 //!
-//! Of an image without a dialect of printing hosts there is nothing of this.
+//! An image without a dialect of printing hosts has none of this.
 
 use super::command::Motion;
 #[cfg(feature = "dialect-reprap")]
@@ -16,89 +18,91 @@ use crate::units::{FIRST_ROTARY, Length, PerAxis};
 
 /// The axis of the extruder.
 pub const EXTRUDER: usize = FIRST_ROTARY;
-/// As much filament as programmed, in thousandths.
+/// The flow at which as much filament is extruded as programmed, in thousandths.
 const FULL: u16 = 1_000;
 #[cfg(feature = "dialect-reprap")]
-/// The feed rate until there is another, mm/min.
+/// The feed rate until a line sets another, mm/min.
 const FEED: f32 = 1_500.0;
 #[cfg(feature = "dialect-reprap")]
-/// How far from the origin the extruder gets before it is moved back, which is half of what a [`Length`] holds: 100 m.
+/// How far from the origin the extruder may get before its coordinate is moved back: 100 m, half of the range of a
+/// [`Length`].
 const FAR: i32 = 1_000_000_000;
 
-/// What of [`Printing`] a line changes that may be refused after that.
+/// The part of [`Printing`] that a line may change before it is refused.
 #[cfg(feature = "dialect-reprap")]
 pub type Kept = Option<Distance>;
-/// What of [`Printing`] a line changes that may be refused after that: nothing.
+/// The part of [`Printing`] that a line may change before it is refused: nothing in this image.
 #[cfg(not(feature = "dialect-reprap"))]
 pub type Kept = ();
 
-/// How the extruder takes its words.
+/// How the extruder interprets its words.
 #[cfg(feature = "dialect-reprap")]
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Printing {
-    /// M82 and M83; `None`: as the other axes.
+    /// The distance mode of M82 or M83. `None` if it is that of the other axes.
     own: Option<Distance>,
-    /// M221, thousandths.
+    /// The flow of M221, thousandths.
     flow: u16,
-    /// The line moves no filament: that is too cold.
+    /// Whether the line extrudes nothing, because the filament is too cold.
     dry: bool,
-    /// How much farther the origin is to move along with what flows, once the line is carried out.
+    /// The difference between extruded and programmed filament. The origin moves by it when the line is carried out.
     more: i32,
 }
 
-/// How the extruder takes its words: as any axis.
+/// How the extruder interprets its words: like any axis in this image.
 #[cfg(not(feature = "dialect-reprap"))]
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Printing;
 
 #[cfg(feature = "dialect-reprap")]
 impl Printing {
-    /// The state at power-up: E moves as any other axis.
+    /// The state at power-up: E moves like any other axis.
     pub const NONE: Self = Self { own: None, flow: FULL, dry: false, more: 0 };
 
-    /// What its words are measured from, if that is not what those of the others are.
+    /// Returns the distance mode of the extruder if it differs from that of the other axes, else `None`.
     #[inline(always)]
     pub fn distance(self) -> Option<Distance> {
         self.own
     }
 
-    /// G90 and G91 are for the extruder, too.
+    /// Notes G90 or G91, which apply to the extruder as well.
     #[inline(always)]
     pub fn follow(&mut self) {
         self.own = None;
     }
 
-    /// What a line that is refused gives back: see [`Printing::take_back`].
+    /// Returns what [`Printing::take_back`] has to restore if the line is refused.
     #[inline(always)]
     pub fn kept(self) -> Kept {
         self.own
     }
 
-    /// A line with G90 or G91 has been refused.
+    /// Restores the state after a line has been refused.
     #[inline(always)]
     pub fn take_back(&mut self, kept: Kept) {
         self.own = kept;
     }
 
-    /// The other axes measure their words by `distance` from now on; the extruder goes on as before.
+    /// Notes that the distance mode of the other axes is `distance` from now on. An own mode of the extruder stays in
+    /// force.
     #[inline(always)]
     pub fn compare(&mut self, distance: Distance) {
         self.own = self.own.filter(|own| *own != distance);
     }
 
-    /// M221, thousandths.
+    /// Returns the flow of M221, thousandths.
     #[inline(always)]
     pub fn flow(self) -> u16 {
         self.flow
     }
 
-    /// How much of the filament flows, thousandths.
+    /// Returns the flow of the present line, thousandths. 0 if it extrudes nothing.
     #[inline(always)]
     fn flows(self) -> u16 {
         if self.dry { 0 } else { self.flow }
     }
 
-    /// Whether as much flows as programmed.
+    /// Whether as much filament is extruded as programmed.
     #[inline(always)]
     pub fn flows_as_programmed(self) -> bool {
         self.flows() == FULL
@@ -110,7 +114,7 @@ impl Printing {
     /// The state at power-up, in an image that cannot print.
     pub const NONE: Self = Self;
 
-    /// Never.
+    /// Returns `None`: in this image the extruder has the distance mode of the other axes.
     #[inline(always)]
     pub fn distance(self) -> Option<Distance> {
         None
@@ -120,7 +124,7 @@ impl Printing {
     #[inline(always)]
     pub fn follow(&mut self) {}
 
-    /// Nothing.
+    /// Returns nothing in an image that cannot print.
     #[inline(always)]
     pub fn kept(self) -> Kept {}
 
@@ -132,19 +136,19 @@ impl Printing {
     #[inline(always)]
     pub fn compare(&mut self, _distance: Distance) {}
 
-    /// All of it.
+    /// Returns a flow of 100 %.
     #[inline(always)]
     pub fn flow(self) -> u16 {
         FULL
     }
 
-    /// All of it.
+    /// Returns a flow of 100 %.
     #[inline(always)]
     fn flows(self) -> u16 {
         FULL
     }
 
-    /// It does.
+    /// Always true in an image that cannot print.
     #[inline(always)]
     pub fn flows_as_programmed(self) -> bool {
         true
@@ -152,7 +156,7 @@ impl Printing {
 }
 
 impl Printing {
-    /// Whether the extruder takes its words as any axis does.
+    /// Whether the extruder interprets its words like any axis.
     #[inline(always)]
     pub fn is_usual(self) -> bool {
         self.distance().is_none() && self.flows() == FULL
@@ -160,7 +164,7 @@ impl Printing {
 }
 
 impl State {
-    /// Refuses a move of the extruder where filament is too cold for that.
+    /// Refuses a move of the extruder if the filament is too cold.
     #[inline(never)]
     #[small]
     pub(super) fn check_extrusion(
@@ -179,8 +183,8 @@ impl State {
         if moves { setup.extrudes() } else { Ok(()) }
     }
 
-    /// Where a move of the extruder to `target` ends. Its origin moves along with what flows more or less, once the line is
-    /// [carried out](Self::carry_flow).
+    /// Returns where a move of the extruder to `target` ends at the present flow. When the line is
+    /// [carried out](Self::carry_flow), the origin moves by the difference to `target`.
     #[inline(never)]
     #[small]
     pub(super) fn flow_to(&mut self, target: Length) -> Result<Length, Status> {
@@ -207,7 +211,8 @@ impl State {
     #[cfg(not(feature = "dialect-reprap"))]
     fn owe_flow(&mut self, _more: i32) {}
 
-    /// The line is carried out, or refused: what its filament flows more or less counts, or does not.
+    /// Ends a line. If it is carried out (`done`), moves the origin of the extruder by the difference that
+    /// [`Self::flow_to`] has noted. If it is refused, forgets the difference.
     #[cfg(feature = "dialect-reprap")]
     #[inline(always)]
     pub(super) fn carry_flow(&mut self, done: bool) {
@@ -224,21 +229,21 @@ impl State {
     #[inline(always)]
     pub(super) fn carry_flow(&mut self, _done: bool) {}
 
-    /// Whether the extruder has got far from the origin.
+    /// Whether the extruder is farther from the origin than [`FAR`].
     #[cfg(feature = "dialect-reprap")]
     #[inline(always)]
     pub(super) fn is_far(&self) -> bool {
         self.position.get(EXTRUDER).is_some_and(|at| at.0.unsigned_abs() > FAR as u32)
     }
 
-    /// There is no dialect in which it does.
+    /// Always false: this image has no dialect of printing hosts.
     #[cfg(not(feature = "dialect-reprap"))]
     #[inline(always)]
     pub(super) fn is_far(&self) -> bool {
         false
     }
 
-    /// Origin and G92 of the extruder, moved.
+    /// Returns origin and G92 offset of the extruder, moved by `by`. `None` beyond the range.
     #[inline(never)]
     #[small]
     fn shifted_extruder(&self, by: i32) -> Option<(Length, Length)> {
@@ -246,7 +251,7 @@ impl State {
         Some((origin.checked_add(Length(by))?, shift.checked_add(Length(by))?))
     }
 
-    /// Moves what the words of the extruder are measured from, as G92 does.
+    /// Moves the origin of the extruder, as G92 does. `None` beyond the range.
     #[cfg(feature = "dialect-reprap")]
     #[small]
     fn shift_extruder(&mut self, by: i32) -> Option<()> {
@@ -260,23 +265,24 @@ impl State {
 
 #[cfg(feature = "dialect-reprap")]
 impl<T> Interpreter<T> {
-    /// Words of the extruder are measured from where it is, or not, whatever those of the others are measured from; until G90 or G91.
+    /// Makes the words of the extruder relative or absolute (M83, M82), independently of the other axes. This lasts
+    /// until G90 or G91.
     pub fn set_relative(&mut self, relative: bool) {
         let own = if relative { Distance::Incremental } else { Distance::Absolute };
         self.state.printing.own = Some(own).filter(|own| *own != self.state.modal.distance);
     }
 
-    /// The extruder moves so many thousandths of what its words say.
+    /// Sets the flow: the distance of the extruder in thousandths of what its words say.
     pub fn set_flow(&mut self, flow: u16) {
         self.state.printing.flow = flow;
     }
 
-    /// The next line moves no filament, whatever it says: its words count as if it had.
+    /// Sets whether the next line extrudes nothing. Its E word counts as if the filament had been extruded.
     pub fn leave_out(&mut self, dry: bool) {
         self.state.printing.dry = dry;
     }
 
-    /// A block of a printing host is next: there are a motion mode and a feed rate from the beginning.
+    /// Prepares for a block of a printing host, which needs no motion mode and no feed rate before its first move.
     pub fn begin_printing(&mut self) {
         let state = &mut self.state;
         if state.feed.to_bits() == 0 {
@@ -287,12 +293,13 @@ impl<T> Interpreter<T> {
         }
     }
 
-    /// Whether the extruder has got far from the origin.
+    /// Whether the extruder is so far from the origin that [`Self::move_back`] is due.
     pub fn is_far(&self) -> bool {
         self.state.is_far()
     }
 
-    /// Gives the place where the machine is another name, at which the extruder is nearer to the origin.
+    /// Redefines the present position, so that the extruder is nearer to the origin of machine coordinates. Nothing
+    /// moves.
     #[inline(never)]
     #[small]
     pub fn move_back(&mut self, out: &mut Commands) {
@@ -300,7 +307,8 @@ impl<T> Interpreter<T> {
         let Some(at) = state.position.get_mut(EXTRUDER) else { return };
         let by = if at.0 < 0 { FAR } else { -FAR };
         at.0 += by;
-        // Relative words may have no origin within reach: then they count from another one.
+        // With relative words the origin may be too far away to be moved. It then stays, and the work coordinate
+        // changes.
         let near = state.origin.get(EXTRUDER).is_some_and(|at| at.0.unsigned_abs() <= FAR as u32);
         if near {
             let _ = state.shift_extruder(by);
@@ -310,7 +318,7 @@ impl<T> Interpreter<T> {
         out.motion = Motion::SetPosition { position: state.position };
     }
 
-    /// No G92 counts on these axes any more, as bits.
+    /// Clears the G92 offsets of these axes. `axes` is a set of bits.
     #[small]
     pub fn clear_shift(&mut self, axes: u8) {
         let state = &mut self.state;
@@ -322,7 +330,7 @@ impl<T> Interpreter<T> {
         }
     }
 
-    /// The extruder alone moves, and so does what its words are measured from.
+    /// Moves the extruder alone, together with its origin, so that the coordinates of its words do not change.
     #[inline(never)]
     #[small]
     pub fn extrude(&mut self, by: Length, feed: f32, out: &mut Commands) -> Result<(), Status> {
@@ -344,7 +352,7 @@ impl<T> Interpreter<T> {
 }
 
 impl<T> Interpreter<T> {
-    /// How far the extruder moves, in thousandths of what its words say.
+    /// Returns the flow: the distance of the extruder in thousandths of what its words say.
     pub fn flow(&self) -> u16 {
         self.state.printing.flow()
     }

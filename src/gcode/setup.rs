@@ -1,4 +1,4 @@
-//! What the interpreter asks about the machine that a program is for. The settings answer
+//! The properties of the machine that the interpreter needs to know. In the firmware the settings provide them
 //! (`tasks::setup`).
 
 use super::heating::Part;
@@ -6,44 +6,44 @@ use super::modal::Defaults;
 use crate::status::Status;
 use crate::units::Length;
 
-/// How an axis takes its words. The discriminants are TinyG's numbers.
+/// How an axis interprets its words. The discriminants are TinyG's numbers.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub enum AxisMode {
-    /// Words are accepted and mean nothing: the axis stays where it is.
+    /// Words are accepted and ignored: the axis stays where it is.
     Disabled = 0,
-    /// Lengths, or degrees of an axis that turns.
+    /// Words are lengths, or degrees for a rotary axis.
     Standard = 1,
-    /// The position moves as that of a standard axis, the motors stand still.
+    /// The position changes like that of a standard axis, but the motors stand still.
     Inhibited = 2,
-    /// A rotary axis whose words are lengths along a circumference.
+    /// Words of a rotary axis are lengths along a circumference.
     Radius = 3,
 }
 
 /// The machine, as far as the language depends on it. Axes are X Y Z A B C from 0.
 pub trait Setup {
-    /// How an axis takes its words.
+    /// Returns how an axis interprets its words.
     fn mode(&self, axis: u8) -> AxisMode;
-    /// The radius that turns a length into an angle, nm; more than 0.
+    /// Returns the radius that converts a length to an angle, nm. More than 0.
     fn radius(&self, axis: u8) -> u32;
-    /// The ends of its travel in machine coordinates, if moves beyond them are to be refused.
+    /// Returns the ends of an axis' travel in machine coordinates. Moves beyond them are refused. `None` for no limits.
     fn travel(&self, axis: u8) -> Option<(Length, Length)>;
 
-    /// How far from the origin of machine coordinates the steps of all motors can be counted, if these do not hold every length. Moves
-    /// from or to places beyond are refused.
+    /// Returns how far from the origin of machine coordinates the steps of all motors can be counted. Moves from or to
+    /// places beyond this distance are refused. `None` if the steps of every length can be counted.
     fn reach(&self) -> Option<Length> {
         None
     }
 
-    /// The modes at start-up and after M2 and M30.
+    /// Returns the modes at start-up and after M2 and M30.
     fn defaults(&self) -> Defaults {
         Defaults::USUAL
     }
-    /// Whether lines that begin with a slash are left out.
+    /// Whether lines that begin with a slash are skipped (block delete).
     fn deletes_blocks(&self) -> bool {
         true
     }
-    /// Whether M1 stops.
+    /// Whether M1 stops the program.
     fn stops_at_m1(&self) -> bool {
         true
     }
@@ -51,29 +51,29 @@ pub trait Setup {
     fn has_probe(&self) -> bool {
         true
     }
-    /// Whether an encoder tells how the spindle turns, or why not.
+    /// Returns `Ok` if an encoder measures the spindle, else the reason why not.
     fn encoder(&self) -> Result<(), Status> {
         Ok(())
     }
-    /// How hot a heater may be made, eighths of a degree; 0 if there is none.
+    /// Returns the highest temperature of a heater, eighths of a degree. 0 if there is no such heater.
     fn hottest(&self, _part: Part) -> u16 {
         275 * 8
     }
-    /// Whether a heater may be switched on, or why not.
+    /// Returns `Ok` if a heater may be switched on, else the reason why not.
     fn heats(&self, _part: Part) -> Result<(), Status> {
         Ok(())
     }
-    /// Whether the hot end is hot enough for filament to be moved, or why not.
+    /// Returns `Ok` if the hot end is hot enough to move filament, else the reason why not.
     fn extrudes(&self) -> Result<(), Status> {
         Ok(())
     }
-    /// Whether an axis can be homed, or why not.
+    /// Returns `Ok` if an axis can be homed, else the reason why not.
     fn homing(&self, _axis: u8) -> Result<(), Status> {
         Ok(())
     }
 }
 
-/// A machine with all axes as usual, and everything else too.
+/// A machine with all axes in mode [`AxisMode::Standard`] and with all equipment.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Usual;
 

@@ -1,7 +1,8 @@
-//! What S means: turns a minute (G97), or the speed of the surface that is cut (G96).
+//! The meaning of S: turns a minute (G97), or a surface speed (G96).
 //!
-//! S of a surface speed is kept in m/min. It becomes turns a minute where the spindle is commanded: by the planner when it switches the spindle,
-//! and by the power task while X moves (`tasks::surface`). The axis of rotation is X 0 of the coordinates in force, with all offsets.
+//! A surface speed is kept in m/min. It is converted to turns a minute when the spindle is commanded: by the planner
+//! when it switches the spindle, and by the power task while X moves (`tasks::surface`). The axis of rotation is X 0 in
+//! the work coordinates in force, with all offsets.
 
 use kerf_macros::small;
 
@@ -13,12 +14,12 @@ use super::words::D;
 use crate::capability::Capability;
 use crate::status::Status;
 
-/// m in a foot.
+/// Metres in a foot.
 const FOOT: f32 = 0.3048;
 
 #[small]
 impl State {
-    /// G96 with its D, and G97. Without S, G97 keeps the speed that G96 asks for where the program is.
+    /// Carries out G96 with its D, and G97. Without S, G97 keeps the spindle speed that G96 gives at the programmed X.
     #[inline(never)]
     pub(super) fn set_speed_mode(&mut self, block: &Block, mode: SpeedMode) -> Result<(), Status> {
         match mode {
@@ -34,7 +35,8 @@ impl State {
         Ok(())
     }
 
-    /// S has been read: of a surface speed it is feet a minute in inches.
+    /// Converts S from feet a minute to m/min, if S is a surface speed and G20 is in force. Call it after S has been
+    /// read.
     #[inline(always)]
     pub(super) fn take_feet(&mut self) {
         if Capability::Lathe.is_built_in()
@@ -45,14 +47,14 @@ impl State {
         }
     }
 
-    /// Whether the axis of rotation may be another by this line, while the spindle turns by a surface speed.
+    /// Whether this line may move the axis of rotation while the spindle turns with a surface speed.
     pub(super) fn moves_axis_of_rotation(&self, block: &Block) -> bool {
         self.modal.speed_mode == SpeedMode::Surface
             && self.modal.spindle != Turn::Off
             && (block.system.is_some() || block.tool_length.is_some() || block.non_modal.is_some())
     }
 
-    /// The surface speed, if one is in force.
+    /// Returns the surface speed. `None` if none is in force.
     #[inline(always)]
     pub(super) fn surface(&self) -> Option<Surface> {
         if Capability::Lathe.is_built_in() { self.surface_in_force() } else { None }
@@ -66,7 +68,7 @@ impl State {
     }
 }
 
-/// D: turns a minute, more than 0.
+/// Returns D, the highest spindle speed in turns a minute. It has to be more than 0.
 fn limit(word: &super::decimal::Decimal) -> Result<u16, Status> {
     let turns = u16::try_from(word.integer()?).map_err(|_| Status::OutOfRange)?;
     if turns == 0 { Err(Status::OutOfRange) } else { Ok(turns) }

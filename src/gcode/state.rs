@@ -1,7 +1,7 @@
-//! What one line leaves to the next, and the order in which a line changes it.
+//! The state that one line leaves to the next, and the order in which a line changes it.
 //!
-//! A refused line changes nothing: [`Interpreter`](super::interpreter) sees to that, so here things may
-//! be left half done.
+//! The functions here may leave the state half changed when they refuse a line. [`Interpreter`](super::interpreter)
+//! then restores it.
 
 use super::block::Block;
 use super::codes::{NonModal, OverrideCode, StopCode, Switch};
@@ -20,49 +20,51 @@ use crate::capability::Capability;
 use crate::status::Status;
 use crate::units::{AXES, Length, PerAxis};
 
-/// Everything a line may change, but for the tables.
+/// Everything that a line may change, except the tables.
 #[derive(Clone, Copy, PartialEq, Debug)]
-// In this order: AVR reaches a field within 63 bytes of the first in one instruction.
+// The fields have a fixed order because AVR accesses those within 63 bytes of the first in one instruction.
 #[repr(C)]
 pub struct State {
     pub modal: Modal,
     /// The units of `feed`.
     pub feed_units: Units,
-    /// F as written, with G94 or G95 in force; 0 if none.
+    /// F as written, while G94 or G95 is in force. 0 if no F is in force.
     pub feed: f32,
     pub line: u32,
-    /// What rounding took from `position`: ten-thousandths of a unit. Incremental moves carry it on.
+    /// What rounding has taken from `position`, in ten-thousandths of a unit. Incremental moves add it to the next
+    /// length.
     pub residue: PerAxis<i16>,
     /// End of the last move, machine coordinates.
     pub position: PerAxis<Length>,
     /// Machine coordinates of the work origin: coordinate system, G92 and tool length together.
     pub origin: PerAxis<Length>,
-    /// The axes whose position has been set to what it is (G28.3), as bits.
+    /// The axes that are homed: whose position has been set by a homing cycle or by G28.3, as bits.
     pub homed: u8,
-    /// The axis that could not be homed last.
+    /// The axis whose homing failed last.
     pub blamed: u8,
-    /// G92, whether or not it is in force.
+    /// The offsets of G92, whether or not they are in force.
     pub shift: PerAxis<Length>,
     pub shifted: bool,
-    /// G43.
+    /// The tool length in force (G43, G43.1, G43.2).
     pub tool_length: PerAxis<Length>,
-    /// A line has asked for the length of a tool that has none. Whoever carries lines out takes it.
+    /// A line has asked for the length of a tool that has none. The parser takes and reports this.
     pub lacks_length: bool,
     /// S: turns a minute, or m/min with G96.
     pub speed: f32,
     /// D of G96: the most turns a minute; 0 for no limit.
     pub limit: u16,
-    /// T, and the tool of the last M6.
+    /// The tool of the last T word.
     pub selected: u8,
+    /// The tool in the spindle: the one that was selected at the last M6.
     pub tool: u8,
-    /// How the extruder of a printer takes its words.
+    /// How the extruder of a printer interprets its words.
     pub printing: Printing,
-    /// The words of canned cycles.
+    /// The words of canned cycles that stay in force.
     pub sticky: Sticky,
 }
 
 impl State {
-    /// At power-up: everything 0.
+    /// Returns the state at power-up: everything is 0.
     pub const fn new(defaults: &Defaults) -> Self {
         Self {
             modal: Modal::new(defaults),
@@ -87,7 +89,7 @@ impl State {
         }
     }
 
-    /// Carries out a block of modes and moves; `start` is where the line before it has ended.
+    /// Carries out a block of modes and moves. `start` is where the previous line has ended.
     #[inline(never)]
     pub fn execute(
         &mut self,
@@ -102,7 +104,7 @@ impl State {
         self.finish(block, start, tables, setup, out)
     }
 
-    /// Carries out a block with whatever it has.
+    /// Carries out a block of any kind. A change of the tables is returned in `edit`.
     #[inline(never)]
     #[small]
     pub fn execute_rare(
@@ -130,7 +132,7 @@ impl State {
         self.stop(block, tables, edit, setup, out)
     }
 
-    /// N, the modes, and F.
+    /// Carries out N, the modes, and F.
     fn begin(&mut self, block: &Block, out: &mut Commands) -> Result<(), Status> {
         let line = block.rare(N).map_or(Ok(0), |value| value.integer())?;
         if line > N_MAX {
@@ -148,7 +150,7 @@ impl State {
     fn modes(&mut self, block: &Block) {
         let modal = &mut self.modal;
         if block.feed_mode.is_some_and(|mode| mode != modal.feed_mode) {
-            // The rate of one mode means nothing in another.
+            // A rate of one feed mode has no meaning in another.
             self.feed = 0.0;
         }
         set(&mut modal.feed_mode, block.feed_mode);
@@ -166,7 +168,7 @@ impl State {
         set(&mut modal.path, block.path);
     }
 
-    /// F, but with G93: there it is for the move of its line alone, which takes it.
+    /// Carries out F. With G93 F applies only to the move of its own line, which reads the word itself.
     fn feed(&mut self, block: &Block) -> Result<(), Status> {
         let Some(value) = block.rare(F) else { return Ok(()) };
         if value.negative {
@@ -179,7 +181,7 @@ impl State {
         Ok(())
     }
 
-    /// S, T and M6.
+    /// Carries out S, T and M6.
     #[small]
     fn tools(&mut self, block: &Block, out: &mut Commands) -> Result<(), Status> {
         if Capability::Lathe.is_built_in()
@@ -210,14 +212,14 @@ impl State {
         if block.changes_tool() {
             self.tool = self.selected;
             out.tool = Some(self.tool);
-            // The change stops the spindle: S alone must not start it again.
+            // The tool change stops the spindle. S on the same line must not start it again.
             self.modal.spindle = Turn::Off;
             out.spindle = None;
         }
         Ok(())
     }
 
-    /// Spindle and coolant.
+    /// Carries out the codes of spindle and coolant.
     fn machine_modes(&mut self, block: &Block, out: &mut Commands) {
         if let Some(turn) = block.spindle {
             self.modal.spindle = turn;
@@ -232,12 +234,12 @@ impl State {
         }
     }
 
-    /// What the spindle does.
+    /// Returns what the spindle does.
     pub fn spindle(&self) -> Spindle {
         Spindle { turn: self.modal.spindle, speed: self.speed }
     }
 
-    /// M48 to M51.
+    /// Carries out M48 to M51.
     #[small]
     fn overrides(block: &Block, out: &mut Commands) -> Result<(), Status> {
         out.overrides = match block.overrides {
@@ -249,7 +251,7 @@ impl State {
         Ok(())
     }
 
-    /// Motion, and what belongs to it.
+    /// Carries out the motion, and checks it against the limits.
     #[inline(never)]
     fn finish(
         &mut self,
@@ -268,7 +270,8 @@ impl State {
         self.end_motion(start, setup, out)
     }
 
-    /// A canned cycle, and what comes after it. Its words stay, unless the line is refused.
+    /// Carries out a canned cycle and what comes after it. The words of the cycle stay in force, unless the line is
+    /// refused.
     #[inline(never)]
     #[small]
     fn finish_cycle(
@@ -299,12 +302,12 @@ impl State {
         if Capability::Printer.is_built_in() {
             self.check_extrusion(start, &out.motion, setup)?;
         }
-        // Limits are for homed axes alone.
+        // Soft limits apply to homed axes only.
         if self.homed != 0 {
             limits::check(start, &out.motion, self.homed, setup)?;
         }
         out.exact_stop = self.modal.path == PathMode::ExactStop;
-        // A line without a move asks for nothing.
+        // A line without a straight move is not merged with others.
         out.blend = if out.is_straight() { self.modal.blend() } else { 0 };
         Ok(())
     }
@@ -331,8 +334,8 @@ impl State {
         Ok(())
     }
 
-    /// M2 and M30: modes as at power-up, but G1 with F0; no G92. The line's own change of the
-    /// tables counts.
+    /// Carries out M2 and M30: the modes become those of power-up, except that G1 is in force; F is 0, and G92 is
+    /// cleared. A change of the tables by the same line is taken into account.
     #[small]
     fn end_program(
         &mut self,
@@ -353,7 +356,7 @@ impl State {
     }
 }
 
-/// What becomes of one override.
+/// Returns the change of one override that a line asks for.
 #[small]
 fn override_one(block: &Block, which: Override, how: Switch) -> Result<Change, Status> {
     let word = block.get(P);
@@ -368,7 +371,7 @@ fn override_one(block: &Block, which: Override, how: Switch) -> Result<Change, S
     Ok(Change::to(which, factor))
 }
 
-/// G64 P, in units of [`Length`]; the most there is if that is more.
+/// Returns the tolerance of G64 P in units of [`Length`], at most [`TOLERANCE_MAX`].
 #[inline(never)]
 #[small]
 fn tolerance(block: &Block, units: Units) -> Result<u8, Status> {

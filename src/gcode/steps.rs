@@ -1,9 +1,10 @@
-//! The commands of a line, taken apart: one step after the other, in the order of execution.
+//! Steps: the commands of a line, split into single steps in the order of execution.
 //!
-//! The planner carries the steps out, `kerf canon` prints them. A canned cycle is a table of what is done
-//! at a hole; it is spelled out here step by step, so that it needs no memory but where it is.
+//! The planner carries the steps out, `kerf canon` prints them. A canned cycle is a table of operations at a hole. It
+//! is expanded step by step, so that it needs no memory except its present place in the table.
 //!
-//! Who asks for a step has carried out the one before and says where that has led to.
+//! The caller carries out each step before it asks for the next, and passes the position that the last step has
+//! reached.
 
 use super::command::{Commands, Cycle, Feed, Motion, Spindle, Stop};
 use super::heating::Heat;
@@ -14,41 +15,41 @@ use crate::capability::Capability;
 use crate::progmem;
 use crate::units::{Length, PerAxis};
 
-/// A step of a cycle.
+/// One step of a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Step {
-    /// The tool that is in the spindle now.
+    /// Sets the tool that is in the spindle.
     Tool(u8),
-    /// The spindle turns so.
+    /// Sets the direction and speed of the spindle.
     Spindle(Spindle),
-    /// These coolants run, bits of [`Coolant`](super::modal::Coolant).
+    /// Sets the coolants that run, bits of [`Coolant`](super::modal::Coolant).
     Coolant(u8),
-    /// What rates and speeds are multiplied by changes so.
+    /// Changes overrides.
     Override(Change),
-    /// Stand still for so many milliseconds.
+    /// Stands still for this many milliseconds.
     Dwell(u32),
-    /// A straight move to a place in machine coordinates; a traverse without a feed.
+    /// A straight move to a place in machine coordinates. Without a feed it is a traverse.
     Line(PerAxis<Length>, Option<Feed>),
     /// The arc of the commands' motion.
     Arc,
     /// The probing move of the commands' motion.
     Probe,
-    /// Stand still until the encoder of the spindle says how fast it turns.
+    /// Waits at standstill until the encoder has measured the speed of the spindle.
     AwaitSpindle,
-    /// A pass in step with the spindle: its [lines](Steps::pass).
+    /// A pass in step with the spindle. [`Steps::pass`] returns its lines.
     Thread,
     /// The homing cycle of the commands' motion.
     Home,
     /// The jog of the commands' motion.
     Jog,
-    /// Lines are checked only from here on, or carried out again.
+    /// From here on lines are only checked, or are carried out again.
     Check,
-    /// Moves follow the plane of the bed from here on, or do not.
+    /// From here on moves follow the plane of the bed (true), or do not.
     #[cfg(feature = "bed-plane")]
     FollowBed(bool),
-    /// Heaters and the fan are to be so.
+    /// Sets a heater or the fan, and waits for a temperature if the request says so.
     Heat(Heat),
-    /// The position is called this.
+    /// Sets the coordinates of the present position.
     SetPosition(PerAxis<Length>),
     /// The program stops or ends.
     Stop(Stop),
@@ -58,10 +59,11 @@ pub enum Step {
 #[derive(Clone, Copy, Default, Debug)]
 pub struct Steps {
     stage: Stage,
-    /// In a motion of several steps: the number of the next one.
+    /// In a motion of several steps: the number of the next step.
     part: u8,
-    /// In a cycle: the hole or the pass, from 1, and how deep it is.
+    /// In a cycle: the number of the hole or the pass, from 1.
     hole: u16,
+    /// In a cycle that pecks: the level that has been drilled to.
     depth: Length,
     peck: Peck,
 }
@@ -80,7 +82,7 @@ enum Stage {
     Done,
 }
 
-/// What comes next in a hole that is drilled bit by bit.
+/// The next movement in a hole that is drilled in pecks.
 #[derive(Clone, Copy, Default, PartialEq, Debug)]
 enum Peck {
     #[default]
@@ -89,27 +91,28 @@ enum Peck {
     Down,
 }
 
-/// X and Z among the axes.
+/// The indices of X and Z among the axes.
 const X: usize = 0;
 const Z: usize = 2;
 
-/// How far above the last depth feeding begins again, and how far chips are broken: 0.254 mm.
+/// How far above the last depth feeding begins again after a peck, and how far the tool goes up to break chips: 0.254
+/// mm.
 const PECK_CLEARANCE: i32 = 2_540;
 
-/// An operation at a hole.
+/// An operation of a canned cycle at a hole.
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Op {
     /// The hole is done.
     End,
-    /// Before the first hole: up to R if the tool is below it.
+    /// Goes up to R before the first hole, if the tool is below R.
     Rise,
-    /// To the hole, across the plane.
+    /// Goes to the place of the hole in the plane.
     Over,
-    /// To one side of the hole.
+    /// Goes to one side of the hole in the plane (G87).
     Aside,
     Rapid(Level),
     Feed(Level),
-    /// To the bottom, bit by bit.
+    /// Drills to the bottom in pecks.
     Peck,
     Dwell,
     SpindleOff,
@@ -126,15 +129,15 @@ enum Level {
     Top,
 }
 
-/// What all cycles begin with.
+/// The operations with which all cycles begin.
 const APPROACH: [Op; 3] = [Op::Rise, Op::Over, Op::Rapid(Level::R)];
-/// The most that one does after that.
+/// The greatest number of operations after the approach.
 const OPS: usize = 12;
-/// The first cycle's motion mode.
+/// The motion mode of the first cycle in [`CYCLES`].
 const FIRST: usize = MotionMode::Drill as usize;
 
 progmem! {
-    /// What each cycle does at a hole, by motion mode from G81 on.
+    /// The operations of each cycle at a hole, by motion mode from G81 on.
     static CYCLES: [[Op; OPS]; 10] = [
         ops(&[Op::Feed(Level::Bottom), Op::Rapid(Level::Clear)]),
         ops(&[Op::Feed(Level::Bottom), Op::Dwell, Op::Rapid(Level::Clear)]),
@@ -174,13 +177,13 @@ const fn ops(some: &[Op]) -> [Op; OPS] {
 
 #[small]
 impl Steps {
-    /// The next step of a line, the machine being at `position`; `None` when there is none left.
+    /// Returns the next step of a line. `position` is where the machine is. `None` after the last step.
     #[inline(never)]
     pub fn next(&mut self, commands: &Commands, position: &PerAxis<Length>) -> Option<Step> {
         loop {
             let stage = self.stage;
             let (step, next) = match stage {
-                // A tool is changed at rest.
+                // The spindle has to stop before the tool is changed.
                 Stage::OldSpindle => {
                     let off = Step::Spindle(Spindle { turn: Turn::Off, speed: 0.0 });
                     (commands.tool.map(|_| off), Stage::Tool)
@@ -207,7 +210,7 @@ impl Steps {
         }
     }
 
-    /// Asks for the stop at the end of the line once more.
+    /// Makes [`Self::next`] return the stop at the end of the line once more.
     pub fn repeat(&mut self) {
         self.stage = Stage::Stop;
     }
@@ -243,14 +246,14 @@ impl Steps {
         }
     }
 
-    /// G76: to where a pass begins, the pass, and back to the drive line.
+    /// Returns the next step of G76. Each pass goes to its start, cuts, and goes back to the drive line.
     #[inline(never)]
     fn threading(&mut self, cycle: &ThreadCycle, position: &PerAxis<Length>) -> Option<Step> {
         self.hole = self.hole.max(1);
         while self.hole <= cycle.passes {
             self.part += 1;
             let (axis, to) = match self.part {
-                // Without a spindle nothing moves.
+                // Before the first pass nothing may move until the spindle turns.
                 1 if self.hole == 1 => return Some(Step::AwaitSpindle),
                 1 => continue,
                 2 => (Z, cycle.begin(self.hole)),
@@ -264,7 +267,7 @@ impl Steps {
                 }
             };
             match level(position, axis, to, None) {
-                // Nowhere to go.
+                // A move to the present position is left out.
                 Some(Step::Line(target, _)) if target == *position => {}
                 step => return step,
             }
@@ -272,8 +275,9 @@ impl Steps {
         None
     }
 
-    /// A line of the pass that [`Step::Thread`] asks for, counted from 0, the machine being at `position`: where it ends, and the way in a turn of the axis
-    /// that moves farthest. `None` beyond the last.
+    /// Returns a line of the pass that [`Step::Thread`] asks for: where the line ends, and how far the axis that moves
+    /// farthest goes in a turn. Lines are counted from 0, and `position` is where the machine is. `None` beyond the
+    /// last line.
     #[inline(never)]
     pub fn pass(
         &self,
@@ -288,7 +292,8 @@ impl Steps {
         }
     }
 
-    /// Where the pass that [`Step::Thread`] asks for ends, the machine being at `position`: for those who do not carry it out.
+    /// Returns where the pass that [`Step::Thread`] asks for ends, for callers that do not carry it out. `position` is
+    /// where the machine is.
     pub fn end_of_pass(&self, motion: &Motion, position: &PerAxis<Length>) -> PerAxis<Length> {
         let (mut at, mut line) = (*position, 0);
         if matches!(motion, Motion::Thread { returns: true, .. }) {
@@ -324,7 +329,7 @@ impl Steps {
                 self.part += 1;
             }
             match step {
-                // Nowhere to go.
+                // A move to the present position is left out.
                 Some(Step::Line(target, _)) if target == *position => {}
                 None => {}
                 step => return step,
@@ -357,7 +362,7 @@ impl Steps {
         }
     }
 
-    /// To the hole, or so far beside it.
+    /// Returns the move to the place of the hole in the plane, or to a place that is `by` beside it.
     #[inline(never)]
     fn over(&self, cycle: &Cycle, position: &PerAxis<Length>, by: [Length; 2]) -> Option<Step> {
         let mut target = *position;
@@ -368,7 +373,7 @@ impl Steps {
         Some(Step::Line(target, None))
     }
 
-    /// G73 and G83: to the bottom in feeds no longer than Q.
+    /// Returns the next step of G73 and G83, which drill to the bottom in feeds no longer than Q.
     #[inline(never)]
     fn peck(&mut self, cycle: &Cycle, position: &PerAxis<Length>, across: usize) -> Option<Step> {
         let again = Length(self.depth.0.saturating_add(PECK_CLEARANCE)).min(cycle.retract);
@@ -391,7 +396,7 @@ impl Steps {
     }
 }
 
-/// Along the axis across the plane.
+/// Returns a move along one axis. Without a feed it is a traverse.
 #[inline(never)]
 #[small]
 fn level(

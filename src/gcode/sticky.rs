@@ -1,7 +1,7 @@
-//! The words of canned cycles that stay in force from line to line (RS274/NGC 3.5.16).
+//! Sticky words: the words of canned cycles that stay in force from line to line (RS274/NGC 3.5.16).
 //!
-//! Numbers are kept as written, in units of a length: R and Z mean something else with G90 than with G91.
-//! They hold for as long as the same cycle goes on, in the same plane.
+//! Numbers are kept as written, in units of a length, because R and Z have a different meaning with G90 and with G91.
+//! They stay in force while the same cycle goes on in the same plane.
 
 use super::axes;
 use super::block::Block;
@@ -13,11 +13,11 @@ use crate::units::Length;
 /// The words of the cycle in force.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Sticky {
-    /// Whose they are: none of another mode counts.
+    /// The cycle that the words belong to. They do not count for another cycle.
     mode: MotionMode,
     /// The plane of the cycle.
     plane: Plane,
-    /// Where the axis stood before the first cycle of the series, machine coordinates.
+    /// The height before the first cycle of the series, machine coordinates.
     pub initial: Length,
     /// R.
     pub retract: Option<Length>,
@@ -33,7 +33,7 @@ pub struct Sticky {
 
 #[small]
 impl Sticky {
-    /// No words. All zeros, so that it needs no memory.
+    /// No words. The value is all zeros, so that it needs no memory for an initial value.
     pub const NONE: Self = Self {
         mode: MotionMode::Traverse,
         plane: Plane::Xy,
@@ -45,8 +45,8 @@ impl Sticky {
         offsets: [None; 3],
     };
 
-    /// Takes what is in force on a line of `mode`, after `before` was: its words, and the others of the series.
-    /// `here`: where the axis across the plane is.
+    /// Takes the words of a line with the cycle `mode`. Words that the line lacks stay in force if the same cycle goes
+    /// on. `before` is the motion mode of the previous line, and `here` the coordinate of the axis across the plane.
     #[inline(never)]
     pub fn on(
         &mut self,
@@ -58,7 +58,7 @@ impl Sticky {
         here: Length,
     ) -> Result<(), Status> {
         match () {
-            // Along another axis, heights mean nothing.
+            // Heights along the axis of another plane have no meaning.
             () if self.plane != plane => self.forget(here),
             () if before == mode && self.mode == mode => {}
             () if before.is_cycle() => self.forget(self.initial),
@@ -83,9 +83,9 @@ impl Sticky {
         Ok(())
     }
 
-    /// No words; the series begins where the axis is at `initial`.
+    /// Forgets all words. `initial` is the height before the first cycle of the series.
     fn forget(&mut self, initial: Length) {
-        // One by one: whole, it would be copied from a constant, which has its place in RAM.
+        // Field by field: a whole value would be copied from a constant, which takes RAM on AVR.
         self.initial = initial;
         (self.retract, self.depth, self.peck, self.dwell_ms) = (None, None, None, None);
         for offset in &mut self.offsets {

@@ -1,13 +1,19 @@
-//! Threads: G33 and G32, a pass in step with the spindle; G33.1, there and back, which taps a hole; G76, a thread in several passes (LinuxCNC).
+//! Threads, as in LinuxCNC. G33 and G32: one pass in step with the spindle. G33.1: a pass there and back, which taps a
+//! hole. G76: a thread in several passes.
 //!
-//! A [`ThreadCycle`] goes along Z. Its *drive line* is parallel to Z through where X is when it begins. Each pass goes from the drive line to its depth, cuts
-//! in step with the spindle, and goes back to the drive line. `steps` spells it out; one pass is up to three [lines](ThreadCycle::line), with a taper at
-//! each end. All passes begin at the index, so that each lies in the one before.
+//! A [`ThreadCycle`] (G76) goes along Z. Its *drive line* is parallel to Z, at the X where the tool is when the cycle
+//! begins. Each pass goes from the drive line to its depth, cuts in step with the spindle, and goes back to the drive
+//! line. `steps` expands the cycle. The cut of a pass consists of up to three [lines](ThreadCycle::line): a taper at
+//! each end, and the thread between them. All passes begin at the index, so that each pass follows the groove of the
+//! previous pass.
 //!
-//! **Depth.** The n-th pass is `J n^(1/R)` deep, counted from the peak of the thread: R 1 is as much each time, R 2 the same area of chip. The last is K deep,
-//! and H more passes as deep. **Compound slide.** A pass of depth d begins `d tan Q` further along Z, so that one flank cuts.
+//! **Depth.** The n-th pass is `J n^(1/R)` deep, measured from the peak of the thread. With R 1 all passes cut equally
+//! deep, with R 2 all passes cut the same area of chip. The last of these passes is K deep, and H more passes of the
+//! same depth follow. **Compound slide.** A pass of depth d begins `d tan Q` further along Z, so that only one flank
+//! cuts.
 //!
-//! Everything is refused before anything moves. Units: [`Length`]; depths go by floats and are rounded once. Cost on AVR: 15,000 cycles for the line, 6,000 for a pass.
+//! Errors are found before anything moves. Units: [`Length`]. Depths are computed as floats and rounded once. Cost on
+//! AVR: 15,000 cycles for the line, 6,000 for a pass.
 
 use kerf_macros::small;
 
@@ -23,40 +29,40 @@ use crate::math::{cos, pow, sin};
 use crate::status::Status;
 use crate::units::{Length, PerAxis};
 
-/// X and Z among the axes.
+/// The indices of X and Z among the axes.
 const X: usize = 0;
 const Z: usize = 2;
 
-/// The most passes without those of H.
+/// The greatest number of passes, without those of H.
 const PASSES_MAX: f32 = 1_000.0;
 
 /// The greatest Q, degrees.
 const SLIDE_MAX: f32 = 80.0;
 
-/// E is at the entry, at the exit: bits of L.
+/// Bits of L: whether there is a taper (E) at the entry, and at the exit.
 const ENTRY: u8 = 1;
 const EXIT: u8 = 2;
 
-/// G76. Machine coordinates and radii.
+/// The threading cycle of G76. Lengths are machine coordinates, and radii along X.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ThreadCycle {
     /// X of the drive line, where the tool begins and ends.
     pub drive: Length,
     /// Z where the tool begins.
     pub start: Length,
-    /// Z where it ends.
+    /// Z where the tool ends.
     pub end: Length,
-    /// P: the way of Z in a turn.
+    /// P: the distance along Z in a turn.
     pub lead: Length,
-    /// I: X of the thread's peak less that of the drive line. Below 0 the thread is an outer one.
+    /// I: X of the thread's peak minus X of the drive line. A negative value means an external thread.
     pub peak: Length,
     /// J: the depth of the first pass.
     pub first: Length,
-    /// K: the depth of the last.
+    /// K: the depth of the last pass.
     pub depth: Length,
-    /// E: how long a taper is, along Z.
+    /// E: the length of a taper along Z.
     pub taper: Length,
-    /// L: where tapers are. 1 at the entry, 2 at the exit, 3 both.
+    /// L: where there are tapers. 1 at the entry, 2 at the exit, 3 at both.
     pub ends: u8,
     /// 1/R.
     pub degression: f32,
@@ -64,13 +70,13 @@ pub struct ThreadCycle {
     pub slide: f32,
     /// The first pass that is K deep, from 1.
     pub deepest: u16,
-    /// All passes, with those of H.
+    /// The number of all passes, with those of H.
     pub passes: u16,
 }
 
 #[small]
 impl ThreadCycle {
-    /// How deep a pass is, counted from 1.
+    /// Returns the depth of a pass. Passes are counted from 1.
     fn depth_of(&self, pass: u16) -> Length {
         if pass >= self.deepest {
             return self.depth;
@@ -79,24 +85,24 @@ impl ThreadCycle {
         Length(depth as i32).min(self.depth)
     }
 
-    /// A length towards the work, along X.
+    /// Returns the signed value of a length towards the workpiece, along X.
     fn inwards(&self, length: Length) -> Length {
         if self.peak.0 < 0 { Length(-length.0) } else { length }
     }
 
-    /// A length from the start to the end, along Z.
+    /// Returns the signed value of a length from the start towards the end, along Z.
     fn onwards(&self, length: Length) -> Length {
         if self.end < self.start { Length(-length.0) } else { length }
     }
 
-    /// X of a pass at its depth.
+    /// Returns X of a pass at its full depth.
     #[inline(never)]
     pub fn bottom(&self, pass: u16) -> Length {
         let depth = self.inwards(self.depth_of(pass));
         Length(self.drive.0 + self.peak.0 + depth.0)
     }
 
-    /// X outside of the cut, where a taper begins or ends. Without one it is where the tool is on its way in or out.
+    /// Returns X outside of the cut, where a taper begins or ends. Without tapers this is X of the drive line.
     pub fn outside(&self, pass: u16) -> Length {
         if self.ends == 0 {
             return self.drive;
@@ -104,27 +110,27 @@ impl ThreadCycle {
         Length(self.bottom(pass).0 - self.inwards(self.depth).0)
     }
 
-    /// X where a pass begins.
+    /// Returns X where a pass begins.
     #[inline(never)]
     pub fn entry(&self, pass: u16) -> Length {
         if self.ends & ENTRY != 0 { self.outside(pass) } else { self.bottom(pass) }
     }
 
-    /// Z where a pass begins.
+    /// Returns Z where a pass begins.
     #[inline(never)]
     pub fn begin(&self, pass: u16) -> Length {
         let slid = self.depth_of(pass).0 as f32 * self.slide;
-        // Before it is checked it may be far away.
+        // Saturates, because `tapers` calls this before the cycle has been checked.
         Length(self.start.0.saturating_add(self.onwards(Length(slid as i32)).0))
     }
 
-    /// X and Z where a line of a pass ends, counted from 0; `None` beyond the last.
+    /// Returns X and Z where a line of a pass ends. Lines are counted from 0. `None` beyond the last line.
     #[inline(never)]
     fn corner(&self, pass: u16, line: u8) -> Option<(Length, Length)> {
         let taper = self.onwards(self.taper);
         let flat = Length(self.end.0 - if self.ends & EXIT != 0 { taper.0 } else { 0 });
         let into = Length(self.begin(pass).0 + taper.0);
-        // Without a taper at the entry its line is left out.
+        // Without a taper at the entry, line 0 is the thread itself.
         match line + u8::from(self.ends & ENTRY == 0) {
             0 => Some((self.bottom(pass), into)),
             1 => Some((self.bottom(pass), flat)),
@@ -133,7 +139,8 @@ impl ThreadCycle {
         }
     }
 
-    /// A line of a pass from `position`, counted from 0: where it ends, and the way in a turn of the axis that moves farther. `None` beyond the last.
+    /// Returns a line of a pass from `position`: where the line ends, and how far the axis that moves farther goes in a
+    /// turn. Lines are counted from 0. `None` beyond the last line.
     #[inline(never)]
     pub fn line(
         &self,
@@ -156,7 +163,8 @@ impl ThreadCycle {
 
 #[small]
 impl State {
-    /// G33 and G32, and G33.1, which `returns`: K is the way in a turn of the axis that moves farthest (LinuxCNC). F does not count.
+    /// Carries out G33 and G32, and with `returns` G33.1. K is the distance that the axis that moves farthest goes in a
+    /// turn (LinuxCNC). F is ignored.
     #[inline(never)]
     pub(super) fn thread(
         &mut self,
@@ -185,7 +193,7 @@ impl State {
         Ok(())
     }
 
-    /// G76.
+    /// Carries out G76.
     #[inline(never)]
     pub(super) fn thread_cycle(
         &mut self,
@@ -197,7 +205,7 @@ impl State {
         if !block.has(words::bit(Z as u8)) {
             return Err(Status::AxisWordMissing);
         }
-        // In its place from the beginning: it is too large to be carried about.
+        // Built in its final place, because it is too large to be copied.
         out.motion = Motion::ThreadCycle(ThreadCycle::default());
         let Motion::ThreadCycle(cycle) = &mut out.motion else { return Err(Status::InternalError) };
         (cycle.drive, cycle.start) = (self.position[X], self.position[Z]);
@@ -208,7 +216,7 @@ impl State {
         self.tapers(block, cycle)
     }
 
-    /// P, I, J and K.
+    /// Carries out P, I, J and K.
     #[inline(never)]
     fn profile(&self, block: &Block, cycle: &mut ThreadCycle) -> Result<(), Status> {
         cycle.lead = self.above_0(block, P, Status::PWordMissing, Status::PWordInvalid)?;
@@ -221,12 +229,12 @@ impl State {
         if cycle.depth.0 <= 0 {
             return Err(Status::KWordInvalid);
         }
-        // So all sums are within the range.
+        // Lengths below this limit have sums within the range.
         let far = [cycle.drive, cycle.peak, cycle.depth].iter().any(|length| is_far(*length));
         if far { Err(Status::OutOfRange) } else { Ok(()) }
     }
 
-    /// R, Q and H.
+    /// Carries out R, Q and H.
     #[inline(never)]
     fn passes(&self, block: &Block, cycle: &mut ThreadCycle) -> Result<(), Status> {
         let number = |slot| block.get(slot).map(|word| word.to_f32());
@@ -241,7 +249,7 @@ impl State {
         let springs = block.get(H).map_or(Ok(0), |word| word.integer());
         let springs = springs.ok().and_then(|springs| u8::try_from(springs).ok());
         let springs = springs.ok_or(Status::HWordInvalid)?;
-        // What rounding leaves is no pass of its own.
+        // The factor keeps a rounding error from becoming a pass of its own.
         let share = cycle.depth.0 as f32 / cycle.first.0 as f32 * 0.9999;
         let before = if share < 1.0 { 0.0 } else { pow(share, degression) };
         if before >= PASSES_MAX {
@@ -255,7 +263,7 @@ impl State {
         Ok(())
     }
 
-    /// E and L, and whether there is room along Z.
+    /// Carries out E and L, and checks that there is room for the tapers along Z.
     #[inline(never)]
     fn tapers(&self, block: &Block, cycle: &mut ThreadCycle) -> Result<(), Status> {
         let ends = block.get(L).map_or(Ok(0), |word| word.integer());
@@ -275,7 +283,7 @@ impl State {
         Ok(())
     }
 
-    /// A length above 0 that the line needs.
+    /// Returns the length of a word that the line needs. It has to be above 0.
     #[inline(never)]
     fn above_0(
         &self,
@@ -288,12 +296,12 @@ impl State {
         if length.0 > 0 { Ok(length) } else { Err(invalid) }
     }
 
-    /// A length across, which is a diameter with G7.
+    /// Returns the length of a word along X that the line needs. With G7 the word is a diameter.
     fn across(&self, block: &Block, slot: u8, missing: Status) -> Result<Length, Status> {
         self.word(block, slot, self.modal.x_mode)?.ok_or(missing)
     }
 
-    /// The length of a word, of which half counts if it is a diameter.
+    /// Returns the length of a word, or half of it if `mode` says that the word is a diameter. `None` without the word.
     #[inline(never)]
     fn word(&self, block: &Block, slot: u8, mode: XMode) -> Result<Option<Length>, Status> {
         let Some(word) = block.get(slot) else { return Ok(None) };
@@ -302,7 +310,7 @@ impl State {
     }
 }
 
-/// Whether threads can be cut.
+/// Returns `Ok` if the image and the machine can cut threads, else the reason why not.
 #[inline(never)]
 #[small]
 fn can_turn(setup: &impl Setup) -> Result<(), Status> {
@@ -310,7 +318,7 @@ fn can_turn(setup: &impl Setup) -> Result<(), Status> {
     setup.encoder()
 }
 
-/// More than 50 m.
+/// Whether a length is more than 50 m.
 #[small]
 fn is_far(length: Length) -> bool {
     length.0.unsigned_abs() > 500_000_000

@@ -1,21 +1,21 @@
-//! The letters of a line that carry a number, as slots and as sets of bits.
+//! Words: the letters of a line that carry a number. Each has a slot, and a bit in sets of words.
 //!
-//! A set is a `u32` with the bit of each slot. The tables of `codes` say with them which words a code
-//! takes and which it needs.
+//! A set is a `u32` with one bit for each slot. The tables of `codes` use sets for the words that a code takes and the
+//! words that it needs.
 
 use crate::progmem;
 use crate::status::Status;
 
 /// The letter of each slot, axes first.
 pub const LETTERS: [u8; COUNT] = *b"XYZABCIJKRPQLHFSTNDE";
-/// How many slots there are.
+/// The number of slots.
 pub const COUNT: usize = 20;
 
 const _: () = assert!(COUNT <= 32, "a set of words is a `u32`");
 
 /// The slot of X.
 pub const X: u8 = 0;
-/// The slot of I, of I J K.
+/// The slot of I. J and K follow.
 pub const I: u8 = 6;
 /// The slot of J.
 pub const J: u8 = 7;
@@ -37,16 +37,16 @@ mod names {
 }
 pub use names::{D, E, F, H, L, N, P, Q, R, S, T};
 
-/// X Y Z A B C.
+/// The set of X Y Z A B C.
 pub const AXES: u32 = 0x3F;
-/// A B C.
+/// The set of A B C.
 pub const ROTARY: u32 = 0x38;
-/// I J K.
+/// The set of I J K.
 pub const OFFSETS: u32 = 7 << I;
-/// Words that mean something by themselves, on any line.
+/// The words that have a meaning on any line, without a code that takes them.
 pub const ALWAYS: u32 = bit(F) | bit(S) | bit(T) | bit(N);
 
-/// No such slot.
+/// The mark of a letter without a slot.
 const NONE: u8 = 255;
 
 progmem! {
@@ -60,7 +60,7 @@ progmem! {
         }
         table
     };
-    /// The bit of each slot: quicker than to shift one there.
+    /// The bit of each slot. A look-up is faster than a shift by a variable number.
     static BIT: [u32; COUNT] = {
         let mut table = [0; COUNT];
         let mut i = 0;
@@ -70,7 +70,7 @@ progmem! {
         }
         table
     };
-    /// What a code is refused with that lacks a word it needs, by slot.
+    /// The status with which a code is refused that lacks a word that it needs, by slot.
     static MISSING: [Status; COUNT] = [
         Status::AxisWordMissing, Status::AxisWordMissing, Status::AxisWordMissing,
         Status::AxisWordMissing, Status::AxisWordMissing, Status::AxisWordMissing,
@@ -81,22 +81,22 @@ progmem! {
     ];
 }
 
-/// The set of one slot.
+/// Returns the set of one slot.
 pub const fn bit(slot: u8) -> u32 {
     1 << slot
 }
 
-/// The set of one slot that is known only at run time; empty for a number beyond the last slot.
+/// Returns the set of one slot that is known only at run time. Empty for a number beyond the last slot.
 pub fn bit_of(slot: u8) -> u32 {
     BIT.at(slot.into()).unwrap_or(0)
 }
 
-/// The slot of a letter in upper case.
+/// Returns the slot of a letter in upper case. `None` if the letter has no slot.
 pub fn slot_of(letter: u8) -> Option<u8> {
     SLOT.at(usize::from(letter.wrapping_sub(b'A'))).filter(|slot| *slot != NONE)
 }
 
-/// What a line is refused with that lacks the first word of a set.
+/// Returns the status with which a line is refused that lacks the words of a set. The first word of the set decides.
 #[small]
 pub fn missing(set: u32) -> Status {
     let first = (0..COUNT as u8).find(|slot| set & bit_of(*slot) != 0);

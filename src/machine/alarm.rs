@@ -1,45 +1,46 @@
-//! Alarms: what brings the machine to a stop that lasts until somebody ends it.
+//! Alarms: conditions that stop the machine until the operator ends the alarm.
 //!
 //! | cause | `stat` | motion | outputs | position | G-code | ended by |
 //! |---|---|---|---|---|---|---|
 //! | `{alarm:n}`, a failed G38.2 or G38.4 | 2 | comes to rest within its limits | off | kept | 203 | `{clear:n}`, `{clr:n}`, `$clear`; M2, M30 alone on a line |
-//! | a reset by the watchdog or a brown-out | 2 | none | off | not known | 203 | the same |
-//! | a limit is hit | 2 | no step more | off | no axis homed | 204 | the same |
-//! | `{shutd:n}`, the emergency stop | 11 (g2core 12) | no step more | off | no axis homed | 205 | clear, when the stop is let go |
-//! | `{panic:n}` | 13 | no step more | off | no axis homed | 206 | `^x` |
+//! | a reset by the watchdog or a brown-out | 2 | none | off | not known | 203 | as in the first row |
+//! | a limit is hit | 2 | stops without another step | off | no axis homed | 204 | as in the first row |
+//! | `{shutd:n}`, the emergency stop | 11 (g2core 12) | stops without another step | off | no axis homed | 205 | clear, when the emergency stop is released |
+//! | `{panic:n}` | 13 | stops without another step | off | no axis homed | 206 | `^x` |
 //!
-//! Whatever it is, what is queued is dropped, and lines that have come before it are refused, also when it has been ended. Motors keep their power: without it a
-//! vertical axis falls. Steps that are made are counted, whenever they stop; but motors that stop at once
-//! may have gone on for some more, so that axes have to be homed again.
+//! Every alarm drops the queue. Lines that arrived before the alarm are refused, even after it has been ended. Motors
+//! keep their power, because a vertical axis falls without it. Every step that is made is counted, even if motion stops
+//! suddenly. But a motor that stops suddenly may slip by some steps that are not counted, so axes have to be homed
+//! again.
 //!
-//! Each is told by one exception report when it begins. What comes later counts only if it is worse.
+//! An alarm is reported by one exception report when it begins. A later cause counts only if it is worse.
 
 use super::Event;
 use crate::status::Status;
 
-/// A part of what the machine is doing: how bad it is.
+/// The part of the machine's state that says which alarm is on. A greater discriminant is a worse alarm.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Alarm {
-    /// There is no alarm.
+    /// No alarm is on.
     #[default]
     None,
-    /// Somebody asked for it.
+    /// An alarm was requested, probing has failed, or the machine had an unwanted reset.
     Alarm,
     /// A limit has been hit.
     Limit,
-    /// Somebody asked for it, or has hit the emergency stop.
+    /// A shutdown was requested, or the emergency stop has been hit.
     Shutdown,
-    /// Somebody asked for it.
+    /// A panic was requested.
     Panic,
 }
 
 impl Alarm {
-    /// All of them, by their discriminants.
+    /// All alarms, in the order of their discriminants.
     pub const ALL: [Alarm; Alarm::Panic as usize + 1] =
         [Alarm::None, Alarm::Alarm, Alarm::Limit, Alarm::Shutdown, Alarm::Panic];
 
-    /// The state that an event leads to. An alarm does not end while the hold `flushes`, nor a panic at all.
+    /// Returns the alarm that an event leads to. An alarm does not end while the hold `flushes`. A panic never ends.
     pub const fn after(self, event: Event, flushes: bool) -> Alarm {
         match (event.alarm(), event) {
             (Some(alarm), _) if self.is_exceeded_by(alarm) => alarm,
@@ -48,17 +49,17 @@ impl Alarm {
         }
     }
 
-    /// Whether the other one is worse, so that it counts.
+    /// Whether the other alarm is worse and therefore replaces this one.
     pub const fn is_exceeded_by(self, other: Alarm) -> bool {
         (self as u8) < other as u8
     }
 
-    /// Whether there is one.
+    /// Whether an alarm is on.
     pub const fn is_on(self) -> bool {
         !matches!(self, Alarm::None)
     }
 
-    /// The one that is so bad.
+    /// Returns the alarm with this discriminant.
     pub fn from_bits(bits: u8) -> Alarm {
         match bits {
             0 => Alarm::None,
@@ -69,17 +70,17 @@ impl Alarm {
         }
     }
 
-    /// Whether motors stop at once, and may lose their position.
+    /// Whether the alarm stops the motors suddenly, so that they may lose their position.
     pub fn is_sudden(self) -> bool {
         self >= Alarm::Limit
     }
 
-    /// Whether the end of a program ends it.
+    /// Whether the end of a program (M2, M30) ends the alarm.
     pub fn ends_with_program(self) -> bool {
         matches!(self, Alarm::Alarm | Alarm::Limit)
     }
 
-    /// What it is told as, and G-code is refused with.
+    /// Returns the status of the exception report, with which G-code is also refused.
     pub fn status(self) -> Status {
         match self {
             Alarm::None => Status::Ok,

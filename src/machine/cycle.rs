@@ -1,15 +1,15 @@
-//! What the machine carries out.
+//! The part of the machine's state that says what the machine carries out.
 
 use super::Event;
 
-/// A part of what the machine is doing.
+/// What the machine carries out.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Cycle {
-    /// Lines, if there are any.
+    /// The machine carries lines out, or is idle.
     #[default]
     Lines,
-    /// The machine has come to a program stop, and waits for cycle start.
+    /// The machine has come to a program stop and waits for cycle start.
     Stopped,
     /// G38.2 to G38.5.
     Probe,
@@ -17,17 +17,18 @@ pub enum Cycle {
     Homing,
     /// `{jogx:..}`.
     Jog,
-    /// `{chk:1}`: lines are checked, and nothing of them is carried out. Only a reset and `{chk:0}` end it.
+    /// `{chk:1}`: lines are checked and not carried out. Only a reset and `{chk:0}` end this.
     Check,
 }
 
 impl Cycle {
-    /// All of them, by their discriminants.
+    /// All cycles, in the order of their discriminants.
     pub const ALL: [Cycle; Cycle::Check as usize + 1] =
         [Cycle::Lines, Cycle::Stopped, Cycle::Probe, Cycle::Homing, Cycle::Jog, Cycle::Check];
 
-    /// The state that an event leads to. None begins while the hold `drops` what is queued, or in an alarm. One that is
-    /// flushed lasts until that has been dropped: who sees to it has to know what has been interrupted.
+    /// Returns the cycle that an event leads to. No cycle begins while the hold `drops` the queue, or in an alarm. A
+    /// cycle that is flushed lasts until the queue has been dropped, because the planner needs to know what has been
+    /// interrupted.
     pub const fn after(self, event: Event, drops: bool, alarmed: bool) -> Cycle {
         match event {
             Event::Stopped | Event::Probe | Event::Homing | Event::Jog | Event::Check
@@ -41,14 +42,14 @@ impl Cycle {
             Event::Jog => Cycle::Jog,
             Event::Check => Cycle::Check,
             Event::Done if drops => self,
-            // What has been sent to be checked is not to move anything because some of it was dropped.
+            // Lines that were sent to be checked must not move anything after some of them have been dropped.
             Event::Dropped if matches!(self, Cycle::Check) => self,
             Event::Done | Event::Dropped => Cycle::Lines,
             _ => self,
         }
     }
 
-    /// The one of a discriminant.
+    /// Returns the cycle with this discriminant.
     pub(super) const fn from_bits(bits: u8) -> Cycle {
         match bits {
             0 => Cycle::Lines,

@@ -1,6 +1,7 @@
-//! One word for what the machine is doing: the three parts of its [`State`](super::State) together, the one that matters most first.
+//! A summary of what the machine is doing. It combines the three parts of its [`State`](super::State), of which the
+//! alarm takes precedence, then the hold, then the cycle.
 //!
-//! Dialects spell it: `stat` is it in TinyG's numbers.
+//! Each dialect has its own names for the values of [`Doing`]. TinyG's numbers for them are `stat`.
 
 use super::{Alarm, Cycle};
 use crate::machine;
@@ -8,7 +9,7 @@ use crate::machine;
 /// What the machine is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Doing {
-    /// The machine rests: nothing is queued, or it waits at a program stop.
+    /// The machine is at rest: nothing is queued, it waits at a program stop, or it is in check mode.
     Rests,
     /// The machine carries lines out.
     Runs,
@@ -18,15 +19,16 @@ pub enum Doing {
     Homes,
     /// The machine is jogged.
     Jogs,
-    /// The machine is held, or what is queued is being dropped.
+    /// The machine is held, or the queue is being dropped.
     Holds,
-    /// The machine is held, or what is queued is being dropped, and the door is open.
+    /// The machine is held, or the queue is being dropped, and the door is open.
     Door,
     /// An alarm is on.
     Alarm(Alarm),
 }
 
-/// What the machine is doing; whether anything is queued or runs is asked by `works`, as late as may be. Thread mode.
+/// Returns what the machine is doing. `works` says whether anything is queued or runs. It is called only if its answer
+/// matters. Thread mode.
 #[inline(always)]
 pub fn doing(works: impl Fn() -> bool) -> Doing {
     if machine::is_alarmed() {
@@ -44,7 +46,8 @@ pub fn doing(works: impl Fn() -> bool) -> Doing {
     }
 }
 
-/// Whether a hold is on that anybody is to see: not that of a kill at rest, which lasts until what waits is dropped. Thread mode.
+/// Whether a hold is on that is to be shown. The short hold of a kill at standstill, which lasts until the waiting
+/// lines are dropped, is not shown. Thread mode.
 #[inline(always)]
 pub fn shows_hold(works: impl Fn() -> bool) -> bool {
     let rests = || !works() || machine::is_stopped();

@@ -1,28 +1,28 @@
-//! What may happen to the machine. Who raises each is in the [module](super)'s table.
+//! The events that change the machine's state. A table in the [parent module](super) says who raises each event.
 
 use super::Alarm;
 
-/// Something that may change what the machine is doing. Those that concern the [`Hold`](super::Hold) alone come first.
+/// An event that may change what the machine is doing. The events that concern the [`Hold`](super::Hold) come first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Event {
-    /// Motion is to come to rest.
+    /// Motion has to come to rest.
     Hold,
-    /// What is held is to go on.
+    /// Held motion has to go on.
     Resume,
-    /// All that has come is to be dropped, up to where the reader is.
+    /// Everything that has arrived has to be dropped. The reader drops the lines first.
     Flush,
-    /// What has come is dropped, from the pools; the queue is to be dropped.
+    /// The lines that have arrived are dropped from the line pools. The queue has to be dropped too.
     Cut,
-    /// What has come is dropped and the queue is to be dropped, as by `Cut`; and the program is to end.
+    /// Like `Cut`, and the program has to end afterwards.
     Kill,
     /// The queue has been dropped.
     Dropped,
     /// The door has been opened.
     DoorOpened,
-    /// The door has been shut, and there is something to go on with.
+    /// The door has been shut, and there is held motion to go on with.
     DoorShut,
-    /// The door has been shut, and there is nothing to go on with.
+    /// The door has been shut, and there is no held motion.
     DoorShutIdle,
     /// The machine has come to rest in a hold.
     Rested,
@@ -38,23 +38,23 @@ pub enum Event {
     Check,
     /// The cycle has come to its end, or a program stop has been left.
     Done,
-    /// Somebody asks for an alarm, or probing has failed.
+    /// An alarm has been requested, or probing has failed.
     Alarm,
     /// A limit has been hit.
     Limit,
-    /// Somebody asks for it, or has hit the emergency stop.
+    /// A shutdown has been requested, or the emergency stop has been hit.
     Shutdown,
-    /// Somebody asks for it.
+    /// A panic has been requested.
     Panic,
-    /// Somebody ends the alarm, and its cause is gone.
+    /// The end of the alarm has been requested, and its cause is gone.
     Cleared,
 }
 
 impl Event {
-    /// How many of them concern the hold and are raised by thread mode: the first.
+    /// The number of events that concern the hold and are raised by thread mode. They are the first ones.
     pub(super) const OF_HOLD: usize = Event::DoorShutIdle as usize + 1;
 
-    /// All of them, by their discriminants.
+    /// All events, in the order of their discriminants.
     pub const ALL: [Event; Event::Cleared as usize + 1] = {
         use Event::*;
         [
@@ -82,7 +82,7 @@ impl Event {
         ]
     };
 
-    /// The alarm that it raises.
+    /// Returns the alarm that the event raises. `None` if it raises none.
     pub(super) const fn alarm(self) -> Option<Alarm> {
         match self {
             Event::Alarm => Some(Alarm::Alarm),

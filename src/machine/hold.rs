@@ -1,28 +1,28 @@
-//! Whether motion goes on, and whether what is queued is being dropped.
+//! The part of the machine's state that says whether motion goes on, and whether the queue is being dropped.
 //!
-//! The order of the states makes each question one comparison of a byte. The door is open in those with an odd discriminant,
-//! but for `Resuming`.
+//! The states are ordered so that each query is one comparison of a byte. The door is open in the states with an odd
+//! discriminant, except in `Resuming`.
 
 use super::Event;
 
-/// A part of what the machine is doing.
+/// Whether motion goes on, and whether lines and the queue are being dropped.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Hold {
     /// Motion goes on.
     #[default]
     Off,
-    /// Motion is held, and goes on when the machine has come to rest.
+    /// Motion comes to rest, and then goes on.
     Resuming,
-    /// Motion is held, or slows down.
+    /// Motion is held, or slows down to be held.
     Held,
     /// Motion is held as long as the door is open.
     Door,
-    /// Motion is held; the reader is to drop the lines that have come.
+    /// Motion is held. The reader has to drop the lines that have arrived.
     Flush,
     /// The state `Flush` with the door open.
     FlushDoor,
-    /// Motion is held; the planner is to drop what is queued.
+    /// Motion is held. The planner has to drop the queue.
     Drop,
     /// The state `Drop` with the door open.
     DropDoor,
@@ -33,13 +33,13 @@ pub enum Hold {
 }
 
 impl Hold {
-    /// All of them, by their discriminants.
+    /// All states, in the order of their discriminants.
     pub const ALL: [Hold; Hold::KillDoor as usize + 1] = {
         use Hold::*;
         [Off, Resuming, Held, Door, Flush, FlushDoor, Drop, DropDoor, Kill, KillDoor]
     };
 
-    /// The state that an event leads to.
+    /// Returns the state that an event leads to.
     pub const fn after(self, event: Event) -> Hold {
         use Hold::*;
         match (event, self) {
@@ -68,22 +68,22 @@ impl Hold {
         }
     }
 
-    /// Whether motion is to come to rest, and nothing begins.
+    /// Whether motion has to come to rest, so that no new motion begins.
     pub const fn holds(self) -> bool {
         !matches!(self, Hold::Off)
     }
 
-    /// Whether lines are to be dropped, or the queue is.
+    /// Whether lines or the queue have to be dropped.
     pub const fn flushes(self) -> bool {
         self as u8 >= Hold::Flush as u8
     }
 
-    /// Whether the queue is to be dropped.
+    /// Whether the queue has to be dropped.
     pub const fn drops(self) -> bool {
         self as u8 >= Hold::Drop as u8
     }
 
-    /// Whether the program ends with that.
+    /// Whether the program ends after the queue has been dropped.
     pub const fn kills(self) -> bool {
         self as u8 >= Hold::Kill as u8
     }
@@ -94,7 +94,7 @@ impl Hold {
     }
 }
 
-/// The state after each event of [`Event::OF_HOLD`], for each state.
+/// Returns the next state for each state and each of the first [`Event::OF_HOLD`] events.
 pub(super) const fn table() -> [u8; Event::OF_HOLD * Hold::ALL.len()] {
     let mut table = [0; Event::OF_HOLD * Hold::ALL.len()];
     let mut at = 0;

@@ -1,21 +1,21 @@
-//! What the machine is doing: its states, what leads from one to another, and where that is kept.
+//! The machine's state: what it is doing, and which events change that.
 //!
-//! [`State`] has three parts, as a state chart has regions. They are three because each goes on while another changes: a
-//! hold keeps the cycle that it holds, and an alarm keeps both until everything queued has been dropped. Each is one enum, so
-//! that nothing can be in two states of a region at once.
+//! [`State`] has three parts, like the regions of a state chart. They are separate because each continues while another
+//! changes: a hold keeps the cycle that it holds, and an alarm keeps both until everything queued has been dropped.
+//! Each part is an enum, so that the machine cannot be in two states of one part at once.
 //!
 //! | part | states | says |
 //! |---|---|---|
 //! | [`Alarm`] | none, alarm, limit, shutdown, panic | whether G-code is refused, and how that ends |
-//! | [`Hold`] | off, resuming, held, door, flush, drop, kill; the last three with the door open, too | whether motion goes on, and whether what is queued is being dropped |
-//! | [`Cycle`] | lines, program stop, probe, homing, jog, check | what is carried out |
+//! | [`Hold`] | off, resuming, held, door, flush, drop, kill; the last three also with the door open | whether motion goes on, and whether the queue is being dropped |
+//! | [`Cycle`] | lines, program stop, probe, homing, jog, check | what the machine carries out |
 //!
-//! [`Doing`] is all three in one word, which is what `stat` tells. `Lines` is idle as well as run: whether anything is queued or
-//! moves is asked of the queue and of exec's snapshot, which count it anyway (`View::has_work`). Held is slowing as well as at
-//! rest: exec's snapshot knows (`Snapshot::held`).
+//! [`Doing`] combines all three parts in one value, which `stat` reports. `Lines` covers both an idle and a running
+//! machine. The queue and exec's snapshot know whether anything is queued or moves (`View::has_work`). `Held` covers
+//! both a machine that slows down and one at standstill. Exec's snapshot knows which (`Snapshot::held`).
 //!
-//! Where events lead a [`Hold`]; where there is nothing, it stays. Of `Flush`, `Drop` and `Kill` there is each with the door open as well:
-//! it goes on alike, with the door open.
+//! The transitions of [`Hold`] follow. In an empty cell the state stays. `Flush`, `Drop` and `Kill` each have a second
+//! state with the door open. An event leads it to the same state as without the door, but with the door open.
 //!
 //! | | `Hold` | `Resume` | `Rested` | `Flush` | `Cut`, an alarm | `Kill` | `Dropped` | `DoorOpened` | `DoorShut` | `DoorShutIdle` |
 //! |---|---|---|---|---|---|---|---|---|---|---|
@@ -27,7 +27,7 @@
 //! | Drop | | | | | | Kill | Off, or Door | door open | door shut | door shut |
 //! | Kill | | | | | | | Off, or Door; the program ends | door open | door shut | door shut |
 //!
-//! Where events lead the others:
+//! The transitions of [`Cycle`] and [`Alarm`] (state, events with their conditions, next state):
 //!
 //! ```text
 //!  Cycle   Lines   Probe, Homing, Jog, Stopped, Check: not in an alarm, nor while Drop or Kill   that cycle
@@ -38,11 +38,11 @@
 //!
 //! | event | raised by | level | what comes with it |
 //! |---|---|---|---|
-//! | `Hold` | `!`, where there is something to hold; `tasks::hold` | thread | |
-//! | `Resume` | `~`, when the reader comes to its place; `tasks::hold` | thread | `cycle_start` is signalled |
+//! | `Hold` | `!`, if there is something to hold; `tasks::hold` | thread | |
+//! | `Resume` | `~`, when the reader reaches its place in the stream; `tasks::hold` | thread | `cycle_start` is signalled |
 //! | `Rested` | exec, at rest while `Resuming` | exec | motion goes on |
-//! | `Flush` | `{qf:1}`, `%!`, the end of a jog | thread | the reader is woken, to cut |
-//! | `Cut` | `%` in a hold, the reader after `Flush` | thread | lines that have come are dropped; the planner is woken |
+//! | `Flush` | `{qf:1}`, `%!`, the end of a jog | thread | the reader is woken to drop the lines |
+//! | `Cut` | `%` in a hold, the reader after `Flush` | thread | lines that have arrived are dropped; the planner is woken |
 //! | `Kill` | `^d` | thread | as with `Cut` |
 //! | `Dropped` | the planner, when exec has dropped its blocks | thread | the model starts from where the motors are |
 //! | `DoorOpened`, `DoorShut`, `DoorShutIdle` | the control task; the last if nothing is held | thread | |
@@ -50,14 +50,16 @@
 //! | `Probe`, `Homing`, `Jog`, `Check` | the planner; requests for homing, jogs and checks | thread | |
 //! | `Done` | the planner: the cycle is over, the stop has been left; the request that ends a check | thread | |
 //! | `Alarm`, `Limit`, `Shutdown`, `Panic` | switches, requests, a failed probing | thread | outputs off, the planner is woken |
-//! | `Cleared` | `{clear:n}`, M2, M30, as far as the alarm lets them | thread | steps may be made again |
+//! | `Cleared` | `{clear:n}`, M2, M30, if the alarm permits it | thread | steps may be made again |
 //!
-//! Exec reads one byte of this at each stretch ([`is_held`]) and writes it in one case, from `Resuming` to `Off`. Thread mode
-//! writes without a lock nevertheless: each of its events leads from both to the same state, or leaves both alone, and what does
-//! not change is not written. Costs: a question 3 cycles, an event 50.
+//! Exec reads the byte of the [`Hold`] for each stretch of motion ([`is_held`]). It writes the byte in one case only,
+//! from `Resuming` to `Off`. Thread mode can nevertheless write without a lock. Each of its events leads from
+//! `Resuming` and from `Off` to the same state, or leaves both alone, and an unchanged byte is not written. Costs: a
+//! query 3 cycles, an event 50.
 //!
-//! Nothing of this waits. What is to be told because of it is in [`Notices`], what characters have asked for and cannot have
-//! yet in [`Signs`]. Whether a jog may begin is a question of order in the stream, not of what the machine is doing: [`jog`].
+//! Nothing here waits. [`Notices`] holds what is still to be reported. [`Signs`] holds the requests of real-time
+//! characters that cannot be carried out yet. Whether a jog may begin depends on the order of bytes in the stream, not
+//! on the state: see [`jog`].
 
 pub mod alarm;
 mod cycle;
@@ -85,24 +87,25 @@ use crate::hal::event::Event::BlockDone;
 use crate::hal::{exec, flags};
 use crate::progmem;
 
-/// What the machine is doing.
+/// The state of the machine.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct State {
     /// Whether G-code is refused.
     pub alarm: Alarm,
     /// Whether motion goes on.
     pub hold: Hold,
-    /// What is carried out.
+    /// What the machine carries out.
     pub cycle: Cycle,
 }
 
 impl State {
-    /// After a reset that somebody wanted.
+    /// The state after a wanted reset.
     pub const START: Self = Self { alarm: Alarm::None, hold: Hold::Off, cycle: Cycle::Lines };
-    /// After a reset that nobody wanted: whoever sends is to look first.
+    /// The state after an unwanted reset. The alarm makes the operator check the machine first.
     pub const AFTER_FAULT: Self = Self { alarm: Alarm::Alarm, ..Self::START };
 
-    /// The state that an event leads to. The image keeps the parts apart, and changes each by the same functions.
+    /// Returns the state that an event leads to. The image stores the three parts separately, and changes each of them
+    /// with the functions that are called here.
     pub const fn after(self, event: Event) -> Self {
         let counts = match event.alarm() {
             Some(alarm) => self.alarm.is_exceeded_by(alarm),
@@ -117,63 +120,63 @@ impl State {
 }
 
 machine_static! {
-    // A `Hold`. Thread mode writes it, and exec if it is `Resuming`.
+    // A `Hold`. Thread mode writes it. Exec writes it while it is `Resuming`.
     fn hold_byte() -> SharedByte = SharedByte::new(Hold::Off as u8);
-    // A `Cycle`. Thread mode alone.
+    // A `Cycle`. Only thread mode uses it.
     fn cycle_byte() -> SharedByte = SharedByte::new(Cycle::Lines as u8);
     // An `Alarm`. Thread mode writes it, any level reads it.
     fn alarm_byte() -> SharedByte = SharedByte::new(Alarm::None as u8);
-    // The planner wants the blocks dropped: thread mode sets it, exec clears it. It is no part of the state: a probe that makes
-    // contact has what is left of its move dropped while nothing is flushed.
+    // Not 0 if the planner wants the blocks dropped. Thread mode sets it, exec clears it. It is not part of the state,
+    // because the rest of a probing move is dropped after contact, although nothing is flushed then.
     fn drop_wanted() -> SharedByte = SharedByte::new(0);
 }
 
 progmem! {
-    /// Where each event of the first `Event::OF_HOLD` leads each [`Hold`].
+    /// The next state for each [`Hold`] and each of the first `Event::OF_HOLD` events.
     static HOLDS: [u8; Event::OF_HOLD * Hold::ALL.len()] = hold::table();
 }
 
-/// Whether G-code is refused. Any level.
+/// Returns the alarm that is on, or `Alarm::None`. G-code is refused during an alarm. Any level.
 pub fn alarm() -> Alarm {
     Alarm::from_bits(alarm_byte().get())
 }
 
-/// What is carried out. Thread mode.
+/// Returns what the machine carries out. Thread mode.
 pub fn cycle() -> Cycle {
     Cycle::from_bits(cycle_byte().get())
 }
 
-/// Whether there is an alarm. Any level.
+/// Whether an alarm is on. Any level.
 #[inline(always)]
 pub fn is_alarmed() -> bool {
     alarm_byte().get() != Alarm::None as u8
 }
 
-/// [`Hold::holds`]. Any level.
+/// Whether motion is held: [`Hold::holds`]. Any level.
 #[inline(always)]
 pub fn is_held() -> bool {
     hold_byte().get() != Hold::Off as u8
 }
 
-/// [`Hold::flushes`]. Thread mode.
+/// Whether lines or the queue are being dropped: [`Hold::flushes`]. Thread mode.
 #[inline(always)]
 pub fn is_flushing() -> bool {
     hold_byte().get() >= Hold::Flush as u8
 }
 
-/// [`Hold::drops`]. Thread mode.
+/// Whether the queue is being dropped: [`Hold::drops`]. Thread mode.
 #[inline(always)]
 pub fn is_dropping() -> bool {
     hold_byte().get() >= Hold::Drop as u8
 }
 
-/// [`Hold::kills`]. Thread mode.
+/// Whether the program ends once the queue has been dropped: [`Hold::kills`]. Thread mode.
 #[inline(always)]
 pub fn is_killing() -> bool {
     hold_byte().get() >= Hold::Kill as u8
 }
 
-/// Whether the reader is to drop the lines that have come. Thread mode.
+/// Whether the reader has to drop the lines that have arrived. Thread mode.
 #[inline(always)]
 pub fn is_to_cut() -> bool {
     hold_byte().get() | 1 == Hold::FlushDoor as u8
@@ -185,7 +188,7 @@ pub fn is_stopped() -> bool {
     cycle_byte().get() == Cycle::Stopped as u8
 }
 
-/// Whether lines are checked only. Thread mode.
+/// Whether lines are only checked and not carried out. Thread mode.
 #[inline(always)]
 pub fn is_checking() -> bool {
     cycle_byte().get() == Cycle::Check as u8
@@ -198,45 +201,47 @@ pub fn has_open_door() -> bool {
     byte > Hold::Resuming as u8 && byte & 1 != 0
 }
 
-/// Whether motion goes on, or will when it has come to rest. Thread mode.
+/// Whether motion goes on, or goes on by itself after it has come to rest. Thread mode.
 #[inline(always)]
 pub fn goes_on() -> bool {
     hold_byte().get() <= Hold::Resuming as u8
 }
 
-/// Whether what is held goes on when it has come to rest. Any level.
+/// Whether held motion goes on after it has come to rest. Any level.
 #[inline(always)]
 pub fn is_resuming() -> bool {
     hold_byte().get() == Hold::Resuming as u8
 }
 
-/// Whether a tilde has what is held go on, or what waits at a program stop. Thread mode.
+/// Whether a `~` may resume what is held or what waits at a program stop. Thread mode.
 #[inline(always)]
 pub fn may_resume() -> bool {
     hold_byte().get() < Hold::Door as u8
 }
 
-/// Takes an event that concerns the [`Hold`] alone, and has exec look. (Of `Dropped` this is a part: [`dropped`] is the whole.) Thread mode.
+/// Applies an event to the [`Hold`], and makes exec run. For events that concern only the [`Hold`]. (`Dropped` concerns
+/// the [`Cycle`] too: call [`dropped`] for it.) Thread mode.
 #[inline(never)]
 #[small]
 pub fn take(event: Event) {
     let before = hold_byte().get();
     let at = usize::from(before) * Event::OF_HOLD + event as usize;
-    // What has not changed is not written: exec may have written meanwhile.
+    // An unchanged state is not written, because exec may have written the byte meanwhile.
     if let Some(after) = HOLDS.at(at).filter(|after| *after != before) {
         hold_byte().set(after);
     }
     exec::pend();
 }
 
-/// Takes an event that concerns the [`Cycle`] alone. Thread mode.
+/// Applies an event that concerns only the [`Cycle`]. Thread mode.
 #[inline(never)]
 #[small]
 pub fn carry_out(event: Event) {
     cycle_byte().set(cycle().after(event, is_dropping(), is_alarmed()) as u8);
 }
 
-/// The queue has been dropped: what has been interrupted, and whether the program is to end. Thread mode.
+/// Applies the event `Dropped`: the queue has been dropped. Returns the cycle that has been interrupted, and whether
+/// the program has to end. Thread mode.
 #[inline(always)]
 pub fn dropped() -> (Cycle, bool) {
     let before = (cycle(), is_killing());
@@ -245,8 +250,8 @@ pub fn dropped() -> (Cycle, bool) {
     before
 }
 
-/// Begins an alarm, if there is none as bad: then what is queued is dropped. `first` is done before exec comes to know. Says
-/// whether it counts. Thread mode.
+/// Begins an alarm and has the queue dropped, unless an equally bad or worse alarm is on. Calls `first` before exec
+/// sees the alarm. Returns whether the alarm has begun. Thread mode.
 #[inline(always)]
 pub fn raise(alarm: Alarm, first: impl FnOnce()) -> bool {
     let counts = self::alarm().is_exceeded_by(alarm);
@@ -258,7 +263,8 @@ pub fn raise(alarm: Alarm, first: impl FnOnce()) -> bool {
     counts
 }
 
-/// Ends the alarm, if it can be. Says whether. Thread mode.
+/// Ends the alarm. Returns false if it cannot end: during a panic, or while lines or the queue are being dropped.
+/// Thread mode.
 #[inline(always)]
 pub fn clear() -> bool {
     let ends = !is_flushing() && alarm_byte().get() != Alarm::Panic as u8;
@@ -268,12 +274,13 @@ pub fn clear() -> bool {
     ends
 }
 
-/// The machine has been reset by nobody, or in motion by its sender: [`State::AFTER_FAULT`]. When nothing is queued.
+/// Puts the machine into [`State::AFTER_FAULT`], after an unwanted reset, or after a reset by the sender during motion.
+/// Call it when nothing is queued.
 pub fn start_alarmed() {
     alarm_byte().set(State::AFTER_FAULT.alarm as u8);
 }
 
-/// The machine has come to rest in a hold: whether it goes on. Exec only.
+/// Notes that the machine has come to rest in a hold. Returns whether motion goes on. Exec only.
 #[inline(always)]
 pub fn rested() -> bool {
     let resumes = is_resuming();
@@ -283,8 +290,8 @@ pub fn rested() -> bool {
     resumes
 }
 
-/// Has exec drop its blocks; it sets `Event::BlockDone` of the [events](crate::hal::event) when it [has](has_dropped_blocks).
-/// Thread mode.
+/// Makes exec drop its blocks. Exec sets `Event::BlockDone` of the [events](crate::hal::event) when it has done so; see
+/// [`has_dropped_blocks`]. Thread mode.
 pub fn drop_blocks() {
     drop_wanted().set(1);
     exec::pend();
@@ -295,7 +302,8 @@ pub fn has_dropped_blocks() -> bool {
     drop_wanted().get() == 0
 }
 
-/// Exec, at rest, drops its blocks if that is wanted, by `drop_all`. Exec only.
+/// Calls `drop_all` if the planner wants exec's blocks dropped, and reports that to the planner. Call it at standstill.
+/// Exec only.
 #[inline(always)]
 pub fn drop_if_wanted(drop_all: impl FnOnce()) {
     if drop_wanted().get() != 0 {

@@ -1,19 +1,19 @@
-//! What is still to be told because of what the machine has done. Whoever has done it writes, the reporter takes; one of
-//! each, and the newest counts.
+//! Notices: things that the machine has done and that still have to be reported. The task that causes a notice writes
+//! it, and the reporter takes it. There is one notice of each kind, and the newest replaces an older one.
 
 use core::cell::Cell;
 
 use crate::status::Status;
 
-/// What nobody has begun to tell.
+/// The notices that the reporter has not taken yet.
 #[derive(Default)]
 pub struct Notices {
-    /// An exception, to whoever feeds the machine.
+    /// An exception, to be reported to the port that feeds the machine.
     pub exception: Cell<Option<Status>>,
     /// A jog has ended.
     pub jogged: Cell<bool>,
     /// The queue has been flushed.
     pub flushed: Cell<bool>,
-    /// The limits that were hit first, as bits of the ends: of the alarm that is on.
+    /// The ends of axes whose limits were hit first in the present alarm, as bits.
     pub limits_hit: Cell<u8>,
 }

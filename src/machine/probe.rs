@@ -1,34 +1,34 @@
-//! What probing has found. The planner writes, reports read.
+//! The result of probing. The planner writes it, reports read it.
 
 use core::cell::Cell;
 
 use crate::units::{FIRST_ROTARY, Length, PerAxis};
 
-/// What has become of a probing. The discriminants are TinyG's numbers.
+/// The state of a probing move. The discriminants are TinyG's numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ProbeState {
     /// No contact.
     #[default]
     Failed,
-    /// There was one.
+    /// The probe made contact.
     Touched,
     /// A probing move is under way.
     Waiting,
 }
 
-/// How far the reporter has come with the result.
+/// How far the result has been reported.
 #[derive(Clone, Copy, Default, PartialEq, Eq)]
 enum News {
-    /// There is nothing to tell.
+    /// There is no result to report.
     #[default]
     None,
-    /// Nobody has begun to tell it.
+    /// The report of a result has not begun.
     Waits,
-    /// It is being told.
+    /// The result is being reported.
     Begun,
 }
 
-/// The last probing.
+/// The result of the last probing move.
 #[derive(Default)]
 pub struct Probe {
     state: Cell<ProbeState>,
@@ -37,12 +37,13 @@ pub struct Probe {
 }
 
 impl Probe {
-    /// What has become of it.
+    /// Returns the state of the last probing move.
     pub fn state(&self) -> ProbeState {
         self.state.get()
     }
 
-    /// Where the contact was, or where it ended, machine coordinates; of the axes that may probe.
+    /// Returns where the contact was, or where the move ended without contact, in machine coordinates. `None` for an
+    /// axis that cannot probe.
     pub fn at(&self, axis: u8) -> Option<Length> {
         self.at.get().get(usize::from(axis)).copied()
     }
@@ -52,36 +53,38 @@ impl Probe {
         self.state.set(ProbeState::Waiting);
     }
 
-    /// Where it has come to an end, which is told when the machine is at rest: [`Self::tell`].
+    /// Records where the probing move has ended. It is reported when the machine is at rest: [`Self::tell`].
     pub fn found(&self, at: &PerAxis<Length>) {
         let [x, y, z, ..] = *at;
         self.at.set([x, y, z]);
     }
 
-    /// Records that the probing move has come to its end, which is to be reported.
+    /// Records the state at the end of the probing move, and that it has to be reported.
     pub fn tell(&self, state: ProbeState) {
         self.state.set(state);
         self.news.set(News::Waits);
     }
 
-    /// Records that a probing move has been flushed, if one was under way: no contact was found, and nothing is reported.
+    /// Records that a probing move has been flushed, if one was under way: no contact was found, and nothing is
+    /// reported.
     pub fn abandon(&self) {
         if self.state.get() == ProbeState::Waiting {
             self.state.set(ProbeState::Failed);
         }
     }
 
-    /// Whether there is a result that nobody has begun to tell.
+    /// Whether there is a result whose report has not begun.
     pub fn is_news(&self) -> bool {
         self.news.get() == News::Waits
     }
 
-    /// Whether there is a result that has not been told to its end.
+    /// Whether there is a result that has not been reported completely.
     pub fn is_untold(&self) -> bool {
         self.news.get() != News::None
     }
 
-    /// Whether there is a result that nobody has begun to tell; the caller tells it, and then says so ([`Self::has_been_told`]).
+    /// Takes a result whose report has not begun. Returns whether there is one. The caller then reports it, and calls
+    /// [`Self::has_been_told`] at the end.
     pub fn take_news(&self) -> bool {
         let is_news = self.is_news();
         if is_news {
@@ -90,7 +93,7 @@ impl Probe {
         is_news
     }
 
-    /// The result has been told.
+    /// Records that the result has been reported completely.
     pub fn has_been_told(&self) {
         self.news.set(News::None);
     }

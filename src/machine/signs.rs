@@ -1,55 +1,56 @@
-//! Real-time characters that have come and have not had all their effect yet.
+//! Signs: real-time characters that have arrived and have not had their whole effect yet.
 //!
-//! Written and read by `tasks::hold` and `tasks::jog`, in thread mode; the power task calls [`Signs::age`].
+//! `tasks::hold` and `tasks::jog` write and read them, in thread mode. The power task calls [`Signs::age`].
 
 use core::cell::Cell;
 
 use super::jog::Bar;
 
-/// Characters of one write may come so far apart, ms.
+/// Characters that a sender writes together may arrive this far apart, ms.
 const TOGETHER_MS: u16 = 20;
 
-/// Which of them.
+/// The pending characters.
 #[derive(Default)]
 pub struct Signs {
-    /// A tilde, and no exclamation mark since: where it stands, what is held goes on.
+    /// A `~` has come, and no `!` since. Held motion goes on when the reader reaches the place of the `~`.
     pub resume: Cell<bool>,
-    /// A percent sign in the hold that is on; perhaps in a comment, where it is none.
+    /// A `%` has come during the present hold. It does not count if it turns out to be in a comment.
     pub percent: Cell<bool>,
-    /// A door has begun the hold that is on.
+    /// Whether an open door has begun the present hold.
     pub door: Cell<bool>,
-    /// Whether a jog may begin, by a character that ends jogs.
+    /// Whether a jog may begin after a character that ends jogs.
     pub jogs: Cell<Bar>,
-    /// When a percent sign came that was none, ms modulo 2^16.
+    /// The time at which a `%` came without a hold, ms modulo 2^16.
     lone: Cell<Option<u16>>,
 }
 
 impl Signs {
-    /// A percent sign has come without a hold, at this time (ms): none, unless an exclamation mark comes right behind it.
+    /// Records that a `%` has come without a hold, at the time `now` (ms). It has no effect unless a `!` comes right
+    /// behind it.
     pub fn lone_percent(&self, now: u32) {
         self.lone.set(Some(now as u16));
     }
 
-    /// Whether such a percent sign has come right before.
+    /// Whether a `%` without a hold has come right before the time `now`.
     fn is_behind_percent(&self, now: u32) -> bool {
         self.lone.get().is_some_and(|at| (now as u16).wrapping_sub(at) < TOGETHER_MS)
     }
 
-    /// Whether such a percent sign has come right before an exclamation mark that comes now. None has come for the next one.
+    /// Whether a `%` without a hold has come right before the `!` that comes at the time `now`. Forgets the `%`.
     pub fn take_lone_percent(&self, now: u32) -> bool {
         let is_behind = self.is_behind_percent(now);
         self.lone.set(None);
         is_behind
     }
 
-    /// Forgets a percent sign that is too old. To be called at least once a minute, for the time wraps.
+    /// Forgets a `%` that is too old. Call it at least once a minute, because the recorded time wraps.
     pub fn age(&self, now: u32) {
         if !self.is_behind_percent(now) {
             self.lone.set(None);
         }
     }
 
-    /// Forgets what has come in a hold.
+    /// Forgets the `~` and the `%` that have come during a hold.
     pub fn clear(&self) {
         self.resume.set(false);
         self.percent.set(false);

@@ -1,11 +1,12 @@
-//! Every event in every state: against the tables written down here, by the image's functions, and what holds of all of them.
+//! Tests every event in every state: against tables in this file, with the functions of the image, and for general
+//! properties.
 
 use std::collections::BTreeSet;
 use std::vec::Vec;
 
 use super::*;
 
-/// The state after an event for each [`Hold`], in their order; `-` where it stays.
+/// The state after an event for each [`Hold`], in their order. `-` means that the state stays.
 const HOLD: [(Event, &str); 14] = [
     //                     O R H D F f X x K k
     (Event::Hold, /*     */ "H H - - - - - - - -"),
@@ -24,11 +25,11 @@ const HOLD: [(Event, &str); 14] = [
     (Event::Panic, /*    */ "X X X x X x - - - -"),
 ];
 
-/// The holds as [`HOLD`] calls them: a lower-case letter with the door open.
+/// The letters of the holds in [`HOLD`]. A lower-case letter means that the door is open.
 const LETTERS: &str = "ORHDFfXxKk";
 
-/// The state after an event for each [`Cycle`], in their order (lines, stopped, probe, homing, jog, check), while nothing is dropped and
-/// there is no alarm.
+/// The state after an event for each [`Cycle`], in their order (lines, stopped, probe, homing, jog, check), while
+/// nothing is dropped and there is no alarm.
 const CYCLE: [(Event, &str); 7] = [
     (Event::Stopped, "S S S S S S"),
     (Event::Probe, "P P P P P P"),
@@ -39,7 +40,8 @@ const CYCLE: [(Event, &str); 7] = [
     (Event::Dropped, "- L L L L -"),
 ];
 
-/// The state after an event for each [`Alarm`], in their order (none, alarm, limit, shutdown, panic), while nothing is flushed.
+/// The state after an event for each [`Alarm`], in their order (none, alarm, limit, shutdown, panic), while nothing is
+/// flushed.
 const ALARM: [(Event, &str); 5] = [
     (Event::Alarm, "A - - - -"),
     (Event::Limit, "L L - - -"),
@@ -48,14 +50,15 @@ const ALARM: [(Event, &str); 5] = [
     (Event::Cleared, "- N N N -"),
 ];
 
-/// Where an event leads from the state `at` of a region whose states have these letters, by a table.
+/// Returns the state that `table` gives for an event in state `at`. `letters` are the letters of the states of this
+/// part.
 fn row(table: &[(Event, &str)], letters: &str, event: Event, at: usize) -> usize {
     let Some((_, row)) = table.iter().find(|(of, _)| *of == event) else { return at };
     let to = row.split(' ').nth(at).unwrap();
     if to == "-" { at } else { letters.find(to).unwrap() }
 }
 
-/// What the tables say.
+/// Returns the state that the tables give for an event.
 fn written(state: State, event: Event) -> State {
     let State { alarm, hold, cycle } = state;
     let counts = match event {
@@ -94,7 +97,7 @@ fn all() -> impl Iterator<Item = State> {
     Alarm::ALL.into_iter().flat_map(regions)
 }
 
-/// Every state that the machine may come to, by whatever events.
+/// Returns every state that the machine can reach by any sequence of events.
 fn reachable() -> BTreeSet<State> {
     let mut reached = BTreeSet::from([State::START, State::AFTER_FAULT]);
     let mut new = Vec::from_iter(reached.iter().copied());
@@ -106,7 +109,7 @@ fn reachable() -> BTreeSet<State> {
     reached
 }
 
-/// The machine's state, of this thread.
+/// Returns the state of this thread's machine.
 fn now() -> State {
     State { alarm: alarm(), hold: Hold::ALL[usize::from(hold_byte().get())], cycle: cycle() }
 }
@@ -177,7 +180,7 @@ fn questions_are_those_of_the_state() {
 fn one_word_says_what_the_machine_is_doing() {
     for (state, works) in all().flat_map(|state| [(state, false), (state, true)]) {
         set(state);
-        // A stop is told as one, and so is a kill at rest.
+        // A program stop is reported as rest, and so is a kill at standstill.
         let moves = works && state.cycle != Cycle::Stopped;
         let expected = match (state.alarm, LETTERS.as_bytes()[state.hold as usize], state.cycle) {
             (Alarm::None, b'R' | b'H' | b'F' | b'X', _) => Doing::Holds,
@@ -187,7 +190,7 @@ fn one_word_says_what_the_machine_is_doing() {
             (Alarm::None, _, Cycle::Probe) => Doing::Probes,
             (Alarm::None, _, Cycle::Homing) => Doing::Homes,
             (Alarm::None, _, Cycle::Jog) => Doing::Jogs,
-            // Nothing is carried out then.
+            // In check mode nothing is carried out.
             (Alarm::None, _, Cycle::Check) => Doing::Rests,
             (Alarm::None, _, _) if moves => Doing::Runs,
             (Alarm::None, _, _) => Doing::Rests,
@@ -223,7 +226,7 @@ fn an_alarm_gets_worse_or_is_cleared_and_a_panic_stays() {
         let after = state.after(event);
         let is_cleared = event == Event::Cleared && state.alarm != Alarm::Panic;
         assert!(after.alarm >= state.alarm || (is_cleared && after.alarm == Alarm::None));
-        // What is queued is dropped in each, before it may end.
+        // Each alarm drops the queue before it may end.
         assert!(after.alarm <= state.alarm || after.hold.drops(), "{event:?} in {state:?}");
         assert!(!state.alarm.is_on() || after.alarm.is_on() || !state.hold.flushes());
     }
@@ -239,7 +242,7 @@ fn a_flush_goes_on_to_its_end_and_ends() {
             assert!(after.hold.drops() || !state.hold.drops() || ends, "{event:?} in {state:?}");
             assert!(after.hold.kills() || !state.hold.kills() || ends, "{event:?} in {state:?}");
         }
-        // The reader cuts, the planner drops.
+        // The reader drops the lines, then the planner drops the queue.
         let end = state.after(Event::Cut).after(Event::Dropped);
         let cycle = if state.cycle == Cycle::Check { Cycle::Check } else { Cycle::Lines };
         assert_eq!(end, State { alarm: state.alarm, cycle, hold: end.hold });
@@ -268,7 +271,7 @@ fn motion_goes_on_by_what_lets_it_alone() {
         if after.hold == Hold::Resuming && state.hold != Hold::Resuming {
             assert_eq!((event, state.hold), (Event::Resume, Hold::Held));
         }
-        // A door is shut by whoever shuts it.
+        // Only the events of a shut door close the door.
         let shuts = matches!(event, Event::DoorShut | Event::DoorShutIdle);
         assert!(
             !state.hold.has_open_door() || shuts || after.hold.has_open_door(),
@@ -279,7 +282,7 @@ fn motion_goes_on_by_what_lets_it_alone() {
 
 #[test]
 fn exec_may_write_while_thread_mode_takes_an_event() {
-    // Between thread mode's look and its writing exec may go from `Resuming` to `Off`.
+    // Between a read and a write by thread mode, exec may change the state from `Resuming` to `Off`.
     for event in Event::ALL.into_iter().filter(|event| *event != Event::Rested) {
         let (before, after) = (Hold::Resuming.after(event), Hold::Off.after(event));
         let is_written = before != Hold::Resuming;
@@ -292,7 +295,7 @@ fn what_can_be_reached() {
     let reached = reachable();
     let without = all().filter(|state| !state.alarm.is_on()).collect::<BTreeSet<_>>();
     assert!(without.is_subset(&reached), "without an alarm each hold is possible in each cycle");
-    // In an alarm: each cycle while it is being dropped, and in each other hold lines that are refused, or check mode.
+    // In an alarm, each cycle is possible while the queue is dropped. With any other hold only `Lines` and `Check` are.
     let alarmed = 4 * (4 * 6 + 6 * 2);
     assert_eq!(reached.len(), without.len() + alarmed);
 }

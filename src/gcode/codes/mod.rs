@@ -1,6 +1,6 @@
 //! The language: every G and M code, what it does, and the words it takes and needs.
 //!
-//! A new code is a row of [`table`] and a text of [`docs`], from which `docs/gcode.md` is made.
+//! To add a code, add a row to [`table`] and a text to [`docs`]. `docs/gcode.md` is generated from these texts.
 
 #[cfg(feature = "std")]
 pub mod docs;
@@ -18,60 +18,60 @@ use table::{DENSE, G, G_START, M, M_START, MOTION, STARTS};
 /// (RS274/NGC section 3.4).
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Action {
-    /// Group 0.
+    /// Group 0: codes without a mode.
     NonModal(NonModal),
-    /// Group 1.
+    /// Group 1: motion.
     Motion(MotionMode),
-    /// Group 2.
+    /// Group 2: the plane.
     Plane(Plane),
-    /// Group 3.
+    /// Group 3: the distance mode.
     Distance(Distance),
-    /// Group 4.
+    /// Group 4: the distance mode of I, J and K.
     ArcDistance(ArcDistance),
-    /// Group 5.
+    /// Group 5: the feed mode.
     FeedMode(FeedMode),
-    /// Group 6.
+    /// Group 6: the units.
     Units(Units),
-    /// Group 7: off.
+    /// Group 7: cutter compensation off.
     CutterOff,
-    /// Group 7: on, which this machine has not.
+    /// Group 7: cutter compensation on, which is not supported.
     CutterOn,
-    /// Group 8.
+    /// Group 8: the tool length.
     ToolLength(ToolLength),
-    /// Group 10.
+    /// Group 10: the retract level of canned cycles.
     Retract(Retract),
-    /// Group 12: 0 to 8.
+    /// Group 12: the coordinate system, 0 to 8.
     System(u8),
-    /// Group 13.
+    /// Group 13: the path mode.
     Path(PathMode),
-    /// Group 14: what S is. G96: a surface speed.
+    /// Group 14: the meaning of S.
     SpeedMode(SpeedMode),
-    /// Group 15: what X is.
+    /// Group 15: the meaning of X.
     XMode(XMode),
-    /// Group 4 of the M codes.
+    /// Group 4 of the M codes: program stops.
     Stop(StopCode),
-    /// Group 6 of the M codes.
+    /// Group 6 of the M codes: the tool change.
     ToolChange,
-    /// Group 7 of the M codes.
+    /// Group 7 of the M codes: the spindle.
     Spindle(Turn),
-    /// Group 8 of the M codes.
+    /// Group 8 of the M codes: coolant.
     Coolant(Coolant),
-    /// Group 9 of the M codes.
+    /// Group 9 of the M codes: overrides.
     Override(OverrideCode),
 }
 
-/// Group 0: for one line only.
+/// Group 0: codes that are in force for one line only.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum NonModal {
     /// G4.
     Dwell,
     /// G10.
     SetData,
-    /// G28, G30: to the first or second stored position.
+    /// G28, G30: moves to the first (0) or second (1) stored position.
     GoStored(u8),
-    /// G28.1, G30.1.
+    /// G28.1, G30.1: stores the first (0) or second (1) position.
     Store(u8),
-    /// G28.2, and G28.4, which leaves the position alone.
+    /// G28.2, and G28.4, which does not set the position.
     Home {
         /// Whether the position is set to what the switches say.
         set: bool,
@@ -92,7 +92,7 @@ pub enum NonModal {
     Heat(HeatCode),
 }
 
-/// Heaters and fans.
+/// The codes for heaters and fans.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum HeatCode {
     /// M104.
@@ -111,20 +111,20 @@ pub enum HeatCode {
     FanOff,
 }
 
-/// Group 8.
+/// Group 8: the tool length.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum ToolLength {
-    /// G43.
+    /// G43: the lengths of a tool in the table.
     Table,
-    /// G43.1.
+    /// G43.1: the lengths in the axis words.
     Words,
-    /// G43.2.
+    /// G43.2: adds the lengths of a tool in the table.
     Add,
-    /// G49.
+    /// G49: no tool length.
     Off,
 }
 
-/// Group 4 of the M codes.
+/// Group 4 of the M codes: stops.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum StopCode {
     /// M0, M60.
@@ -135,56 +135,56 @@ pub enum StopCode {
     End,
 }
 
-/// Group 9 of the M codes.
+/// Group 9 of the M codes: overrides.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum OverrideCode {
-    /// M48, M49: all of them on or off.
+    /// M48 switches all overrides on, M49 off.
     All(bool),
-    /// M48.1, M49.1, M50; M48.2, M49.2, M50.1; M51: of one.
+    /// M48.1, M49.1, M50; M48.2, M49.2, M50.1; M51: these set one override.
     One(Override, Switch),
 }
 
 /// How one override is set.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Switch {
-    /// To P, which has to be there.
+    /// The factor is set to P, which has to be present.
     To,
-    /// To P, off for P0, on without P.
+    /// The factor is set to P. P0 switches the override off, and no P switches it on.
     Maybe,
-    /// Off.
+    /// The override is switched off.
     Off,
 }
 
-/// A row of the tables.
+/// A row of the tables: one code.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Code {
     /// The number of the code in tenths: 283 for G28.3.
     pub number: u16,
-    /// What it does.
+    /// What the code does.
     pub action: Action,
-    /// The words it may use, as a set.
+    /// The words that the code may use, as a set.
     pub takes: u32,
-    /// The words that the code cannot be without, as bits; for axes, at least one of them.
+    /// The words that the code needs, as a set. If the set has axes, the code needs at least one of them.
     pub needs: u32,
 }
 
-/// G code `whole`.`tenth`.
+/// Returns the row of the G code `whole`.`tenth`. `None` if there is no such code.
 pub fn g(whole: u16, tenth: u8) -> Option<Code> {
     find(&G, &G_START, whole, tenth)
 }
 
-/// M code `whole`.`tenth`.
+/// Returns the row of the M code `whole`.`tenth`. `None` if there is no such code.
 pub fn m(whole: u16, tenth: u8) -> Option<Code> {
     find(&M, &M_START, whole, tenth)
 }
 
-/// The words that the code of a motion mode takes, whether it is on the line or in force.
+/// Returns the words that the code of a motion mode takes, whether the code is on the line or in force.
 pub fn taken_by(mode: MotionMode) -> u32 {
     MOTION.at(mode as usize).unwrap_or(0)
 }
 
-/// Looks a code up; `whole` is at most 999. Cost on AVR: 60 cycles, and 9 for each byte of the row; from [`DENSE`] on the
-/// same for each row before it.
+/// Looks a code up. `whole` is at most 999. Cost on AVR: 60 cycles, and 9 for each byte of the row. From [`DENSE`] on
+/// each row before that of the code costs as much again.
 fn find<const N: usize>(
     table: &Progmem<[Code; N]>,
     starts: &Progmem<[u8; STARTS]>,

@@ -1,4 +1,4 @@
-//! The rows of the language.
+//! The tables of all G and M codes.
 
 use super::{Action, Code, HeatCode, NonModal, OverrideCode, StopCode, Switch, ToolLength};
 use crate::gcode::modal::{
@@ -8,22 +8,22 @@ use crate::gcode::modal::{
 use crate::gcode::overrides::Override;
 use crate::gcode::words::{self, AXES, D, E, H, K, L, OFFSETS, P, Q, R, S, T, bit};
 
-/// A code without words of its own.
+/// Returns a row for a code without words of its own.
 const fn code(number: u16, action: Action) -> Code {
     Code { number, action, takes: 0, needs: 0 }
 }
 
-/// A code that may have some.
+/// Returns a row for a code that may have the words `takes`.
 const fn with(number: u16, action: Action, takes: u32) -> Code {
     Code { number, action, takes, needs: 0 }
 }
 
-/// A code that cannot be without some.
+/// Returns a row for a code that needs the words `needs`, and may have the words `also`.
 const fn needing(number: u16, action: Action, needs: u32, also: u32) -> Code {
     Code { number, action, takes: needs | also, needs }
 }
 
-/// A canned cycle. Its words stay in force from line to line, so that it needs none here.
+/// Returns a row for a canned cycle. It needs no words here, because its words stay in force from line to line.
 const fn cycle(number: u16, mode: MotionMode, also: u32) -> Code {
     with(number, Action::Motion(mode), AXES | bit(R) | bit(L) | also)
 }
@@ -32,38 +32,41 @@ const fn probe(number: u16, mode: MotionMode) -> Code {
     needing(number, Action::Motion(mode), AXES, 0)
 }
 
-/// K is not in force for the next line: the code in force needs it as well.
+/// Returns a row for a threading pass. K does not stay in force: a line without the code, while it is in force, needs K
+/// too. `State::thread` checks this.
 const fn thread(number: u16, mode: MotionMode) -> Code {
     with(number, Action::Motion(mode), AXES | bit(K))
 }
 
-/// A threading cycle. Its words are not in force for the next line, which needs them as well.
+/// Returns a row for a threading cycle. Its words do not stay in force: a line without the code, while it is in force,
+/// needs them too. `State::thread_cycle` checks this.
 const fn thread_cycle(number: u16) -> Code {
     let words = Z_WORD | OFFSETS | bit(P) | bit(R) | bit(Q) | bit(H) | bit(E) | bit(L);
     with(number, Action::Motion(MotionMode::ThreadCycle), words)
 }
 
-/// Z alone of the axes.
+/// The set of Z.
 const Z_WORD: u32 = 1 << 2;
 
 const ARC: u32 = AXES | OFFSETS | bit(R) | bit(P);
 
-/// From this whole number on codes are few, and are looked for one after the other: they take no room but their rows.
+/// From this whole number on there are few codes. They have no entries in the tables of first rows, and are searched
+/// one after the other.
 pub const DENSE: u16 = 100;
-/// Entries of the tables of first rows.
+/// The number of entries in the tables of first rows.
 pub const STARTS: usize = DENSE as usize + 1;
 
-/// Rows of G codes.
+/// The number of G codes.
 pub const G_ROWS: usize = 74;
-/// Rows of M codes.
+/// The number of M codes.
 pub const M_ROWS: usize = 28;
 
 crate::progmem! {
-    /// G codes, by number.
+    /// The G codes, by number.
     pub static G: [Code; G_ROWS] = G_TABLE;
-    /// M codes, by number.
+    /// The M codes, by number.
     pub static M: [Code; M_ROWS] = M_TABLE;
-    /// For each whole number up to [`DENSE`], the first row of that number or a greater one.
+    /// For each whole number up to [`DENSE`], the first row of a G code of that number or a greater one.
     pub static G_START: [u8; STARTS] = starts(&G_TABLE);
     /// For each whole number up to [`DENSE`], the first row of an M code of that number or a greater one.
     pub static M_START: [u8; STARTS] = starts(&M_TABLE);
@@ -214,7 +217,7 @@ const fn motions() -> [u32; MotionMode::COUNT] {
     taken
 }
 
-/// Words that no code takes would be refused on every line.
+/// Checks that each word is taken by some code. A word that no code takes would be refused on every line.
 const _: () = {
     let mut taken = words::ALWAYS;
     let mut row = 0;

@@ -1,4 +1,4 @@
-//! Which circle a line means.
+//! The circles that lines describe.
 
 use super::{position, refusal, run};
 use crate::gcode::command::{Arc, Motion};
@@ -24,7 +24,7 @@ fn center_form() {
     assert_eq!(quarter.center.map(|length| length.0), [0, 0]);
     assert!(!quarter.clockwise && quarter.extra_turns == 0);
     assert!(arc(&[AT_10_0, "G2 X0 Y10 I-10"]).clockwise);
-    // Offsets count from the start, in inches too, and the mode stays.
+    // Offsets are measured from the start, in inches too. The mode stays in force.
     assert_eq!(center(&["F1 G0 X254", "G20", "G91 G3 X-10 Y10 I-10 J0", "X-10 Y-10 J-10"]), [0, 0]);
     // A full circle, and a helix.
     assert_eq!(center(&[AT_10_0, "G2 J5"]), [100_000, 50_000]);
@@ -46,7 +46,7 @@ fn radius_form() {
     assert_eq!(center(&[AT_10_0, "G2 X0 Y10 R-10"]), [0, 0]);
     assert_eq!(center(&[AT_10_0, "G2 X0 Y10 R10"]), [100_000, 100_000]);
     assert_eq!(center(&[AT_10_0, "G3 X0 Y10 R-10"]), [100_000, 100_000]);
-    // Half circles, with R exact and 4 um short.
+    // Half circles, with an exact R and with an R that is 4 um short.
     assert_eq!(center(&[AT_10_0, "G3 X-10 R10"]), [0, 0]);
     assert_eq!(center(&[AT_10_0, "G3 X-10 R9.996"]), [0, 0]);
     assert_eq!(center(&["F1 G18 G0 Z10", "G3 X10 Z0 R10"]), [0, 0]);
@@ -79,7 +79,7 @@ fn incomplete_arcs() {
     ] {
         assert_eq!(refusal(&[AT_10_0, line]), status, "{line}");
     }
-    // With G2 in force, a move still has to say which circle.
+    // With G2 in force, a line with axis words still has to describe a circle.
     assert_eq!(refusal(&[AT_10_0, "G2 I5", "X5"]), Status::ArcOffsetsMissing);
     run(&[AT_10_0, "G2 I5", "F200"]);
 }
@@ -104,10 +104,10 @@ fn impossible_arcs() {
     ] {
         assert_eq!(refusal(&[AT_10_0, line]), status, "{line}");
     }
-    // Small ones: 1 um, and what a real program has.
+    // Small circles: a radius of 1 um, and a case from a real program.
     assert_eq!(center(&[AT_10_0, "G2 X10.002 R0.001"]), [100_010, 0]);
     run(&["F1 G20 G0 X0.00392 Y0.000795", "G2 R0.002 X0.00199 Y0.0002"]);
-    // 5 um, or a thousandth of the radius up to 1 mm.
+    // The radii may differ by 5 um, or by a thousandth of the radius up to 1 mm.
     run(&[AT_10_0, "G3 X0 Y10.0049 I-10"]);
     run(&["F1 G0 X500", "G3 X0 Y500.4 I-500"]);
     assert_eq!(refusal(&["F1 G0 X5000", "G3 X0 Y5002 I-5000"]), Status::ArcSpecification);
@@ -123,7 +123,7 @@ fn a_refused_arc_leaves_no_trace() {
 fn circles_stay_within_the_range_of_lengths() {
     assert_eq!(refusal(&["F800", "G3 Y3 I131515.5"]), Status::OutOfRange);
     assert_eq!(refusal(&["F800 G0 X200000", "G3 J15000"]), Status::OutOfRange);
-    // The far side of a circle counts only if it is reached.
+    // The far side of the circle counts only if the arc reaches it.
     run(&["F800", "G2 Y3 I131515.5"]);
     run(&["F800 G0 X200000", "G3 J14000"]);
 }

@@ -1,4 +1,4 @@
-//! Canned cycles, step by step, and what stays from line to line.
+//! Canned cycles, step by step, and the words that stay in force from line to line.
 
 use super::{refusal, run};
 use crate::gcode::command::{Commands, Stop};
@@ -12,8 +12,8 @@ use std::format;
 use std::string::String;
 use std::vec::Vec;
 
-/// The steps of the last of these lines. Moves are the axes that they move, and where to: traverses in upper
-/// case, feeds in lower case. The rest is written as in G-code.
+/// Returns the steps of the last of these lines. A move is written as the axes that it moves and their targets: a
+/// traverse in upper case, a feed in lower case. Other steps are written as in G-code.
 fn steps(lines: &[&str]) -> String {
     let (last, before) = lines.split_last().unwrap();
     let (mut interpreter, _) = run(before);
@@ -60,7 +60,7 @@ fn moved(from: &PerAxis<Length>, to: &PerAxis<Length>) -> String {
     text
 }
 
-/// At height 9, the spindle turning: each cycle at X1 Y2, R5 and down to 1.
+/// Each cycle begins at height 9 with the spindle on. Its hole is at X1 Y2, from R5 down to 1.
 #[test]
 fn what_is_done_at_a_hole() {
     for (line, expected) in [
@@ -87,7 +87,7 @@ fn what_is_done_at_a_hole() {
     }
 }
 
-/// A spindle that turns the other way is started that way again.
+/// A counterclockwise spindle is started again counterclockwise.
 #[test]
 fn the_spindle_turns_as_before() {
     let lines = ["M4 G0 Z9", "G86 P0 Z1 R5 F100"];
@@ -124,7 +124,7 @@ fn repeats() {
     assert_eq!(steps(&at_one_place), "X1 Z5 z1 Z9 Z5 z1 Z9");
     let along = ["G0 X1 Z9", "G91 G99 G81 X1 Y1 Z-4 R-4 L2 F9"];
     assert_eq!(steps(&along), "X2Y1 Z5 z1 Z5 X3Y2 z1 Z5");
-    // R and the depth count from the present place.
+    // R is measured from the present place, and the depth from R.
     let on = [along[0], along[1], "X1"];
     assert_eq!(steps(&on), "X4 Z1 z-3 Z1");
 }
@@ -135,7 +135,7 @@ fn words_stay_as_long_as_the_cycle() {
     assert_eq!(steps(&["G0 Z9", first, "X2"]), "X2 Z5 z1 P1000 Z9");
     assert_eq!(steps(&["G0 Z9", first, "G82 Z2"]), "Z5 z2 P1000 Z9");
     assert_eq!(steps(&["G0 Z9", first, "M3", "G4 P1", "G99 Y1"]), "Y1 Z5 z1 P1000 Z5");
-    // The height before the first cycle of a series.
+    // G98 returns to the height before the first cycle of a series.
     assert_eq!(steps(&["G0 Z9", "G99 G81 Z1 R5 F9", "G98 G85 Z1 R3"]), "Z3 z1 z9");
     assert_eq!(steps(&["G0 Z9", "G99 G81 Z1 R5 F9", "G0", "G98 G81 Z1 R3"]), "Z3 z1 Z5");
     for (lines, status) in [

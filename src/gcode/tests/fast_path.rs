@@ -1,4 +1,4 @@
-//! The fast path and the slow path of the interpreter do the same.
+//! The fast path and the slow path of the interpreter give the same results.
 
 use std::string::String;
 
@@ -10,7 +10,7 @@ use crate::gcode::interpreter::Interpreter;
 use crate::gcode::setup::Usual;
 use crate::units::Length;
 
-/// Lines that the fast path takes, or almost.
+/// Lines for the fast path, and lines that it just declines.
 fn line() -> impl Strategy<Value = String> {
     let word = prop_oneof![
         8 => "[XYZABCxyz][-+]?[0-9]{0,5}(\\.[0-9]{0,5})?",
@@ -68,13 +68,13 @@ fn what_is_fast() {
         both_ways(&mut interpreter, mode.as_bytes());
         assert!(!both_ways(&mut interpreter, b"G0X1"), "{mode}");
     }
-    // At the ends of the range.
+    // Both paths agree at the ends of the range.
     for line in ["G92X-65000", "G0X60000", "G92X-65000", "G0X60000", "G92X-65000", "G0X60000"] {
         both_ways(&mut interpreter, line.as_bytes());
     }
 }
 
-/// Lines of printing hosts, as they are and in the words of the interpreter.
+/// Lines of printing hosts: each as the host sends it, and as the slow path expects it.
 fn printed() -> impl Strategy<Value = (String, String)> {
     let digits = || "-?[0-9]{0,5}(\\.[0-9]{0,6})?";
     let word = prop_oneof![

@@ -90,7 +90,7 @@ fn the_tolerance_of_the_path_is_modal() {
     assert_eq!(blend(&["G64 P0.005", "G64", "G0 X1"]), 11);
     assert_eq!(blend(&["G64 P0.005", "M30", "G0 X1"]), 11);
     assert_eq!(blend(&["G64 P0.005", "G61", "G64", "G0 X1"]), 11);
-    // Nothing is merged with an exact path, and an arc with nothing.
+    // Moves are not merged with G61 and G61.1, and arcs are never merged.
     for line in ["G61", "G61.1"] {
         assert_eq!(blend(&["G64 P0.005", line, "G0 X1"]), 0, "{line}");
     }
@@ -110,7 +110,7 @@ fn exact_stop_is_modal_and_asks_for_nothing_itself() {
     }
 }
 
-/// X disabled, A by a radius of 1 mm.
+/// A machine with X disabled, and with A in radius mode with a radius of 1 mm.
 struct Odd;
 
 impl Setup for Odd {
@@ -152,7 +152,7 @@ fn words_of_a_radius_axis_are_lengths() {
     assert_eq!(odd(&["G0 A1"]), Ok([0, 0, 0, 572_958, 0, 0]));
     assert_eq!(odd(&["G20 G0 A1 B1"]), Ok([0, 0, 0, 14_553_128, 10_000, 0]));
     assert_eq!(odd(&["G28.3 A1", "G92 A0", "G0 A1"]), Ok([0, 0, 0, 1_145_916, 0, 0]));
-    // What rounding takes is carried on.
+    // The residue of rounding is added to the next move.
     let mut lines = vec!["G91 G0"];
     lines.extend(["A0.0001"; 1000]);
     assert_eq!(odd(&lines), Ok([0, 0, 0, 57_296, 0, 0]));
@@ -208,7 +208,7 @@ fn feed_is_in_the_units_of_its_line() {
     assert_eq!(feed(&["G20", "G21 F10 G1 X1"]), Feed::PerMinute(10.0));
     assert_eq!(feed(&["G20 F10", "G21 G1 X1"]), Feed::PerMinute(254.0));
     assert_eq!(run(&["G20 F10"]).0.feed_rate(), 254.0);
-    // Degrees are degrees.
+    // Degrees do not depend on G20.
     assert_eq!(feed(&["G20 F10 G1 A1"]), Feed::PerMinute(10.0));
     assert_eq!(feed(&["G20 F10 G1 A1 X1"]), Feed::PerMinute(254.0));
 }
@@ -232,7 +232,7 @@ fn inverse_time() {
     assert_eq!(feed(&["G93 G1 X1 F4"]), Feed::Minutes(0.25));
     assert_eq!(feed(&["G20 G93 G1 X1 F4", "X2 F2"]), Feed::Minutes(0.5));
     assert_eq!(feed(&["G93", "G94 F100 G1 X1"]), Feed::PerMinute(100.0));
-    // F means nothing to lines that are not timed by it.
+    // With G93, F is accepted and ignored on lines that do not feed.
     run(&["G93 G0 X1 F4"]);
     run(&["G93 F4"]);
 }

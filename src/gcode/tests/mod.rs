@@ -12,7 +12,7 @@ use super::interpreter::Interpreter;
 use super::setup::Usual;
 use crate::status::Status;
 
-/// An interpreter that has read these lines, and the commands of the last one.
+/// Returns an interpreter that has read these lines, and the commands of the last line.
 fn run(lines: &[&str]) -> (Interpreter, Commands) {
     let mut interpreter = Interpreter::new();
     let mut out = Commands::default();
@@ -22,7 +22,7 @@ fn run(lines: &[&str]) -> (Interpreter, Commands) {
     (interpreter, out)
 }
 
-/// What the last of these lines is refused with. It must leave no trace.
+/// Returns the status with which the last of these lines is refused. Checks that this line changes nothing.
 fn refusal(lines: &[&str]) -> Status {
     let (last, before) = lines.split_last().unwrap();
     let (mut interpreter, mut out) = run(before);
@@ -33,12 +33,12 @@ fn refusal(lines: &[&str]) -> Status {
     status
 }
 
-/// The position after these lines, in units.
+/// Returns the position after these lines, in units.
 fn position(lines: &[&str]) -> [i32; 6] {
     run(lines).0.position().map(|length| length.0)
 }
 
-/// The feed of the last line.
+/// Returns the feed of the last line.
 fn feed(lines: &[&str]) -> Feed {
     match run(lines).1.motion {
         Motion::Feed { feed, .. } | Motion::Arc { feed, .. } => feed,

@@ -1,10 +1,10 @@
-//! Tables that are kept elsewhere, and slowly.
+//! Tables that are kept outside the interpreter, and that cannot always take a change.
 
 use super::super::tables::{Edit, Ram, TableRow, Tables};
 use super::*;
 use crate::units::{Length, PerAxis};
 
-/// Tables with a row on its way: they take changes of no other.
+/// Tables that are writing one row. Meanwhile they take no change of another row.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct Slow {
     kept: Ram,
@@ -42,7 +42,7 @@ fn a_line_that_has_to_wait_for_the_tables_leaves_no_trace() {
     for line in ["N7 G55 G10 L2 P2 X2", "G10 L20 P3 X2 M2", "G10 L1 P1 Z2", "G28.1", "G30.1"] {
         run(line, Err(Status::Again));
     }
-    // The same row, and lines that read rows.
+    // A change of the row that is being written is accepted, and so are lines that only read rows.
     assert_eq!(run("G10 L20 P1 X0.5", Ok(())), 25_000);
     assert_eq!(run("G55", Ok(())), 0);
     assert_eq!(run("G54", Ok(())), 25_000);
@@ -50,7 +50,7 @@ fn a_line_that_has_to_wait_for_the_tables_leaves_no_trace() {
 
 #[test]
 fn the_system_in_force_is_known_without_the_tables() {
-    /// Tables that nobody is to ask.
+    /// Tables that the interpreter must not read.
     #[derive(Clone, Copy)]
     struct Deaf;
     impl Tables for Deaf {

@@ -6,7 +6,8 @@ use std::format;
 use std::string::String;
 use std::vec::Vec;
 
-/// X and Z of all lines after these: traverses in upper case, lines of a pass in lower case with their lead.
+/// Returns X and Z of all moves of the last of these lines: traverses in upper case, lines of a pass in lower case with
+/// their lead.
 fn told(lines: &[&str]) -> String {
     let (before, _) = run(&lines[..lines.len() - 1]);
     let (after, out) = run(lines);
@@ -56,7 +57,7 @@ fn an_inner_thread_goes_outwards_and_any_way_along_z() {
 fn the_area_of_chips_is_alike_with_r2() {
     assert_eq!(told(&["G0 X5 Z2", "G76 P1 Z-10 I-1 J0.3 K0.6 R2"]).matches("k1").count(), 4);
     let second = told(&["G0 X5 Z2", "G76 P1 Z-10 I-1 J0.3 K0.6 R2"]);
-    // 0.3 times the root of 2.
+    // The second pass is 0.3 times the root of 2 deep.
     assert!(second.contains("x3.5758 z-10"), "{second}");
 }
 

@@ -1,4 +1,4 @@
-//! Canned cycles that drill, and what is said of all cycles.
+//! Canned cycles that drill, and the refusals that all canned cycles share.
 
 use super::{On, Section, g, no, no_on};
 use crate::status::Status::{
@@ -7,8 +7,8 @@ use crate::status::Status::{
     RWordMissing, RotaryNotAllowed, SWordMissing, SpindleMustTurn,
 };
 
-/// Refusals of a canned cycle that is complete with `$more` (and for some with the spindle on: `$begin`),
-/// and `$own`.
+/// The refusals of a canned cycle: those that all cycles share, and those of this cycle (`$own`). With the words
+/// `$more` the line of the cycle is complete. Some cycles need `$begin`, which switches the spindle on.
 macro_rules! cycle {
     ($code:literal, $begin:literal, $more:literal $(, $own:expr)*) => {
         &[
@@ -27,7 +27,7 @@ macro_rules! cycle {
 }
 pub(super) use cycle;
 
-/// Refusals with G95 of a cycle for which the spindle may stand.
+/// The refusal with G95, which needs a turning spindle, of a cycle that otherwise does not need one.
 macro_rules! per_turn {
     ($code:literal, $more:literal) => {
         no(SpindleMustTurn, &["G95 F0.1", concat!($code, $more, " Z-1 R1")])
@@ -35,7 +35,7 @@ macro_rules! per_turn {
 }
 pub(super) use per_turn;
 
-/// Refusals with G95 of any cycle.
+/// The refusal of any cycle with G95 and without a spindle speed.
 macro_rules! speed {
     ($code:literal, $more:literal) => {
         no(SWordMissing, &["M3 G95 F0.1", concat!($code, $more, " Z-1 R1")])

@@ -1,4 +1,4 @@
-//! What holds on every line.
+//! The rules that apply to every line.
 
 use super::{On, Rule, no, no_on};
 use crate::status::Status::{
@@ -95,7 +95,7 @@ slash means nothing.",
     },
 ];
 
-/// 256 bytes.
+/// A line of 256 bytes.
 const LONG: &str = concat!(
     "G0 X1 (0123456789012345678901234567890123456789012345678901234567890123456789",
     "01234567890123456789012345678901234567890123456789012345678901234567890123456789",

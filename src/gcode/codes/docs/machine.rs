@@ -1,11 +1,11 @@
-//! M codes.
+//! M codes: program, spindle, coolant, overrides.
 
 use super::{Doc, Section, g, m, no};
 use crate::status::Status::{
     BadNumber, OutOfRange, PWordInvalid, PWordMissing, SWordInvalid, SWordMissing,
 };
 
-/// M6 stands with the tools.
+/// M6. It is documented in the section of the tools.
 pub const CHANGE: Doc = m(
     60,
     "Change the tool",

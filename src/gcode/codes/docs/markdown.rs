@@ -1,4 +1,4 @@
-//! `docs/gcode.md`, from what is said of codes.
+//! Generates `docs/gcode.md` from the documentation of the codes.
 
 use std::format;
 use std::string::{String, ToString};
@@ -37,7 +37,7 @@ Where others may do otherwise:
 
 ";
 
-/// All of it.
+/// Returns the whole document.
 pub fn markdown() -> String {
     let mut text = PREFACE.to_string();
     text += "## Overview\n\nWords in bold are needed; of axes at least one. A code with a capability is refused with status ";
@@ -70,7 +70,7 @@ pub fn markdown() -> String {
     text + &settings()
 }
 
-/// The text, broken into lines of no more than 110 characters.
+/// Returns the text, broken into lines of at most 110 characters.
 fn wrapped(text: &str) -> String {
     let (mut lines, mut column) = (String::new(), 0);
     for word in text.split(' ') {
@@ -90,13 +90,13 @@ fn heading(doc: &Doc) -> String {
     format!("{} {}", doc.name(), doc.title)
 }
 
-/// What a heading is called in links.
+/// Returns the name of a heading in links.
 fn anchor(heading: &str) -> String {
     let kept = heading.chars().filter(|c| c.is_alphanumeric() || *c == ' ' || *c == '-');
     kept.collect::<String>().to_lowercase().replace(' ', "-")
 }
 
-/// The modal group, by the numbers of RS274/NGC.
+/// Returns the number of the modal group, as in RS274/NGC.
 fn group(doc: &Doc) -> &'static str {
     let Some(row) = doc.row() else { return "" };
     match row.action {
@@ -122,7 +122,7 @@ fn group(doc: &Doc) -> &'static str {
     }
 }
 
-/// What an image needs to have for it.
+/// Returns the capability that an image needs for the code. Empty if every image has the code.
 fn capability(doc: &Doc) -> String {
     match doc.row().map(|row| row.action) {
         Some(Action::Motion(mode)) => {
@@ -134,7 +134,7 @@ fn capability(doc: &Doc) -> String {
     }
 }
 
-/// The words of a code, those it needs in bold.
+/// Returns the words of a code, with the needed words in bold.
 fn words(doc: &Doc) -> String {
     let Some(row) = doc.row() else { return String::new() };
     let [needed, other] = [letters(row.needs), letters(row.takes & !row.needs)];
@@ -145,7 +145,7 @@ fn words(doc: &Doc) -> String {
     }
 }
 
-/// The letters of a set of words.
+/// Returns the letters of a set of words.
 fn letters(set: u32) -> String {
     let mut parts = Vec::new();
     let axes = set & AXES == AXES;
@@ -158,7 +158,7 @@ fn letters(set: u32) -> String {
     parts.join(" ")
 }
 
-/// A table of refusals.
+/// Returns a table of refusals.
 fn refused(refusals: &[Refusal]) -> String {
     if refusals.is_empty() {
         return String::new();
@@ -195,7 +195,7 @@ fn shortened(line: &str) -> String {
     }
 }
 
-/// The settings that the language depends on.
+/// Returns the table of the settings that the language depends on.
 fn settings() -> String {
     let mut text = "\n## Settings\n\n| Setting | | Values |\n|---|---|---|\n".to_string();
     for (name, what, values) in [

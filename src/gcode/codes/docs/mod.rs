@@ -1,5 +1,5 @@
-//! What is said of every code, for people. `docs/gcode.md` is made from it, and tests hold it to the
-//! truth: every row of the tables has an entry, and every example is refused as it says.
+//! Documentation of every code, for people. `docs/gcode.md` is generated from it. Tests check that every row of the
+//! tables has an entry, and that every example is refused as documented.
 
 mod bores;
 mod cycles;
@@ -24,47 +24,47 @@ use super::Code;
 use crate::status::Status;
 use crate::units::{Length, PerAxis};
 
-/// What belongs together.
+/// A section: codes that belong together.
 pub struct Section {
     /// The heading of the section.
     pub title: &'static str,
-    /// What holds for all of it; may be empty.
+    /// A text that applies to the whole section. May be empty.
     pub intro: &'static str,
     /// The codes of the section.
     pub docs: &'static [Doc],
 }
 
-/// What is said of one code.
+/// The documentation of one code.
 pub struct Doc {
     /// `G` or `M`.
     pub letter: char,
     /// The number of the code in tenths.
     pub number: u16,
-    /// What it is called.
+    /// The title of the code.
     pub title: &'static str,
-    /// What it does.
+    /// The description of the code.
     pub text: &'static str,
-    /// What it is refused with, beside what may be wrong with any line.
+    /// The reasons for which a line with the code is refused, in addition to those that apply to any line.
     pub refusals: &'static [Refusal],
 }
 
-/// What is said of something that may stand on any line.
+/// The documentation of something that may stand on any line.
 pub struct Rule {
-    /// What it is.
+    /// The title of the rule.
     pub title: &'static str,
-    /// What it means.
+    /// The description of the rule.
     pub text: &'static str,
-    /// What is refused.
+    /// The reasons for which a line is refused.
     pub refusals: &'static [Refusal],
 }
 
-/// Why a line is refused.
+/// A reason for which a line is refused.
 pub struct Refusal {
-    /// With this.
+    /// The status with which the line is refused.
     pub status: Status,
-    /// An example: on a machine that has just been started the last of these lines is refused.
+    /// An example. On a machine that has just been started, the last of these lines is refused.
     pub lines: &'static [&'static str],
-    /// Which machine.
+    /// The machine of the example.
     pub on: On,
 }
 
@@ -144,7 +144,7 @@ impl Tables for Fresh {
 }
 
 impl Refusal {
-    /// What the last line of the example is refused with by a machine; `None` if it is not.
+    /// Runs the example on a machine. Returns the status with which the last line is refused, `None` if it is accepted.
     pub fn on(&self, setup: &impl Setup) -> Option<Status> {
         let (mut interpreter, mut out) = (Fresh::machine(), Commands::default());
         let mut last = None;
@@ -156,7 +156,7 @@ impl Refusal {
 }
 
 impl Doc {
-    /// The name of the code: `G28.3`.
+    /// Returns the name of the code: `G28.3`.
     pub fn name(&self) -> std::string::String {
         match (self.number / 10, self.number % 10) {
             (whole, 0) => std::format!("{}{whole}", self.letter),
@@ -164,14 +164,14 @@ impl Doc {
         }
     }
 
-    /// The row of the code in the tables.
+    /// Returns the row of the code in the tables.
     pub fn row(&self) -> Option<Code> {
         let (whole, tenth) = (self.number / 10, (self.number % 10) as u8);
         if self.letter == 'G' { super::g(whole, tenth) } else { super::m(whole, tenth) }
     }
 }
 
-/// Everything that is said of codes.
+/// The documentation of all codes.
 pub const SECTIONS: &[Section] = &[
     motion::MOVES,
     motion::PROBES,
@@ -188,10 +188,10 @@ pub const SECTIONS: &[Section] = &[
     heating::HEATING,
 ];
 
-/// Everything that is said of lines.
+/// The documentation of everything that may stand on any line.
 pub const RULES: &[Rule] = lines::RULES;
 
-/// All entries.
+/// Returns the documentation of all codes, code by code.
 pub fn docs() -> impl Iterator<Item = &'static Doc> {
     SECTIONS.iter().flat_map(|section| section.docs)
 }
@@ -214,12 +214,12 @@ const fn m(
     Doc { letter: 'M', number, title, text, refusals }
 }
 
-/// Refused by every machine.
+/// Returns a refusal whose example uses the usual machine.
 const fn no(status: Status, lines: &'static [&'static str]) -> Refusal {
     Refusal { status, lines, on: On::Usual }
 }
 
-/// Refused by some.
+/// Returns a refusal whose example uses the machine `on`.
 const fn no_on(on: On, status: Status, lines: &'static [&'static str]) -> Refusal {
     Refusal { status, lines, on }
 }

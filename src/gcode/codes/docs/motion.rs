@@ -9,7 +9,7 @@ use crate::status::Status::{
     RWordInvalid, RotaryNotAllowed, SWordMissing, SpindleMustTurn,
 };
 
-/// Refusals of an arc.
+/// The refusals of an arc.
 macro_rules! arc {
     ($code:literal) => {
         &[
@@ -34,7 +34,7 @@ macro_rules! arc {
     };
 }
 
-/// Refusals of a probing move.
+/// The refusals of a probing move.
 macro_rules! probe {
     ($code:literal) => {
         &[
@@ -50,7 +50,7 @@ macro_rules! probe {
     };
 }
 
-/// Refusals of a thread.
+/// The refusals of a thread.
 macro_rules! thread {
     ($code:literal) => {
         &[

@@ -1,4 +1,4 @@
-//! Where the origin is: coordinate systems and tool lengths.
+//! The work origin: coordinate systems and tool lengths.
 
 use super::{Section, g, no};
 use crate::status::Status::{

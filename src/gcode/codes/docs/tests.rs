@@ -68,7 +68,7 @@ fn examples_are_of_their_code() {
     }
 }
 
-/// The statuses that are named in the sources of the language.
+/// Returns the statuses that the sources of the language name.
 fn named() -> HashSet<String> {
     let folder = Path::new("src/gcode");
     let mut named = HashSet::new();
@@ -88,7 +88,7 @@ fn every_refusal_of_the_language_is_listed() {
     let listed: HashSet<String> =
         refusals().map(|refusal| std::format!("{:?}", refusal.status)).collect();
     let mut named = named();
-    // Not refusals; no code needs T; nothing is lacking here (`tests/capabilities.rs`).
+    // The first three are not refusals, no code needs T, and no capability is missing here (`tests/capabilities.rs`).
     for other in ["Noop", "Again", "InternalError", "TWordMissing", "NotBuiltIn"] {
         named.remove(other);
     }
