@@ -421,7 +421,8 @@ impl<T> Interpreter<T> {
         &self.state.tool_length
     }
 
-    /// Returns F in mm/min, or mm a turn with G95. 0 if none is in force, as always with G93.
+    /// Returns the feed in force: mm/min with G94, mm a turn with G95. Returns 0 before the first F word, and always
+    /// with G93.
     pub fn feed_rate(&self) -> f32 {
         match self.state.feed_units {
             Units::Inch => self.state.feed * 25.4,

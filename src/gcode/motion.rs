@@ -191,7 +191,7 @@ impl State {
         Ok(moved)
     }
 
-    /// Returns the feed of a move, or error 142 if none is in force. `rotary` says that only rotary axes move.
+    /// Returns the feed of a move, or error 142 if no feed is in force. `rotary` says that only rotary axes move.
     pub(super) fn rate(&self, block: &Block, rotary: bool) -> Result<Feed, Status> {
         let rate = match self.modal.feed_mode {
             FeedMode::InverseTime => block.get(F).map_or(0.0, |value| value.to_f32()),

@@ -54,7 +54,7 @@ impl State {
             && (block.system.is_some() || block.tool_length.is_some() || block.non_modal.is_some())
     }
 
-    /// Returns the surface speed. `None` if none is in force.
+    /// Returns the constant surface speed (G96) in force; `None` with G97, and on a machine without a lathe.
     #[inline(always)]
     pub(super) fn surface(&self) -> Option<Surface> {
         if Capability::Lathe.is_built_in() { self.surface_in_force() } else { None }

@@ -47,7 +47,7 @@ pub(super) const MARGIN_FIRST: u8 = 4;
 /// Most slices by which a scan looks further than it has to.
 const MARGIN: u8 = 15;
 
-/// See [`Governor::crawled`].
+/// How much longer than a usual slice a crept slice may be, as a power of two: see [`Governor::crawled`].
 const CRAWL_LOG2: i8 = 3;
 /// A stretch that is shorter than this is not worth a segment, s.
 const LITTLE_S: f32 = SEGMENT_S / 4.0;
@@ -550,8 +550,9 @@ impl Governor {
         self.add(greater(seconds, left / span.cruise), left, self.potential(left));
     }
 
-    /// How far a slice goes at most that makes no ramp, from rest to rest. It takes up to `2^CRAWL_LOG2` times as long as others then, and
-    /// its mean velocity is what two of those build up: so little may begin and end at once.
+    /// Returns the longest distance that may be crept over from rest to rest in one slice, without a ramp, mm. Such a
+    /// slice takes up to `2^CRAWL_LOG2` times as long as `span` says. Its mean velocity is at most what two usual
+    /// slices of acceleration build up: a jump by so little is allowed.
     #[inline(never)]
     fn crawled(&self, span: &Span) -> f32 {
         let Limits { accel, jerk, .. } = self.limits;

@@ -99,7 +99,8 @@ pub fn check_changes(planned: &[Planned], share: f64, accel: f64, jerk: f64, lat
         assert!(change.abs() <= most, "{change} of {most} mm/s: {a:?} {b:?} {p:?}");
         let mean = (b.place - a.place) / seconds;
         let (low, high) = (a.velocity.min(b.velocity), a.velocity.max(b.velocity));
-        // There may be a peak between. What is hardly more than rounding takes one slice, from rest to rest.
+        // The velocity may have a peak in the middle. From rest to rest a very short move is one slice without a ramp,
+        // whose mean velocity may be `least` at once.
         let least = if high == 0.0 { (2.0 * jump).min(p.accel * STRETCH) } else { 0.0 };
         let peak = high + 0.25 * p.accel * seconds + least;
         let off = 1e-3 * high + 3e-3 / seconds;

@@ -348,7 +348,7 @@ pub fn inverse_root(x: u16) -> u16 {
             "com  {error:h}",
             "neg  {error:l}",
             "sbci {error:h}, 255",
-            // The same difference in units of 2^-11: e.
+            // The high byte of `more` becomes that difference, e, in units of 2^-11.
             "movw {more:l}, {error:l}",
             ".rept 3",
             "lsl  {more:l}",

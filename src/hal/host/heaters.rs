@@ -25,7 +25,7 @@ pub fn reading() -> Option<u16> {
     Some(word(begun().get()).unwrap_or(SAMPLES * 1_023))
 }
 
-/// Reads the word of a heater's MAX6675, `None` if none is there.
+/// Returns the word that the MAX6675 of a heater sends; `None` if the heater has no MAX6675.
 pub fn word(heater: u8) -> Option<u16> {
     readings().get().get(usize::from(heater)).copied().flatten()
 }

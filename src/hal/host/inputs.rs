@@ -99,7 +99,7 @@ pub(super) fn set(input: usize, high: bool) {
     }
 }
 
-/// Plans a sample as after an edge, if none is due.
+/// Plans the first sample after an edge, unless a sample is planned already.
 fn edge() {
     if all().next_sample.get() == NEVER {
         all().next_sample.set(now() + cycles(FIRST_US));

@@ -97,7 +97,7 @@ impl State {
         }
     }
 
-    /// Plans a sample as after an edge, if none is due.
+    /// Plans the first sample after an edge, unless a sample is planned already.
     fn ask(&mut self) {
         if !self.due {
             self.plan(FIRST_US);

@@ -21,7 +21,7 @@
 //! # When full or late
 //!
 //! - **Words** last for half a millisecond to one. If the feeder comes later than that, all motors pause between
-//!   two words: no step is lost, and none is doubled.
+//!   two words: no step is lost, and no step is made twice.
 //! - **A byte** that is not taken before the next one has come is lost, and marked ([`serial`](super::serial)).
 //! - **Entries in buffers** at a stop are counted, not made into steps: see [`stepper::settle`].
 
