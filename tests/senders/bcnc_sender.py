@@ -80,9 +80,18 @@ class Bcnc(Sender.Sender):
             self.errors.append(text)
         print(kind, text)
 
+    def _settle(self):
+        """Waits until what it asks by itself has been answered. It asks when the machine comes to rest, and counts the
+        answers to the lines of the job if the job has begun meanwhile: it then takes the job for ended too early."""
+        count = None
+        while not self.queue.empty() or count != len(self.heard):
+            count = len(self.heard)
+            time.sleep(1)
+
     def start(self, lines=None):
         """The button "Start": sends the file that is loaded, or these lines."""
         assert self.serial and not self.running
+        self._settle()
         self.cleanAfter = True
         # So many tell its thread that there are lines still to come.
         self._runLines = sys.maxsize
