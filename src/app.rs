@@ -55,6 +55,7 @@ impl Links {
             commands_taken: Cell::new(false),
             planner_wake: Wake::default(),
             chain_waits: Cell::new(false),
+            moves_last: Cell::new(false),
             cycle_start: Wake::default(),
             notices: Notices::default(),
             reporter_wake: ReporterWake::default(),

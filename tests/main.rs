@@ -78,6 +78,7 @@ mod gcode_props;
 mod governor;
 mod grbl;
 mod grbl_random;
+mod grbl_resets;
 mod heat;
 mod heat_hosts;
 mod hold;

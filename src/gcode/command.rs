@@ -45,6 +45,11 @@ impl Commands {
         matches!(self.motion, Motion::None) && self.is_motion_alone()
     }
 
+    /// Whether the line asks for a move.
+    pub fn moves(&self) -> bool {
+        !matches!(self.motion, Motion::None | Motion::SetPosition { .. } | Motion::Check)
+    }
+
     /// Whether the line asks for one straight move and for nothing else.
     pub fn is_straight(&self) -> bool {
         matches!(self.motion, Motion::Traverse { .. } | Motion::Feed { .. })

@@ -65,6 +65,11 @@ impl Job {
         (self.number == STARTUP).then_some(self.piece)
     }
 
+    /// Whether start-up lines are still to be taken.
+    pub fn starts_up(&self) -> bool {
+        self.startup().is_some() && !self.is_over()
+    }
+
     /// Whether there is none.
     pub fn is_none(&self) -> bool {
         self.number == 0

@@ -13,6 +13,8 @@
 //! suddenly. But a motor that stops suddenly may slip by some steps that are not counted, so axes have to be homed
 //! again.
 //!
+//! M2 and M30 end no alarm on a port of grbl's dialect, whose senders end alarms by `$X`, `$H` and a reset.
+//!
 //! An alarm is reported by one exception report when it begins. A later cause counts only if it is worse.
 
 use super::Event;

@@ -156,6 +156,10 @@ pub trait Answers {
         false
     }
 
+    /// Notes that the line has been dropped since its answer was begun, by an alarm or by a sender. May be called more
+    /// than once.
+    fn dropped(&mut self) {}
+
     /// Drops all output except what the line itself asks to be reported. For lines from a file: no sender waits for
     /// an answer.
     fn silence(&mut self) {}
@@ -485,6 +489,14 @@ macro_rules! dialects {
                 match self {
                     $(#[cfg(feature = $feature)]
                     Self::$name(request) => request.interject(),)+
+                }
+            }
+
+            #[inline(always)]
+            fn dropped(&mut self) {
+                match self {
+                    $(#[cfg(feature = $feature)]
+                    Self::$name(request) => request.dropped(),)+
                 }
             }
 

@@ -20,6 +20,8 @@ pub enum Value {
     Flow,
     /// 1 if anything is queued or runs.
     Working,
+    /// 1 if the last line that was queued moves the machine.
+    MovesLast,
     /// 1 if a block is being carried out.
     Running,
     /// Units: 0 inch, 1 mm.

@@ -49,7 +49,7 @@ use crate::hal::system::reset;
 use crate::hal::time::millis;
 use crate::hal::{flags, uart};
 use crate::machine::{self, Alarm};
-use crate::protocol::{Hold, Machine};
+use crate::protocol::{Hold, Machine, Speech};
 use crate::realtime::{ENQUIRY, FLUSH, HOLD, KILL, LET_GO, RESET, RESUME, UNPLACED};
 use crate::status::Status;
 
@@ -67,8 +67,12 @@ pub fn abandon(links: &Links) {
     links.signs.clear();
     for port in &links.ports {
         if let Ok(mut lines) = port.lines.try_borrow_mut() {
-            lines.terminate(dropped());
-            cut_up_to(port, &mut lines, uart::newest(port.number));
+            // A probing that has failed has begun the alarm itself: its line is answered when the result has been told.
+            let probed = port.speech.get().is_in_order() && links.probe.is_news();
+            lines.terminate_from(probed.into(), dropped());
+            if !port.is_resetting() {
+                cut_up_to(port, &mut lines, uart::newest(port.number));
+            }
         }
     }
     drop_queue(links);
@@ -158,7 +162,7 @@ pub fn serve(links: &Links) {
         if characters != 0 {
             act(links, port, characters);
         }
-        if port.take_asked(ports::RESET) {
+        if Speech::HAS_QUESTION && port.take_asked(ports::RESET) {
             start_over(links, port, uart::newest(port.number), false);
         }
     }
@@ -245,10 +249,13 @@ fn starts_over(links: &Links, port: &Port) -> bool {
 #[small]
 fn start_over(links: &Links, port: &Port, slot: Option<u8>, works: bool) {
     cut(links, port, slot, machine::Event::Kill);
+    let mut lines = port.lines.borrow_mut();
+    lines.drop_unanswered();
     if port.cut.get().is_none() {
         // The next byte begins a line.
-        port.lines.borrow_mut().forget();
+        lines.forget();
     }
+    drop(lines);
     for which in [Override::Feed, Override::Traverse, Override::Spindle] {
         overrides::change(links.thread, Change::to(which, FULL));
     }
@@ -290,7 +297,10 @@ fn cut(links: &Links, port: &Port, slot: Option<u8>, event: machine::Event) {
         let slot = if each.number == port.number { slot } else { uart::newest(each.number) };
         let mut lines = each.lines.borrow_mut();
         lines.terminate(dropped());
-        cut_up_to(each, &mut lines, slot);
+        // On a port with a reset of its own, the cut is where that reset stands.
+        if each.number == port.number || !each.is_resetting() {
+            cut_up_to(each, &mut lines, slot);
+        }
     }
     drop_queue(links);
 }

@@ -48,6 +48,8 @@ pub enum Class {
     Data,
     /// The line could not be kept, and is answered with this status.
     Fault(Status),
+    /// The line came before its sender reset the machine. It is never answered.
+    Gone,
 }
 
 /// Names a line in the pool until it is removed.
@@ -463,35 +465,54 @@ impl LinePool {
         self.entries.len() > usize::from(self.controls)
     }
 
-    /// Whether a line waits that could not be kept, or has been dropped.
-    pub fn has_faults(&self) -> bool {
-        self.entries.iter().any(|entry| matches!(entry.class, Class::Fault(_)))
+    /// Whether a line waits that is never answered.
+    pub fn has_gone(&self) -> bool {
+        self.entries.iter().any(|entry| entry.class == Class::Gone)
+    }
+
+    /// Drops all lines that are not control lines. They are never answered, because their sender has reset the machine.
+    #[cold]
+    #[inline(never)]
+    #[small]
+    pub fn drop_unanswered(&mut self) {
+        for index in 0..self.entries.len() {
+            if let Some(entry) = self.entries.get_mut(index)
+                && entry.class != Class::Control
+            {
+                entry.class = Class::Gone;
+            }
+        }
     }
 
     /// Drops all data lines: they will be answered with `status`.
     pub fn terminate(&mut self, status: Status) {
-        self.drop_data(status, false);
+        self.terminate_from(0, status);
     }
 
-    /// Drops data lines as [`terminate`](Self::terminate) does, in an alarm. Keeps the end of a program, which ends
-    /// the alarm, and everything behind it.
+    /// Drops data lines as [`terminate`](Self::terminate) does, but the `first` ones.
+    pub fn terminate_from(&mut self, first: u8, status: Status) {
+        self.drop_data(first, status, false);
+    }
+
+    /// Drops data lines as [`terminate`](Self::terminate) does, in an alarm. Keeps the end of a program, if it ends the
+    /// alarm, and everything behind it.
     pub fn refuse(&mut self, status: Status) {
-        self.drop_data(status, true);
+        self.drop_data(0, status, true);
     }
 
     #[cold]
     #[inline(never)]
     #[small]
-    fn drop_data(&mut self, status: Status, spares_end: bool) {
-        for index in 0..self.entries.len() {
-            let id = LineId(index as u8);
+    fn drop_data(&mut self, first: u8, status: Status, spares_end: bool) {
+        for index in first..self.entries.len() as u8 {
+            let id = LineId(index);
             if self.class(id) != Class::Data {
                 continue;
             }
-            if spares_end && is_program_end(self.text(id)) {
+            if spares_end && !self.in_order && is_program_end(self.text(id)) {
                 break;
             }
-            if let Some(entry) = self.entries.get_mut(index) {
+            if let Some(entry) = self.entries.get_mut(index.into()) {
                 entry.class = Class::Fault(status);
             }
         }

@@ -57,6 +57,8 @@ pub struct Links {
     pub feeder: Cell<u8>,
     /// The planner works on `commands`.
     pub commands_taken: Cell<bool>,
+    /// The last line that the planner has been given moves the machine.
+    pub moves_last: Cell<bool>,
     /// A line has come, or the planner is ready: the parser looks again.
     pub parser_wake: Wake,
     /// `commands` has been filled.

@@ -35,7 +35,7 @@ use super::tx::Tx;
 use crate::hal::event::{Event, is_wanted, set_asked, wake_after, wake_after_transmitted};
 use crate::hal::serial::{PORTS, USB};
 use crate::machine::{self, Cycle};
-use crate::protocol::{Answers, Notice, Request, asks_alarm};
+use crate::protocol::{Answers, Notice, Request, Speech, asks_alarm, jog};
 use crate::status::Status;
 use answer::{Answer, finish, go_on, has_room, leave};
 use block::{has_room_for_startup, is_working, job_line};
@@ -273,6 +273,9 @@ impl Parser {
             return go_on(links, port, session, awaited);
         }
         if port.asks_report() {
+            if port.awaits_greeting() && !machine::is_flushing() {
+                return false;
+            }
             if begin_report(port, session) {
                 return go_on(links, port, session, false);
             }
@@ -385,9 +388,11 @@ impl Parser {
         let flushes = machine::is_flushing();
         let any = data || flushes || port.number != links.feeder.get();
         let (id, class) = port.lines.borrow().next(any)?;
-        // A line that follows a reset waits for the greeting.
+        // A line that follows a reset waits for the greeting, and then for the start-up lines.
+        let starts = || port.speech.get().is_in_order() && links.job.get().starts_up();
         let waits = (flushes && class == Class::Data)
-            || (port.is_resetting() && !matches!(class, Class::Fault(_)));
+            || (port.awaits_greeting() && class != Class::Gone)
+            || starts();
         if !matches!(session, Session::Idle) || waits {
             return None;
         }
@@ -503,7 +508,8 @@ fn begin(
     if port.is_undecided() {
         links.decide_by(port, line);
     }
-    if port.drops_unanswered() && matches!(class, Class::Fault(_)) {
+    if Speech::HAS_QUESTION && class == Class::Gone {
+        *deferred = Deferred::No;
         return Begun::Silent;
     }
     let before = port.speech.get();
@@ -528,7 +534,7 @@ fn begin(
         if status == Status::Again {
             // The line number counts only when the line is begun for good.
             port.speech.set(before);
-            if machine::cycle() == Cycle::Jog {
+            if machine::cycle() == Cycle::Jog || jog(block.of(line)).is_some() {
                 *deferred = Deferred::Line;
             }
             return Begun::Again;

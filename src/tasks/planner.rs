@@ -688,6 +688,10 @@ impl Planner {
             links.except(Status::KillJob);
         }
         links.notices.flushed.set(ended && !machine::is_alarmed());
+        if links.is_interrupted() && !machine::is_alarmed() {
+            // Before any other line is begun: lines that have come since the reset are refused.
+            machine::start_alarmed();
+        }
         links.reporter_wake.notify_now();
         killed
     }

@@ -40,8 +40,7 @@ pub const COURTESY: u8 = 8;
 
 /// A bit of [`Port::asked`]: a status report.
 pub const REPORT: u8 = 1;
-/// A bit of [`Port::asked`]: the greeting, because the sender has reset the machine. Lines that the reset has dropped
-/// are not answered.
+/// A bit of [`Port::asked`]: the greeting, because the sender has reset the machine.
 pub const GREETING: u8 = 2;
 /// A bit of [`Port::asked`]: before the greeting, the report that motion was interrupted.
 pub const INTERRUPTED: u8 = 4;
@@ -55,6 +54,14 @@ pub const RESET: u8 = 16;
 
 /// A bit of [`Port::asked`], beside [`GREETING`]: a program has opened the port, and nothing has been reset.
 pub const OPENED: u8 = 64;
+/// A bit of [`Port::asked`]: the greeting is being sent. Lines wait until it has been sent.
+pub const GREETS: u8 = 128;
+
+/// Whether a sender may be greeted other than at the start of the machine.
+#[inline(always)]
+pub fn greets_anew() -> bool {
+    Speech::HAS_QUESTION || uart::sees_opening()
+}
 
 /// What has decided in which dialect a port is spoken to.
 #[derive(Clone, Copy, Default, PartialEq, Eq)]
@@ -142,14 +149,17 @@ impl Port {
         asked & bit != 0
     }
 
-    /// Whether the sender waits for the greeting: it has reset the machine, or opened the port.
+    /// Whether a reset is under way: the sender has reset the machine, or opened the port, and the greeting has not
+    /// been begun.
+    #[inline(always)]
     pub fn is_resetting(&self) -> bool {
-        self.asked.get() & GREETING != 0
+        greets_anew() && self.asked.get() & GREETING != 0
     }
 
-    /// Whether lines that have got no answer yet are never answered, because their sender has reset the machine.
-    pub fn drops_unanswered(&self) -> bool {
-        self.is_resetting() && !(uart::sees_opening() && self.asked.get() & OPENED != 0)
+    /// Whether lines wait for the end of the greeting.
+    #[inline(always)]
+    pub fn awaits_greeting(&self) -> bool {
+        greets_anew() && self.asked.get() & (GREETING | GREETS) != 0
     }
 
     /// Whether the dialect is undecided: the first line that is in one dialect alone will decide.
@@ -329,6 +339,12 @@ impl Links {
     /// Whether a sender has reset the machine, and waits for the greeting.
     pub fn is_resetting(&self) -> bool {
         self.ports.iter().any(Port::is_resetting)
+    }
+
+    /// Whether a sender on any port has reset the machine in motion.
+    pub fn is_interrupted(&self) -> bool {
+        let is_interrupted = |port: &Port| port.asked.get() & INTERRUPTED != 0;
+        Speech::HAS_QUESTION && self.ports.iter().any(is_interrupted)
     }
 
     /// Reports an exception to whoever feeds the machine. It replaces one that waits, except in an alarm, where the

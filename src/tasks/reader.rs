@@ -231,7 +231,9 @@ impl Intake {
                 _ => pool.put(byte),
             };
             if is_line {
-                if cuts {
+                if cuts && self.port.is_resetting() {
+                    pool.drop_unanswered();
+                } else if cuts {
                     pool.terminate(hold::dropped());
                 }
                 self.ended(pool, looked, links);

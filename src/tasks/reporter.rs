@@ -14,7 +14,9 @@ use super::health;
 #[cfg(feature = "dialect-reprap")]
 use super::heat;
 use super::links::Links;
-use super::ports::{COURTESY, GREETING, HOMING, INTERRUPTED, OPENED, OTHERS, Port};
+use super::ports::{
+    COURTESY, GREETING, GREETS, HOMING, INTERRUPTED, OPENED, OTHERS, Port, greets_anew,
+};
 use super::turning;
 use super::tx::Tx;
 use super::view::{View, moves, queue_free};
@@ -83,9 +85,11 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
             links.parser_wake.signal();
         }
         while let Some((number, notice)) = asked(links) {
-            let opened = uart::sees_opening() && links.port(number).take_asked(OPENED);
-            tell(links, links.port(number), notice).await;
-            if matches!(notice, Notice::Greeting(_)) && !opened {
+            let port = links.port(number);
+            let opened = uart::sees_opening() && port.take_asked(OPENED);
+            tell(links, port, notice).await;
+            // In one turn: no line comes between the greeting and the start-up lines.
+            if greets_anew() && port.take_asked(GREETS) && !opened {
                 start_up(links);
             }
         }
@@ -312,15 +316,12 @@ fn asked_on(port: &Port) -> Option<Notice> {
         return None;
     }
     if port.take_asked(INTERRUPTED) {
-        if !machine::is_alarmed() {
-            // What came before the reset has been dropped; what has come since is refused.
-            machine::start_alarmed();
-        }
         let homed = port.take_asked(HOMING);
         let status = if homed { Status::Terminated } else { Status::HardReset };
         return Some(Notice::Exception(status));
     }
     port.take_asked(GREETING);
+    port.ask(GREETS);
     Some(Notice::Greeting(Occasion::Ready))
 }
 
@@ -328,7 +329,7 @@ fn asked_on(port: &Port) -> Option<Notice> {
 #[inline(never)]
 #[small]
 fn is_over(port: &Port) -> bool {
-    let drops = || port.cut.get().is_some() || port.lines.borrow().has_faults();
+    let drops = || port.cut.get().is_some() || port.lines.borrow().has_gone();
     port.is_resetting() && !machine::is_flushing() && !drops()
 }
 

@@ -47,7 +47,7 @@ pub(super) fn run(links: &Links, shared: &planner::Shared) -> Row {
         None => return Row::Over,
     };
     let Ok(mut tx) = port.tx.try_lock() else { return Row::Over };
-    if settings.echo() || port.is_resetting() {
+    if settings.echo() || port.awaits_greeting() {
         return Row::Over;
     }
     let Ok(mut planner) = shared.try_lock() else { return Row::Over };
@@ -83,6 +83,7 @@ pub(super) fn run(links: &Links, shared: &planner::Shared) -> Row {
         }
     };
     if count > 0 {
+        links.moves_last.set(true);
         links.pool_space.signal();
         links.reporter_wake.signal();
     }

@@ -286,6 +286,10 @@ const RESUMES: i32 = 2;
 #[small]
 fn state(machine: &mut impl Machine, out: &mut impl Out) {
     let (doing, rests) = (machine.doing(), machine.hold() == Hold::Rests);
+    if !matches!(doing, Doing::Alarm(_)) {
+        // A sender on another port may have ended the alarm.
+        machine.memory().grbl.note(SLEEPS, false);
+    }
     let sleeps = machine.memory().grbl.flags & SLEEPS != 0;
     let door = machine.value(Value::Door);
     let stopped = machine.cycle() == Cycle::Stopped;

@@ -36,6 +36,10 @@ pub struct Request {
 
 /// The position after the last part of a list.
 const END: u8 = u8::MAX;
+/// G-code that has run has been dropped before it was answered.
+const DROPPED: u8 = 2;
+/// The line could not be kept.
+const REFUSED: u8 = 1;
 /// A setting, or all settings, are being written to memory.
 const STORES: u8 = 1;
 
@@ -63,7 +67,14 @@ impl Request {
 
     /// Starts to answer a line that could not be kept.
     pub(super) fn refused(status: Status) -> Self {
-        Self { command: Command::Gcode, at: 1, status, block: None, begun: false, report: None }
+        Self {
+            command: Command::Gcode,
+            at: REFUSED,
+            status,
+            block: None,
+            begun: false,
+            report: None,
+        }
     }
 
     /// Starts to answer a single `?`.
@@ -127,6 +138,14 @@ impl Answers for Request {
         self.begun
     }
 
+    fn dropped(&mut self) {
+        match self.command {
+            Command::Gcode if self.at == 0 && self.block.is_none() => self.at = DROPPED,
+            Command::StoreStartup(_) if self.block.is_none() => self.status = Status::Alarmed,
+            _ => {}
+        }
+    }
+
     fn interject(&mut self) -> bool {
         let ended = match self.command {
             Command::Settings | Command::Startup => true,
@@ -174,7 +193,9 @@ impl Request {
             }
             // The commands from here on need the machine at rest or in an alarm.
             _ if at == 0 && self.command != Command::Unlock && !may_change(machine) => {
-                Step::Error(BUSY)
+                let ends = machine.doing() == Doing::Runs && machine.value(Value::MovesLast) == 0;
+                // grbl answers a line that moves nothing when the machine is at rest, so a sender expects it to be.
+                if ends { Step::Later(0) } else { Step::Error(BUSY) }
             }
             Command::Settings => list_setting(at, machine, out),
             Command::Offsets => match at {
@@ -246,6 +267,10 @@ impl Request {
         if number != 0 {
             return Step::Error(number);
         }
+        if self.at == DROPPED && command::jog(line).is_none() {
+            // What the line waits for does not come any more.
+            return Step::Error(refusal(machine).unwrap_or(LOCKED));
+        }
         if is_program_end(line) && machine.value(Value::Check) == 0 {
             if machine.value(Value::Working) != 0 {
                 return Step::Later(0);
@@ -253,7 +278,7 @@ impl Request {
             message(out, text!("Pgm End"));
             return Step::Done;
         }
-        if Capability::Lathe.is_built_in() && is_threading(machine.value(Value::MotionMode)) {
+        if threads(machine) {
             return begins(machine);
         }
         // A probing mode that an earlier line has left does not count: this line has to move.
@@ -291,17 +316,32 @@ fn is_threading(mode: i32) -> bool {
     (MotionMode::Thread as i32..=MotionMode::RigidTap as i32).contains(&mode)
 }
 
+/// Whether the motion mode is a thread.
+fn threads(machine: &mut impl Machine) -> bool {
+    Capability::Lathe.is_built_in() && is_threading(machine.value(Value::MotionMode))
+}
+
+/// Returns the number of the error with which the pass of a thread has been refused; `None` if there is no such pass.
+#[inline(never)]
+#[small]
+fn refusal(machine: &mut impl Machine) -> Option<u8> {
+    if !threads(machine) {
+        return None;
+    }
+    let pass = machine.value(Value::Pass);
+    let refusals = [Status::NoIndex, Status::NoSync, Status::WrongWay, Status::VelocityExceeded];
+    refusals.into_iter().find(|status| *status as i32 == pass).map(error_number)
+}
+
 /// Waits until the pass of a thread has begun. Only then the line is answered, because until then it can be refused.
 #[inline(never)]
 #[small]
 fn begins(machine: &mut impl Machine) -> Step {
-    let pass = machine.value(Value::Pass);
-    if pass == Status::Ok as i32 {
+    if machine.value(Value::Pass) == Status::Ok as i32 {
         return Step::Done;
     }
-    let refusal = [Status::NoIndex, Status::NoSync, Status::WrongWay, Status::VelocityExceeded];
-    if let Some(status) = refusal.into_iter().find(|status| *status as i32 == pass) {
-        return Step::Error(error_number(status));
+    if let Some(number) = refusal(machine) {
+        return Step::Error(number);
     }
     let waits = machine.value(Value::Working) != 0 && machine.value(Value::Check) == 0;
     if waits { Step::Later(0) } else { Step::Done }
@@ -448,6 +488,9 @@ fn check(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Step {
     if at == LEAVES {
         machine.start_over();
         return Step::Done;
+    }
+    if matches!(machine.doing(), Doing::Alarm(_)) {
+        return Step::Error(BUSY);
     }
     let on = machine.value(Value::Check) == 0;
     match machine.check(on) {

@@ -9,7 +9,7 @@ use crate::hal::system;
 use crate::hal::time::millis;
 use crate::hal::uart;
 use crate::machine;
-use crate::protocol::{Answers, Next, Out, Request, Span};
+use crate::protocol::{Answers, Next, Out, Request, Span, Speech};
 use crate::status::Status;
 use crate::tasks::hold;
 use crate::tasks::lines::{Class, LineId};
@@ -167,9 +167,13 @@ impl Answer {
         begun: bool,
         awaited: bool,
     ) -> (Progress, bool) {
-        if port.drops_unanswered() && !begun && self.id != LineId::NONE {
-            // Nobody waits for the answer.
-            return (Progress::Done, false);
+        if Speech::HAS_QUESTION {
+            match port.lines.borrow().class(self.id) {
+                // Nobody waits for the answer.
+                Class::Gone if !begun => return (Progress::Done, false),
+                Class::Fault(_) => self.request.dropped(),
+                _ => {}
+            }
         }
         let (mut begun, since) = (begun, millis());
         // A `?` is answered in one turn, if its answer is short enough.

@@ -13,6 +13,7 @@ use crate::status::Status;
 use crate::tasks::alarm;
 #[cfg(feature = "dialect-reprap")]
 use crate::tasks::heat;
+use crate::tasks::hold;
 use crate::tasks::links::Links;
 use crate::tasks::ports::Port;
 use crate::tasks::reporter::tell_startup;
@@ -70,6 +71,10 @@ pub fn run_block(links: &Links, port: &Port, block: &[u8], declined: bool) -> (S
     match links.may_feed(port) {
         #[cfg(feature = "dialect-reprap")]
         true if port.is_plain() => interpret_rewritten(links, port, block),
+        // Senders of a dialect in order end an alarm by other means than the end of a program.
+        true if port.speech.get().is_in_order() && machine::is_alarmed() => {
+            (if jog(block).is_some() { Status::NotAccepted } else { hold::dropped() }, true)
+        }
         true => interpret(links, block, declined),
         false => (Status::Muted, true),
     }
@@ -160,9 +165,15 @@ fn enter(jogs: bool) {
 fn carry_out(links: &Links, block: &[u8], declined: bool) -> (Status, bool) {
     let words = jog(block);
     let jogs = machine::cycle() == Cycle::Jog;
-    if words.is_some() && (machine::is_held() || (!jogs && is_working(links))) {
-        // A jog waits for nothing but other jogs.
-        return (Status::NotAccepted, true);
+    if words.is_some() {
+        let works = !jogs && is_working(links);
+        if machine::is_held() || machine::is_checking() || (works && links.moves_last.get()) {
+            return (Status::NotAccepted, true);
+        }
+        if works {
+            // A jog waits for other jogs, and for lines that move nothing.
+            return (Status::Again, true);
+        }
     }
     if jogs && words.is_none() && !block.is_empty() && is_working(links) {
         // The end of a jog drops what is queued. So nothing that has been answered may be queued behind a jog.
@@ -181,6 +192,7 @@ fn carry_out(links: &Links, block: &[u8], declined: bool) -> (Status, bool) {
         Ok(info) if info.deleted => (Status::Noop, true),
         Ok(info) => {
             if !commands.is_empty() && !machine::is_checking() {
+                links.moves_last.set(commands.moves());
                 if words.is_some() != jogs {
                     enter(words.is_some());
                 }

@@ -19,6 +19,7 @@ use crate::tasks::turning;
 pub(super) fn value(view: &mut View<'_>, value: Value) -> i32 {
     match value {
         Value::Working => view.has_work().into(),
+        Value::MovesLast => view.links.moves_last.get().into(),
         Value::Running => view.motion().running.into(),
         // Lines that move nothing are finished when all lines before them are.
         Value::FinishedLine if !view.is_busy() => modal(view, Value::BlockLine),
