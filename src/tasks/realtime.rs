@@ -23,9 +23,6 @@ use crate::hal::serial::{GO, MARKS};
 use crate::protocol::Speech;
 use crate::realtime::Asked;
 
-/// A ring with more bytes than this is filling.
-const ROOMY: u8 = 64;
-
 /// Opens the door and shuts it: what moves is held, and waits for a tilde.
 const DOOR: u8 = 0x84;
 /// Stops the spindle in a hold, or lets it turn again.
@@ -35,15 +32,15 @@ const FLOOD: u8 = 0xA0;
 const MIST: u8 = 0xA1;
 const ASKS: u8 = b'?';
 
-/// Takes bytes that act out of a ring, and does what they ask for. Returns how many bytes are to be released. In a
-/// ring that is filling no blanks are left in their place, because the sender does not count these bytes.
+/// Takes bytes that act out of a ring, and does what they ask for. Returns how many bytes are to be released. No blanks
+/// are left in their place, because the sender does not count these bytes.
 #[inline(never)]
 #[small]
 pub fn pick(links: &Links, port: &Port, ring: &mut Window<'_>) -> u8 {
     let mut within = port.lines.borrow().is_within_line();
     let waiting = ring.len();
     // If there is a cut, the slots of the bytes must not change.
-    let mut closes = waiting > ROOMY && port.cut.get().is_none();
+    let mut closes = port.cut.get().is_none();
     let mut n = 0;
     while n < ring.len() {
         let byte = ring.get(n);
