@@ -17,7 +17,8 @@ pub fn named(owner: Owner, token: [u8; 4]) -> Option<Setting> {
 }
 
 /// Returns the steps per millimetre of a motor, in thousandths, if `by` is the travel per turn, scaled as kept. Works
-/// both ways: if `by` is the steps per millimetre, in thousandths, returns the travel per turn.
+/// both ways: if `by` is the steps per millimetre, in thousandths, returns the travel per turn. Returns 0, which no
+/// setting accepts, if the result is out of range.
 #[small]
 pub fn turned(machine: &mut impl Machine, motor: u8, by: i32) -> i32 {
     let mut read = |token| {
@@ -27,5 +28,5 @@ pub fn turned(machine: &mut impl Machine, motor: u8, by: i32) -> i32 {
     let (angle, microsteps) = (read(token("sa")), read(token("mi")));
     let divisor = (u64::from(angle) * u64::from(by.unsigned_abs())).max(1);
     let quotient = (STEPS * u64::from(microsteps) + divisor / 2) / divisor;
-    i32::try_from(quotient).unwrap_or(i32::MAX)
+    i32::try_from(quotient).unwrap_or(0)
 }

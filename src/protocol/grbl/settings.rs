@@ -440,15 +440,30 @@ fn set_axis(what: u8, axis: u8, to: Number, machine: &mut impl Machine) -> Resul
     }
 }
 
-/// Sets the steps per millimetre of an axis, by the travel per turn of each of its motors.
+/// Sets the steps per millimetre of an axis, by the travel per turn of each of its motors. If one of them cannot have
+/// its travel, none is changed.
 #[small]
 fn set_steps(axis: u8, to: Number, machine: &mut impl Machine) -> Result<(), Status> {
     let to = to.fixed(3, false).filter(|to| *to > 0).ok_or(Status::OutOfRange)?;
-    (0..MOTORS as u8).try_for_each(|motor| {
-        if !moves(machine, motor, axis) {
-            return Ok(());
+    for sets in [false, true] {
+        for motor in 0..MOTORS as u8 {
+            if moves(machine, motor, axis) {
+                set_turn(motor, to, sets, machine)?;
+            }
         }
-        let turn = turned(machine, motor, to);
-        put_value(machine, of_motor(motor, token("tr")), turn)
-    })
+    }
+    Ok(())
+}
+
+/// Checks the travel per turn with which a motor has `steps` per millimetre, in thousandths; and `sets` it.
+#[inline(never)]
+#[small]
+fn set_turn(motor: u8, steps: i32, sets: bool, machine: &mut impl Machine) -> Result<(), Status> {
+    let travel = of_motor(motor, token("tr"));
+    let turn = turned(machine, motor, steps);
+    match travel {
+        Some(travel) if !travel.accepts(turn) => Err(Status::OutOfRange),
+        travel if sets => put_value(machine, travel, turn),
+        _ => Ok(()),
+    }
 }
