@@ -226,6 +226,9 @@ pub fn set(number: u8, text: &[u8], machine: &mut impl Machine) -> Result<(), St
         return Err(Status::BelowMinimum);
     }
     if let Some((what, axis)) = split(number) {
+        if axis >= axes(machine) {
+            return Err(Status::UnrecognizedName);
+        }
         return set_axis(what, axis, to, machine);
     }
     let whole = || to.fixed(0, false).ok_or(Status::BadNumber);
@@ -441,10 +444,11 @@ fn set_axis(what: u8, axis: u8, to: Number, machine: &mut impl Machine) -> Resul
 }
 
 /// Sets the steps per millimetre of an axis, by the travel per turn of each of its motors. If one of them cannot have
-/// its travel, none is changed.
+/// its travel, none is changed. An axis without a motor has no steps.
 #[small]
 fn set_steps(axis: u8, to: Number, machine: &mut impl Machine) -> Result<(), Status> {
     let to = to.fixed(3, false).filter(|to| *to > 0).ok_or(Status::OutOfRange)?;
+    motor_of(machine, axis).ok_or(Status::UnrecognizedName)?;
     for sets in [false, true] {
         for motor in 0..MOTORS as u8 {
             if moves(machine, motor, axis) {
