@@ -10,7 +10,6 @@ use super::status::{BAD_JOG, BUSY, LOCKED, TOO_LONG, UNSUPPORTED, error_number};
 use super::write::{fixed, int, line_end, message, text};
 use super::{lists, settings};
 use crate::capability::Capability;
-use crate::config::Fixed;
 use crate::gcode::modal::MotionMode;
 use crate::gcode::tables::{SYSTEMS, TableRow};
 use crate::machine::alarm::is_program_end;
@@ -363,17 +362,11 @@ fn list_setting(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Step 
     if let Some(value) = settings::value(number, machine) {
         out.put(b'$');
         int(out, number.into());
-        equals(value, out);
+        out.put(b'=');
+        fixed(out, value);
+        line_end(out);
     }
     Step::At(at + 1)
-}
-
-/// Ends a line with `=` and a value.
-#[small]
-fn equals(value: Fixed, out: &mut impl Out) {
-    out.put(b'=');
-    fixed(out, value);
-    line_end(out);
 }
 
 /// `$name` reads a setting, `$name=v` sets it.
@@ -388,7 +381,9 @@ fn named(at: u8, line: &[u8], from: u8, machine: &mut impl Machine, out: &mut im
     }
     out.put(b'$');
     out.put_all(name.iter().map(u8::to_ascii_lowercase));
-    equals(settings::value_of(setting, machine), out);
+    out.put(b'=');
+    settings::put_named(setting, machine, out);
+    line_end(out);
     Step::Done
 }
 

@@ -4,15 +4,18 @@
 //! without a setting in Kerf is shown with a fixed value, and accepts only that value.
 
 use super::report::LOWERED;
+use super::write::{bits, fixed, text};
 use crate::boards::MOTORS;
 use crate::capability::Capability;
 use crate::config::name::{Name, token};
+use crate::config::table::Kind;
 use crate::config::{Fixed, Number, Owner, Setting};
 use crate::kinematics;
 use crate::progmem;
 use crate::protocol::steps::{named, turned};
-use crate::protocol::{Machine, Warning};
+use crate::protocol::{Machine, Out, Warning};
 use crate::status::Status;
+use crate::text;
 use crate::units::AXES;
 
 progmem! {
@@ -278,17 +281,40 @@ pub fn by_name(name: &[u8]) -> Option<Setting> {
     Setting::find(&Name::new().with(name)?)
 }
 
-/// Returns the value of a setting, in the unit of TinyG's dialect.
+/// Writes the value of a setting, in the unit of TinyG's dialect and with all its decimals.
+#[inline(never)]
 #[small]
-pub fn value_of(setting: Setting, machine: &mut impl Machine) -> Fixed {
-    Fixed { value: machine.setting(setting), decimals: setting.row().stored }
+pub fn put_named(setting: Setting, machine: &mut impl Machine, out: &mut impl Out) {
+    let (row, value) = (setting.row(), machine.setting(setting));
+    match row.kind {
+        Kind::Text if row.max != 0 => text(out, text!(env!("CARGO_PKG_VERSION"))),
+        Kind::Text => text(out, text!("0000-KERF")),
+        Kind::Data | Kind::Job => bits(out, value),
+        _ => fixed(out, Fixed { value, decimals: row.stored }),
+    }
 }
 
 /// Sets a setting to the value in `text`. [`Status::Again`] as of [`set`].
 #[inline(never)]
 #[small]
 pub fn set_named(setting: Setting, text: &[u8], machine: &mut impl Machine) -> Result<(), Status> {
-    put(machine, Some(setting), parse(text)?)
+    match text {
+        [b'0', b'x' | b'X', digits @ ..] if setting.is_data() => {
+            put_value(machine, Some(setting), hex(digits)?)
+        }
+        _ => put(machine, Some(setting), parse(text)?),
+    }
+}
+
+/// Parses up to eight hexadecimal digits.
+#[small]
+fn hex(digits: &[u8]) -> Result<i32, Status> {
+    if !(1..=8).contains(&digits.len()) {
+        return Err(Status::BadNumber);
+    }
+    let digit = |bits: u32, byte: &u8| Some(bits << 4 | char::from(*byte).to_digit(16)?);
+    let bits = digits.iter().try_fold(0, digit).ok_or(Status::BadNumber)?;
+    Ok(bits.cast_signed())
 }
 
 /// Parses a number. Commas are refused, so that 1,5 is not taken for 15.
