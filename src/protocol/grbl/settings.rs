@@ -393,8 +393,9 @@ fn set_idle(ms: i32, machine: &mut impl Machine) -> Result<(), Status> {
     if ms == ALWAYS {
         return Ok(());
     }
+    let hundredths = ms / 10 + i32::from(ms % 10 >= 5);
     // At least a tenth of a second.
-    put_value(machine, of_system(token("mt")), (ms / 10).max(10))
+    put_value(machine, of_system(token("mt")), hundredths.max(10))
 }
 
 /// Sets a bit in the modes of all switches that are on, or clears it in all.
