@@ -2,7 +2,7 @@
 
 use core::cell::Cell;
 
-use crate::units::{FIRST_ROTARY, Length, PerAxis};
+use crate::units::{Length, PerAxis};
 
 /// The state of a probing move. The discriminants are TinyG's numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -32,7 +32,7 @@ enum News {
 #[derive(Default)]
 pub struct Probe {
     state: Cell<ProbeState>,
-    at: Cell<[Length; FIRST_ROTARY]>,
+    at: Cell<PerAxis<Length>>,
     news: Cell<News>,
 }
 
@@ -42,8 +42,8 @@ impl Probe {
         self.state.get()
     }
 
-    /// Returns where the contact was, or where the move ended without contact, in machine coordinates. `None` for an
-    /// axis that cannot probe.
+    /// Returns where the contact was, or where the move ended without contact, in machine coordinates. Axes that
+    /// cannot probe stood still there.
     pub fn at(&self, axis: u8) -> Option<Length> {
         self.at.get().get(usize::from(axis)).copied()
     }
@@ -55,8 +55,7 @@ impl Probe {
 
     /// Records where the probing move has ended. It is reported when the machine is at rest: [`Self::tell`].
     pub fn found(&self, at: &PerAxis<Length>) {
-        let [x, y, z, ..] = *at;
-        self.at.set([x, y, z]);
+        self.at.set(*at);
     }
 
     /// Records the state at the end of the probing move, and that it has to be reported.

@@ -14,7 +14,7 @@
 //! | [`Port::seen`] | how the machine stood when the report under way first told of motion | 1 | 33 B each port | whoever tells it on the port | the same | overwritten |
 //! | [`Links::restart`] | a reset that is due | 1 | 1 B | parser | parser | overwritten |
 //! | [`Links::changes`] | what the planner has to look at before the next line | a bit each | 1 B | parser, planner | planner | bits merge |
-//! | [`Links::notices`], [`Links::probe`] | what is to be told: an exception, the end of a jog or of a flush, a probing | 1 each | 4 B, 14 B | all | reporter | overwritten: the newest counts, but in an alarm its reason |
+//! | [`Links::notices`], [`Links::probe`] | what is to be told: an exception, the end of a jog or of a flush, a probing | 1 each | 4 B, 26 B | all | reporter | overwritten: the newest counts, but in an alarm its reason |
 //! | [`Links::job`] | the built-in job, and how far it has come | 1 | 4 B | parser | parser, reporter, planner in a flush | a second one is refused |
 //! | [`Links::cleared_by`] | who has ended an alarm last | 1 | 1 B | parser | parser | overwritten |
 //! | [`Links::feeder`] | which port's lines are carried out | 1 | 1 B | parser | all | never: it changes at rest |

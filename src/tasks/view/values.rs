@@ -61,11 +61,7 @@ pub(super) fn value(view: &mut View<'_>, value: Value) -> i32 {
             let is_told = || view.port.number == view.links.told().number;
             i32::from(Speech::HAS_QUESTION && view.links.probe.is_untold() && is_told())
         }
-        // A rotary axis stands still in a probing move.
-        Value::Probed(axis) => {
-            let at = view.links.probe.at(axis);
-            at.unwrap_or_else(|| view.position(usize::from(axis))).0
-        }
+        Value::Probed(axis) => view.links.probe.at(axis).map_or(0, |at| at.0),
         Value::LimitHit => match view.links.notices.limits_hit.get() {
             0 => -1,
             hit => hit.trailing_zeros() as i32,
