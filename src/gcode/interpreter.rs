@@ -254,7 +254,6 @@ impl<T: Tables> Interpreter<T> {
             (Err(_), _) => {
                 before.restore(&mut self.state);
                 self.state.lacks_length = false;
-                self.restore_origin();
                 out.clear();
             }
         }
@@ -302,10 +301,11 @@ impl Before {
 }
 
 /// A copy of those parts of the state that any block may change, except the words of a canned cycle, which `State`
-/// restores itself, and the origin, which is computed again. It is kept small because the deepest stack is reached
-/// while it exists.
+/// restores itself. It is kept small because the deepest stack is reached while it exists. The origin is copied because
+/// the tables do not have what G10 has set in check mode.
 struct RareBefore {
     usual: Before,
+    origin: PerAxis<Length>,
     homed: u8,
     shift: PerAxis<Length>,
     shifted: bool,
@@ -320,13 +320,14 @@ struct RareBefore {
 impl RareBefore {
     fn of(state: &State) -> Self {
         let State { homed, shift, shifted, tool_length, speed, limit, selected, tool, .. } = *state;
-        let usual = Before::of(state);
-        Self { usual, homed, shift, shifted, tool_length, speed, limit, selected, tool }
+        let (usual, origin) = (Before::of(state), state.origin);
+        Self { usual, origin, homed, shift, shifted, tool_length, speed, limit, selected, tool }
     }
 
     #[inline(never)]
     fn restore(&self, state: &mut State) {
         self.usual.restore(state);
+        state.origin = self.origin;
         state.homed = self.homed;
         (state.shift, state.shifted) = (self.shift, self.shifted);
         state.tool_length = self.tool_length;
