@@ -5,7 +5,7 @@
 
 use super::json::{self, Kind, Pair};
 use super::request::{Context, Request};
-use super::token::{Target, resolve};
+use super::token::{Target, Token, resolve};
 use super::write::Writer;
 use crate::config::Name;
 use crate::plain;
@@ -75,13 +75,21 @@ fn reset(name: &Name, pair: &Pair, machine: &mut impl Machine) -> Result<(), Sta
     Ok(())
 }
 
+/// Returns the value of this name. An error says why it cannot be in the report.
+#[inline(never)]
+#[small]
+pub(super) fn reported(name: &[u8]) -> Result<Token, Status> {
+    match resolve(Name::new(), name) {
+        Target::Token(token) if token.is_far() => Err(Status::CannotRead),
+        Target::Token(token) => Ok(token),
+        _ => Err(Status::UnrecognizedName),
+    }
+}
+
 /// Adds a value to the report, or removes it.
 #[small]
 fn change<M: Machine, O>(pair: &Pair, c: &mut Context<'_, M, O>) -> Result<(), Status> {
-    let token = match resolve(Name::new(), pair.name.of(c.line)) {
-        Target::Token(token) if !token.is_far() => token,
-        _ => return Err(Status::UnrecognizedName),
-    };
+    let token = reported(pair.name.of(c.line))?;
     match pair.kind {
         Kind::True if !c.machine.memory().tinyg.add(token) => Err(Status::JsonTooManyPairs),
         Kind::True => Ok(()),

@@ -1,7 +1,7 @@
 //! The pairs of a JSON line: carries them out one by one, and reports the result of each.
 
 use super::Format;
-use super::amend::is_amended;
+use super::amend::{is_amended, reported};
 use super::json::{self, Kind, Pair};
 use super::notice::put_exception;
 use super::request::{Context, Phase, Request};
@@ -152,8 +152,8 @@ impl Request {
             self.status = Status::UnsupportedType;
             return self.leave(c);
         }
-        let Target::Token(token) = resolve(Name::new(), pair.name.of(c.line)) else { return };
-        if pair.kind != Kind::True || token.is_far() {
+        let Ok(token) = reported(pair.name.of(c.line)) else { return };
+        if pair.kind != Kind::True {
             return;
         }
         let report = &mut c.machine.memory().tinyg;
@@ -174,8 +174,9 @@ impl Request {
         }
         self.status = Status::MalformedCommand;
         if let Some(first) = json::pair(c.line, self.item) {
-            self.status = Status::UnrecognizedName;
-            let known = resolve(Name::new(), first.name.of(c.line)) != Target::Unknown;
+            let found = reported(first.name.of(c.line));
+            self.status = found.err().unwrap_or(Status::UnrecognizedName);
+            let known = found != Err(Status::UnrecognizedName);
             self.tell_sent(&first, known, c);
         }
         self.leave(c);
