@@ -34,9 +34,12 @@
 //! wherever it stands, and at once.
 //!
 //! A dropped line still gets its response, because senders count responses: [`Status::Terminated`], or the status of
-//! the alarm if there is one. Nothing here waits, and nothing can be full: everything is kept as states.
+//! the alarm if there is one. Only lines before a reset of their own sender get none ([`Class::Gone`]). Nothing here
+//! waits, and nothing can be full: everything is kept as states.
 
 use super::jog;
+#[cfg(doc)]
+use super::lines::Class;
 use super::lines::LinePool;
 use super::links::Links;
 use super::overrides;
@@ -349,13 +352,13 @@ fn drop_queue(links: &Links) {
 }
 
 /// Whether anything is being carried out. What is held at rest, waits at a program stop or is only checked does not
-/// count.
+/// count, and neither does a built-in job of which nothing is under way.
 #[inline(never)]
 #[small]
 fn is_moving(links: &Links, port: &Port) -> bool {
     let mut view = View::of(links, port);
     let rests = machine::is_stopped() || machine::is_checking() || view.hold() == Hold::Rests;
-    !rests && view.has_work()
+    !rests && view.carries_out()
 }
 
 /// Whether there is anything to hold.

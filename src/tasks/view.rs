@@ -152,7 +152,7 @@ impl<'a> View<'a> {
     }
 
     /// Whether a line is being carried out.
-    fn carries_out(&self) -> bool {
+    pub fn carries_out(&self) -> bool {
         if self.shares || self.seen.get().is_some() {
             return self.seen().carries_out;
         }

@@ -139,8 +139,12 @@ impl Answers for Request {
 
     fn dropped(&mut self) {
         match self.command {
-            Command::Gcode if self.at == 0 && self.block.is_none() => self.at = DROPPED,
-            Command::StoreStartup(_) if self.block.is_none() => self.status = Status::Alarmed,
+            // The line has not run: that is refused by whoever runs it.
+            _ if self.block.is_some() => {}
+            Command::Gcode if self.at == 0 => self.at = DROPPED,
+            Command::StoreStartup(_) if self.at != 0 => self.status = Status::Alarmed,
+            Command::Gcode | Command::Nothing => {}
+            _ if self.at == 0 && !self.begun => *self = Self::refused(Status::Alarmed),
             _ => {}
         }
     }
