@@ -17,7 +17,8 @@ fn booted() -> Machine {
         machine.send_aux(line.as_bytes());
         machine.run_ms(100);
     }
-    (machine.received(), machine.received_aux());
+    machine.received();
+    machine.received_aux();
     machine
 }
 
