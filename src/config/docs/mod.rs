@@ -19,73 +19,84 @@ const PREFACE: &str = "\
 
 <!-- Made from `src/config` by `cargo xtask docs`: change it there. -->
 
-To read and to write:
+Requests, in JSON and in text mode:
 
 | | JSON | Text |
 |---|---|---|
-| one | `{xvm:n}` | `$xvm` |
-| a group | `{x:n}` | `$x` |
-| several | `{xvm:n,x:{fr:n}}` | `$m` motors, `$q` axes, `$$` all |
+| read one setting | `{xvm:n}` | `$xvm` |
+| read a group | `{x:n}` | `$x` |
+| read several | `{xvm:n,x:{fr:n}}` | `$m` motors, `$q` axes, `$$` all |
 | write | `{xvm:1200}` | `$xvm=1200` |
-| restore all of these | `{defa:1}` | `$defa=1` |
+| restore all defaults | `{defa:1}` | `$defa=1` |
 
-A setting is in force when its response comes, and survives a power cut unless it is said below that it does not.
-With G20 lengths are in inches, both ways; those of axes that turn are degrees. What is out of range is refused
-with status 108 (too little), 109 (too much) or 110 (no such choice); what is fixed with 104, what is no number or
-has a fraction where an integer is due with 102, a string with 103, and what has to wait until the machine is at
-rest with 106. `Decimals` are those that are kept; more are rounded, and fewer may be shown.
+A setting takes effect before its response is sent. It survives a power cut, unless its description says otherwise. After G20,
+lengths are read and written in inches; values of rotary axes stay in degrees. A write is refused with one of these statuses:
 
-`{defa:1}` needs the machine at rest, and is answered with status 15, the build and a message. Offsets, stored positions and tools are kept.
+| status | reason |
+|---|---|
+| 102 | not a number, or a fraction where an integer is required |
+| 103 | a string where a number is required |
+| 104 | the setting is fixed |
+| 106 | the setting can be changed only at rest, and the machine moves |
+| 108, 109 | a number below the minimum, above the maximum |
+| 110 | an integer, a driver current or `he1pa` outside its range |
+
+The column `Decimals` gives the number of decimals that are stored. Further decimals are rounded. Responses may show fewer decimals
+than are stored ([backup.md](backup.md#fewer-decimals-than-are-kept)).
+
+`{defa:1}` is accepted only at rest. Its response has status 15, the build and a message. Offsets, stored positions and tools are kept.
 
 ";
 
 const MACHINES: &str = "\
 ## Machines
 
-`{mch:1}` sets all settings of motors and axes, `ja`, `ct` and `gpl` as they are on that machine; all others stay. It is
-refused while anything moves (106). `{mch:n}` says which was chosen last, whatever was set since. An image that
-is built with `--machine NAME` has that machine's values as defaults. They are a beginning: check `tr`, `sa`, `mi` and
-the travel against your machine before you trust them. Wait until `{kept:n}` is 1, which takes 2.4 s or so. A power cut before that may
-leave some as they were: choose again.
+`{mch:1}` sets all settings of motors and axes, `ja`, `ct` and `gpl` to the values of that machine. All other settings stay as they
+are. While anything moves, the request is refused with status 106. `{mch:n}` reads which machine was chosen last, even if settings have been changed
+since. In an image that is built with `--machine NAME`, the values of that machine are the defaults. The values are a starting point: check `tr`,
+`sa`, `mi` and the travel against your machine before you trust them. Storing takes about 2.4 s: wait until `{kept:n}` is 1. After a power cut
+before that, some settings may have their old values: choose the machine again.
 
-After homing an axis stands at the end of its travel: at the lower number if it homes down, at the upper if it homes up. Z homes up, and its
-top is machine zero, on all but the `printer`, where the bed is 0.
+After homing an axis stands at one end of its travel: at `tn` if it homes to the lower switch, at `tm` if it homes to the upper one. On all machines
+but the `printer` Z homes upwards, and machine zero is the top of Z. On the `printer` Z 0 is the bed.
 
 ";
 
 const PLACES: &str = "\
 ## Offsets
 
-Coordinate systems, positions and tools are groups as well; each value is read and set alone (`g54x`) or with others
-(`{g54:{x:1,y:2}}`). Lengths have four decimals, angles too.
+Coordinate systems, stored positions and tools are groups, too. Each value can be read and written alone (`g54x`) or together with
+others (`{g54:{x:1,y:2}}`). Lengths and angles have four decimals.
 
-| Group | Members | What | Set by | Survives a power cut |
+| Group | Members | Meaning | Set by | Survives a power cut |
 |---|---|---|---|---|
-| `g54` to `g59`, `g591` to `g593` | `x` to `c` | origin of a coordinate system, G54 to G59.3 | itself, G10 L2, G10 L20 | yes |
-| `tt1` to `tt10` | `x` `z` | length of a tool | itself, G10 L1, G10 L10 | yes |
+| `g54` to `g59`, `g591` to `g593` | `x` to `c` | origin of a coordinate system, G54 to G59.3 | a write, G10 L2, G10 L20 | yes |
+| `tt1` to `tt10` | `x` `z` | length of a tool | a write, G10 L1, G10 L10 | yes |
 | `g28`, `g30` | `x` to `c` | stored position | G28.1, G30.1 | yes |
-| `g92` | `x` to `c` | offset of G92, in force or not | G92 | no |
+| `g92` | `x` to `c` | offset of G92, active or not | G92 | no |
 
-They are in force when the response comes, those of a tool with the next G43. All are 0 at first. `$o` and `$$` show
-them, but for tools. Those that survive a power cut cannot be in status reports.
+A new value takes effect before its response is sent; that of a tool takes effect with the next G43. All values are 0 at first. `$o` and `$$`
+list all of these groups except the tools. Values that survive a power cut cannot be in status reports.
 
 ## A program of your own
 
-One program of G-code, of up to 794 bytes and lines of up to 48, is kept as well, for example to measure a tool or to
-go to a place:
+Kerf stores one program of G-code, for example to measure a tool or to move to a fixed position. The program has room for 783 bytes, 607 in
+an image that can print. Each line counts with one byte for its end, and may have 48 bytes.
 
 | | JSON | Text |
 |---|---|---|
-| begin a new one | `{prog:f}` | `$prog=f` |
+| begin a new program | `{prog:f}` | `$prog=f` |
 | add a line | `{prog:\"G0 X1\"}` | `$prog=G0 X1` |
-| it is complete | `{prog:t}` | `$prog=t` |
-| show it | `{prog:n}` | `$prog` |
-| carry it out | `{test:100}` | `$test=100` |
-| end that | `{test:0}` | `$test=0` |
+| complete the program | `{prog:t}` | `$prog=t` |
+| show the program | `{prog:n}` | `$prog` |
+| run the program | `{test:100}` | `$test=100` |
+| stop the program | `{test:0}` | `$test=0` |
 
-It is there when `{prog:t}` is answered with status 0; until then there is none, and a power cut leaves none. It
-is written at rest (else 106). 34 means that it has no room. Like a built-in job it ends with M2 or M30, or with its last line, and then, when its motion is done, with an exception report: 8, or at once why a line was
-refused. A line is looked at when it is carried out, not before.
+The program exists once the response to `{prog:t}` has status 0. From `{prog:f}` until then there is no program, and a power cut leaves none.
+A program can be stored only at rest (106). Status 34 means that there is no room for it.
+
+The program ends with M2, M30 or its last line, as a built-in job does. Once its motion is done, an exception report has status 8. If a line is
+refused, the program ends, and an exception report has the reason at once. Lines are not checked when they are stored, only when they are run.
 ";
 
 /// Returns the whole text of `docs/settings.md`.
@@ -93,26 +104,27 @@ pub fn markdown() -> String {
     let groups: [(&str, &str, &[Owner], &[Meaning]); 11 + cfg!(feature = "drivers") as usize] = [
         (
             "The machine",
-            "The group `sys`; names have no prefix.",
+            "The group `sys`. The names have no prefix.",
             &[Owner::System],
             &system::MEANINGS,
         ),
         (
             "Motors",
-            "The groups `1` to `4`: `1tr`, `2tr`. Written at rest only.",
+            "The groups `1` to `4`, one for each motor: `1tr`, `2tr`. These settings can be changed only at rest (106).",
             &[0, 1, 2, 3].map(Owner::Motor),
             &motor::MEANINGS,
         ),
         (
             "Axes",
-            "The groups `x` `y` `z` `a` `b` `c`: `xvm`, `yvm`.",
+            "The groups `x` `y` `z` `a` `b` `c`, one for each axis: `xvm`, `yvm`.",
             &[0, 1, 2, 3, 4, 5].map(Owner::Axis),
             &axis::MEANINGS,
         ),
         (
             "PWM of the spindle",
-            "The group `p1`: `p1frq`. The defaults fit an inverter with a 0 to 10 V input behind a PWM converter: no pulses while \
-the spindle is off, S24000 is 10 V. A spindle of 12,000 RPM wants `{p1:{csh:12000,wsh:12000}}`. A hobby ESC wants \
+            "The group `p1`: `p1frq`. A duty cycle of 1 is always high. Between the two speeds of a direction, the duty cycle changes in proportion to S. \
+The defaults fit an inverter with a 0 to 10 V input behind a PWM converter: there are no pulses while \
+the spindle is off, and S24000 gives 10 V. Example for a spindle of 12,000 RPM: `{p1:{csh:12000,wsh:12000}}`. Example for a hobby ESC: \
 `{p1:{frq:100,csl:1000,csh:2000,cpl:0.125,cph:0.2,wsl:1000,wsh:2000,wpl:0.125,wph:0.2,pof:0.1}}`.",
             &[Owner::Pwm],
             &pwm::MEANINGS,
@@ -121,38 +133,38 @@ the spindle is off, S24000 is 10 V. A spindle of 12,000 RPM wants `{p1:{csh:1200
         ("Coolant", "The group `co`: `coph`.", &[Owner::Coolant], &coolant::MEANINGS),
         (
             "Squaring",
-            "The group `sq`: `sqsw`. Homing squares an axis whose two motors have a switch each.",
+            "The group `sq`: `sqsw`. If the two motors of an axis have a homing switch each, homing squares the axis.",
             &[Owner::Squaring],
             &squaring::MEANINGS,
         ),
         (
             "Hot end",
-            "The group `he1`: `he1p`. Of images that can print.",
+            "The group `he1`: `he1p`. Only images that can print have it.",
             &[Owner::HotEnd],
             &hot_end::MEANINGS,
         ),
         (
             "Bed",
-            "The group `he3`: `he3p`. Of images that can print.",
+            "The group `he3`: `he3p`. Only images that can print have it.",
             &[Owner::Bed],
             &bed::MEANINGS,
         ),
         #[cfg(feature = "drivers")]
         (
             "Drivers",
-            "The group `dr`: `drr1`. Of images for boards whose drivers are told by UART ([rp2040.md](rp2040.md#skr-pico)).",
+            "The group `dr`: `drr1`. Only images for boards that configure their drivers by UART have it ([rp2040.md](rp2040.md#skr-pico)).",
             &[Owner::Drivers],
             &driver::MEANINGS,
         ),
         (
             "User data",
-            "The groups `uda` `udb` `udc` `udd`: `uda0`, `udd3`. For a sender's own use: `{uda0:\"0x2a\"}`, `$uda0=0x2a`.",
+            "The groups `uda` `udb` `udc` `udd`: `uda0`, `udd3`. A sender may store any data here: `{uda0:\"0x2a\"}`, `$uda0=0x2a`. Kerf does not use it.",
             &[0, 1, 2, 3].map(Owner::User),
             &user::MEANINGS,
         ),
         (
             "Job",
-            "The group `jid`: `jida`. Who runs what, for senders, in the same form; 0 after a reset.",
+            "The group `jid`: `jida`. A sender may store here which job it runs: `{jida:\"0x2a\"}`, `$jida=0x2a`. The values are 0 after a reset.",
             &[Owner::Job],
             &job::MEANINGS,
         ),
@@ -172,7 +184,7 @@ the spindle is off, S24000 is 10 V. A spindle of 12,000 RPM wants `{p1:{csh:1200
 /// Returns the table of machines with their most characteristic settings.
 fn machine_table() -> String {
     let mut text =
-        "| `mch` | Name | What | Motors 1 to 4 move | `tr` | `vm` | `ac` | `jm` | Travel |\n"
+        "| `mch` | Name | Machine | Motors 1 to 4 move | `tr` | `vm` | `ac` | `jm` | Travel |\n"
             .to_string();
     text += "|---|---|---|---|---|---|---|---|---|\n";
     for (n, machine) in (0..).zip(machines::ALL) {
@@ -280,10 +292,10 @@ fn choices(words: &Words) -> String {
 fn remarks(row: &SettingRow) -> String {
     let mut text = String::new();
     for (flag, remark) in [
-        (CLAMP, "Out of range is the nearest that is not."),
-        (IDLE, "Written at rest only."),
+        (CLAMP, "A value out of range becomes the nearest limit."),
+        (IDLE, "Can be changed only at rest."),
         (HOMING, "X Y Z A only."),
-        (RADIUS, "A B C only; a length."),
+        (RADIUS, "A B C only. The value is a length, not an angle."),
     ] {
         if row.is(flag) {
             text += &format!(" {remark}");

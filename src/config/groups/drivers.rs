@@ -7,48 +7,48 @@ group! {
     driver: i32, PLAIN => {
         R1 "r1": current(), 580,
             words(text!("run current m1"), AMPERES),
-            "Current of motor 1 in motion, RMS.";
+            "Run current of motor 1 (RMS). The driver uses the nearest of 32 levels.";
         R2 "r2": current(), 580,
             words(text!("run current m2"), AMPERES),
-            "Current of motor 2 in motion.";
+            "Run current of motor 2 (RMS). The driver uses the nearest of 32 levels.";
         R3 "r3": current(), 580,
             words(text!("run current m3"), AMPERES),
-            "Current of motor 3 in motion.";
+            "Run current of motor 3 (RMS). The driver uses the nearest of 32 levels.";
         R4 "r4": current(), 580,
             words(text!("run current m4"), AMPERES),
-            "Current of motor 4 in motion.";
+            "Run current of motor 4 (RMS). The driver uses the nearest of 32 levels.";
         H1 "h1": current(), 310,
             words(text!("hold current m1"), AMPERES),
-            "Current of motor 1 at standstill, RMS.";
+            "Hold current of motor 1 at standstill (RMS). The driver uses the nearest of 32 levels.";
         H2 "h2": current(), 310,
             words(text!("hold current m2"), AMPERES),
-            "Current of motor 2 at standstill.";
+            "Hold current of motor 2 at standstill (RMS). The driver uses the nearest of 32 levels.";
         H3 "h3": current(), 310,
             words(text!("hold current m3"), AMPERES),
-            "Current of motor 3 at standstill.";
+            "Hold current of motor 3 at standstill (RMS). The driver uses the nearest of 32 levels.";
         H4 "h4": current(), 310,
             words(text!("hold current m4"), AMPERES),
-            "Current of motor 4 at standstill.";
+            "Hold current of motor 4 at standstill (RMS). The driver uses the nearest of 32 levels.";
         C1 "c1": choice().with(IDLE), 1,
             words(text!("stealthchop m1"), OFF_ON),
-            "Chopper of motor 1: 1 stealthChop, which is quiet; 0 spreadCycle.";
+            "Chopper mode of motor 1: on is stealthChop, which is quiet; off is spreadCycle.";
         C2 "c2": choice().with(IDLE), 1,
             words(text!("stealthchop m2"), OFF_ON),
-            "Chopper of motor 2.";
+            "Chopper mode of motor 2: on is stealthChop, which is quiet; off is spreadCycle.";
         C3 "c3": choice().with(IDLE), 1,
             words(text!("stealthchop m3"), OFF_ON),
-            "Chopper of motor 3.";
+            "Chopper mode of motor 3: on is stealthChop, which is quiet; off is spreadCycle.";
         C4 "c4": choice().with(IDLE), 1,
             words(text!("stealthchop m4"), OFF_ON),
-            "Chopper of motor 4.";
+            "Chopper mode of motor 4: on is stealthChop, which is quiet; off is spreadCycle.";
         S1 "s1": whole(cold(0), 255).with(IDLE), 0,
             words(text!("stall threshold m1"), NONE),
-            "Sensitivity of motor 1 to a stall, by which X [homes without a switch](rp2040.md#homing-by-a-stall); 0 is off.";
+            "Stall threshold of motor 1 for [homing X by a stall](rp2040.md#homing-by-a-stall). A higher value detects a stall sooner. 0: off.";
         S2 "s2": whole(cold(0), 255).with(IDLE), 0,
             words(text!("stall threshold m2"), NONE),
-            "Sensitivity of motor 2, by which Y homes.";
+            "Stall threshold of motor 2 for [homing Y by a stall](rp2040.md#homing-by-a-stall). A higher value detects a stall sooner. 0: off.";
         S3 "s3": whole(cold(0), 255).with(IDLE), 0,
             words(text!("stall threshold m3"), NONE),
-            "Sensitivity of motor 3, by which Z homes.";
+            "Stall threshold of motor 3 for [homing Z by a stall](rp2040.md#homing-by-a-stall). A higher value detects a stall sooner. 0: off.";
     }
 }

@@ -7,123 +7,123 @@ group! {
     system: i32, CAREFUL.system => {
         FB "fb": constant(2), 44_020,
             bare(text!("firmware build")),
-            "Build that the protocol is compatible with.";
+            "Build number of the firmware whose protocol Kerf speaks.";
         FV "fv": constant(3), 970,
             bare(text!("firmware version")).with_decimals(2),
-            "Version that the protocol is compatible with.";
+            "Version number of the firmware whose protocol Kerf speaks.";
         HP "hp": constant(0), 1,
             bare(text!("hardware platform")).with_decimals(2),
-            "Kind of hardware.";
+            "Hardware platform number.";
         HV "hv": constant(0), 8,
             bare(text!("hardware version")).with_decimals(2),
-            "Revision of the hardware.";
+            "Hardware version number.";
         ID "id": fixed_text(false), 0,
             bare(text!("TinyG ID")),
-            "Name of the board.";
+            "Board ID.";
         JA "ja": fixed(2, 0, POSITIVE).with(UNIT), 10_000_000,
             length(text!("junction acceleration"), NONE),
-            "Acceleration towards the centre of a corner; more makes corners faster.";
+            "Junction acceleration: maximum centripetal acceleration in a corner. A larger value makes corners faster.";
         CT "ct": fixed(6, 4, 1_000).with(UNIT), 10_000,
             length(text!("chordal tolerance"), NONE),
-            "How far the chords of an arc may leave it.";
+            "Chordal tolerance: maximum distance between an arc and the chords that approximate it.";
         SL "sl": int(0, 1), 0,
             bare(text!("soft limit enable")),
-            "Moves of homed axes beyond `tn` and `tm` are refused (220).";
+            "Soft limits. 1: a move of a homed axis beyond `tn` or `tm` is refused with status 220. 0: no soft limits.";
         ST "st": int(0, 1), 0,
             words(text!("switch type"), text!(" [0=NO,1=NC]")),
-            "Type of all limit and homing switches. The probe is always normally open.";
+            "Type of all limit and homing switches: normally open (NO) or normally closed (NC). The probe is always normally open.";
         MT "mt": up_to(fixed(2, 2, 10), 429_496_700).with(CLAMP), 200,
             words(text!("motor idle timeout"), text!(" Sec")),
-            "Seconds after the last move until motors with `pm` 2 lose power.";
+            "Motor idle timeout: time from the last move until motors with `pm` 2 or 3 lose power. Time in a feedhold does not count.";
         EJ "ej": int(0, 2), 1,
             words(text!("enable json mode"), text!(" [0=text,1=JSON]")),
-            "Mode at power-up; afterwards each answer has the mode of the line. With `dia` 1, 2 gives plain text answers.";
+            "Text mode or JSON mode at power-up. After that, G-code is answered in the mode of the last line that began with `{`, `$`, `?` or `h`. 2 has an effect only with `dia` 1: lines in text mode are answered as plain text, not as JSON with `txt`.";
         JV "jv": int(0, 5), 3,
             words(text!("json verbosity"), text!(" [0=silent,1=footer,2=messages,3=configs,4=linenum,5=verbose]")),
-            "How much JSON responses contain; each level adds to the one below.";
+            "JSON verbosity: what JSON responses contain. Each level adds to the level below it.";
         JS "js": int(0, 1), 1,
             words(text!("json serialize style"), text!(" [0=relaxed,1=strict]")),
-            "Whether keys are quoted.";
+            "JSON syntax of what Kerf sends: strict puts keys in quotes, relaxed does not.";
         TV "tv": int(0, 1), 1,
             words(text!("text verbosity"), text!(" [0=silent,1=verbose]")),
-            "Whether lines are answered with a prompt in text mode.";
+            "Text verbosity: whether a prompt answers each line in text mode.";
         QV "qv": int(0, 3), 0,
             words(text!("queue report verbosity"), text!(" [0=off,1=single,2=triple]")),
-            "Queue reports: none, free blocks, or also those added and removed (3 is 2).";
+            "Queue reports. Single has the number of free blocks. Triple also has the numbers of blocks added and removed. 3 acts as 2.";
         SV "sv": int(0, 2), 1,
             words(text!("status report verbosity"), text!(" [0=off,1=filtered,2=verbose]")),
-            "Status reports: none, what has changed, or all of it.";
+            "Automatic status reports. Filtered has only the values that have changed. Verbose has all values.";
         SI "si": up_to(fixed(0, 0, 100), 65_535).with(CLAMP), 500,
             words(text!("status interval"), text!(" ms")),
-            "Time between status reports.";
+            "Minimum time between automatic status reports. A change of the machine state is reported at once.";
         EC "ec": int(0, 1), 0,
             words(text!("expand LF to CRLF on TX"), OFF_ON),
-            "Whether lines end in LF CR.";
+            "Line end in what Kerf sends: LF if off, LF CR if on.";
         EE "ee": int(0, 1), 0,
             words(text!("enable echo"), OFF_ON),
-            "Whether each line is sent back before it is answered, as a line of its own.";
+            "Echo. 1: each received line is sent back as a line of its own, before its response.";
         EX "ex": int(0, if ACTIVE.has_handshake() { 2 } else { 1 }), 1,
             words(text!("enable flow control"), text!(" [0=off,1=XON/XOFF,2=RTS/CTS]")),
-            "Flow control, in both directions. 2 needs a board with the pins.";
+            "Flow control, in both directions. 2 needs a board with RTS and CTS pins.";
         RXM "rxm": int(0, 1), 1,
             words(text!("serial RX mode"), text!(" [0=char_mode,1=line_mode]")),
-            "How the sender paces itself: by lines (4 may be unanswered) or by characters (254).";
+            "What the sender counts to limit unanswered input. line_mode: at most 4 lines. char_mode: at most 254 characters (62 on the second port).";
         BAUD "baud": up_to(fixed(0, 0, 1), 1_000_000).with(RANGE), 5,
             words(text!("USB baud rate"), text!(" [1=9600,2=19200,3=38400,4=57600,5=115200,6=230400]")),
-            "Rate of the USB line: a code, or bits a second from 9600 to 1000000; above 500000 lines may be refused by 13 while motors move. In force when the response has left; 115200 after a reset.";
+            "Baud rate of the USB serial port: a code from 1 to 6, or the rate from 9600 to 1000000. The new rate applies once the response has been sent. After a reset the rate is 115200. Above 500000, lines may be refused with status 13 while motors move.";
         NET "net": constant(0), 0,
             words(text!("network mode"), text!(" [0=master]")),
-            "Network of boards: there is none.";
+            "Network mode. Kerf does not support a network of boards; the value is always 0.";
         GPL "gpl": int(0, 2), 0,
             words(text!("default gcode plane"), text!(" [0=G17,1=G18,2=G19]")),
-            "Plane at power-up and after M2.";
+            "Plane at power-up and after M2 or M30.";
         GUN "gun": int(0, 1), 1,
             words(text!("default gcode units mode"), text!(" [0=G20,1=G21]")),
-            "Units at power-up and after M2.";
+            "Units at power-up and after M2 or M30.";
         GCO "gco": int(1, 9), 1,
             words(text!("default gcode coord system"), text!(" [1-9 (G54-G59.3)]")),
-            "Coordinate system at power-up and after M2.";
+            "Coordinate system at power-up and after M2 or M30: 1 is G54, 6 is G59, 9 is G59.3.";
         GPA "gpa": int(0, 2), 2,
             words(text!("default gcode path control"), text!(" [0=G61,1=G61.1,2=G64]")),
-            "Path mode at power-up and after M2.";
+            "Path control mode at power-up and after M2 or M30.";
         GDI "gdi": int(0, 1), 0,
             words(text!("default gcode distance mode"), text!(" [0=G90,1=G91]")),
-            "Distance mode at power-up and after M2.";
+            "Distance mode at power-up and after M2 or M30.";
         BD "bd": int(0, 1), 1,
             words(text!("block delete"), OFF_ON),
-            "Lines that begin with a slash are passed over.";
+            "Block delete. 1: lines that begin with `/` are skipped.";
         OST "ost": int(0, 1), 1,
             words(text!("optional stop"), OFF_ON),
-            "M1 stops.";
+            "Optional stop. 1: M1 stops the program. 0: M1 has no effect.";
         PSW "psw": int(0, 1), 1,
             words(text!("program stop waits"), OFF_ON),
-            "M0, M1, M6, M60 and G88 wait for `~`, and an exception (38) says so. Senders that see to stops and tools themselves want 0.";
+            "Program stop. 1: M0, M1, M6, M60 and G88 wait for `~`, and exception 38 reports the wait. 0: they do not wait. Use 0 if the sender handles stops and tool changes itself.";
         PBO "pbo": int(0, 1), 1,
             words(text!("probe backs off"), OFF_ON),
-            "Whether a probe goes back to the contact. With 0 the machine stays where it came to rest, beyond the contact.";
+            "Probe back-off. 1: after a contact the axes return to the contact point. 0: they stay where they have stopped, beyond the contact point.";
         DIA "dia": int(0, if cfg!(feature = "dialect-reprap") { 63 } else { 15 }), ACTIVE.dialect as i32,
             words(text!("protocol dialect"), text!(" [0=auto,1=g2core,2=TinyG,3=grbl]")),
-            "Whom the sender takes the machine for. With 0 a port speaks TinyG's dialect, or grbl's if the first that is said there in one alone is grbl's. 2 and 3 are one alone, from the next reset on. The second port is as the first, or by itself with 4 more (as 0), 8 more (as 2) or 12 more (as 3): 11 is grbl on the first and TinyG on the second. 16 more is RepRap's on the first, 32 more on the second, in images that have it. As a g2core it ends responses with `[1,status,length]` and has that one's `fb`, `fv`, `hp`, `hv`, prompts, and some status codes and texts.";
+            "Protocol dialects, as a sum. First port: 0 lets the first lines decide, 1 is g2core's, 2 is TinyG's, 3 is grbl's, 16 is RepRap's. Second port: 0 is as the first port, 4 lets the first lines decide, 8 is TinyG's, 12 is grbl's, 32 is RepRap's. Example: 11 is grbl's on the first port and TinyG's on the second. Where the first lines decide, the port starts in TinyG's dialect. The first line that only one dialect has selects that dialect. g2core's is TinyG's dialect with responses that end with `[1,status,length]`, and with `fb`, `fv`, `hp`, `hv`, prompts, some status codes and some texts of g2core. RepRap's needs an image that has it. A change to 2, 3, 16 or 32 takes effect at the next reset.";
         GRM "grm": int(0, 63), 1,
             bare(text!("grbl report mask")),
-            "What grbl's reports have: 1 machine position (else work position), 2 free blocks and bytes; 4 inches. Its senders know the first two bits as number 10, the third as 13. 8 holds the machine behind a line of G-code that is refused, until `~` or a reset. 16 has reports tell in a thread how far the axes are ahead of the spindle (`Se`), and 32 has each index pulse tell it, in TinyG's dialect too (`spf`): 4 and 8 of number 10.";
+            "Contents of reports in grbl's dialect, a sum. 1: machine position instead of work position. 2: free blocks and bytes. 4: inches instead of millimetres. 8: after a refused line of G-code the machine holds until `~` or a reset. 16: in a thread, status reports have `Se`, the distance by which the axes are ahead of the spindle. 32: each index pulse in a thread reports that distance, in TinyG's dialect as `spf`. grbl's setting number 10 has the values 1, 2, 16 and 32 as 1, 2, 4 and 8. Its setting number 13 has the value 4 as 1.";
         SPW "spw": int(SHORTEST_PULSE_US, 10).with(IDLE), 2,
             words(text!("step pulse width"), text!(" us")),
-            "How long a step pulse lasts. Longer pulses may lower `vm` and `fr`. On boards with an RP2040 0 is half a microsecond.";
+            "Step pulse width. A wider pulse may lower `vm` and `fr`. Boards with an RP2040 also take 0, which is 0.5 us.";
         DSU "dsu": int(0, 100).with(IDLE), 1,
             words(text!("direction setup time"), text!(" us")),
-            "How long a direction pin stands before a step.";
+            "Direction setup time: minimum time between a change of a direction pin and the next step pulse.";
         SAF "saf": int(0, 2), 0,
             words(text!("safety door"), text!(" [0=off,1=NO,2=NC]")),
-            "Door switch: none, one that closes when the door is opened, or one that opens. An open door holds the machine; `~` resumes when it is shut.";
+            "Safety door switch. NO closes when the door opens, NC opens when the door opens. An open door causes a feedhold. `~` resumes once the door is shut.";
         EST "est": int(0, 2), 0,
             words(text!("emergency stop"), text!(" [0=off,1=NO,2=NC]")),
-            "Emergency stop: none, one that closes when it is hit, or one that opens, as a broken wire does. It shuts the machine down: no step more, spindle and coolant off, motors keep their power until `mt` is over.";
+            "Emergency stop switch. NO closes when it is pressed. NC opens when it is pressed or when a wire breaks. A pressed switch shuts the machine down: no further step, spindle and coolant off. The motors keep their power until `mt` has passed.";
         MCH "mch": int(0, machines::COUNT as i32 - 1).with(IDLE), 0,
             words(text!("machine"), text!(" [0=careful,1=router,2=mill,3=printer,4=lathe]")),
-            "MachineProfile that was chosen last. Choosing one sets all settings of motors and axes, `ja`, `ct` and `gpl` to what they are on that machine: see Machines.";
+            "Machine profile that was chosen last. Writing it sets all settings of motors and axes, `ja`, `ct` and `gpl` to the values of that machine: see Machines.";
         KERF "kerf": fixed_text(true), 0,
             bare(text!("Kerf version")),
-            "Version of Kerf, which the greeting tells, too. `fb` and `fv` are the protocol's.";
+            "Version of Kerf, which the start-up message has, too. `fb` and `fv` describe the protocol instead.";
     }
 }

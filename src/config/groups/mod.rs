@@ -5,7 +5,7 @@
 //! ```text
 //! SL "sl": int(0, 1), 0,
 //!     bare(text!("soft limit enable")),
-//!     "Moves of homed axes beyond `tn` and `tm` are refused (220).";
+//!     "Soft limits. 1: a move of a homed axis beyond `tn` or `tm` is refused with status 220. 0: no soft limits.";
 //! ```
 //!
 //! When Kerf is built, the setting's place in RAM, the tables in program memory and the table in `docs/settings.md`

@@ -7,16 +7,16 @@ group! {
     user: i32, PLAIN => {
         D0 "0": bits(Kind::Data), 0,
             bare(USER_DATA),
-            "First of the group.";
+            "First value of the group.";
         D1 "1": bits(Kind::Data), 0,
             bare(USER_DATA),
-            "Second of the group.";
+            "Second value of the group.";
         D2 "2": bits(Kind::Data), 0,
             bare(USER_DATA),
-            "Third of the group.";
+            "Third value of the group.";
         D3 "3": bits(Kind::Data), 0,
             bare(USER_DATA),
-            "Fourth of the group.";
+            "Fourth value of the group.";
     }
 }
 
@@ -25,15 +25,15 @@ group! {
     job: i32, PLAIN => {
         A "a": bits(Kind::Job), 0,
             bare(JOB_ID),
-            "First part.";
+            "First value of the job ID.";
         B "b": bits(Kind::Job), 0,
             bare(JOB_ID),
-            "Second part.";
+            "Second value of the job ID.";
         C "c": bits(Kind::Job), 0,
             bare(JOB_ID),
-            "Third part.";
+            "Third value of the job ID.";
         D "d": bits(Kind::Job), 0,
             bare(JOB_ID),
-            "Fourth part.";
+            "Fourth value of the job ID.";
     }
 }
