@@ -1,12 +1,13 @@
 //! From temperatures to power: PID with its integral held in bounds, or on and off with a hysteresis.
 //!
-//! Stepped five times a second. Temperatures are in 1/64 degree, power is 255 for all there is. Beyond [`RANGE`] of what is wanted the
-//! power is all or nothing; within it
+//! Stepped five times a second. Temperatures are in 1/64 degree. Full power is 255. Farther than [`RANGE`] from the
+//! target the power is full or 0; within it
 //!
 //! `power = p * error + sum of i * error * time - d * change in a second + f * fan`
 //!
-//! with the integral growing only while the power is within its bounds, or where it leads back there. With `p` 0 the heater is on below
-//! what is wanted by the hysteresis, and off above it. Cost of a step: 2,500 cycles.
+//! with the integral growing only while the power is within its bounds, or where it leads back there. With `p` 0 the
+//! heater is switched on half the hysteresis below the target, and off half the hysteresis above it. Cost of a step:
+//! 2,500 cycles.
 
 use super::sensor::UNIT;
 
