@@ -94,3 +94,136 @@ fn the_end_of_a_program_that_is_cut_short_is_refused() {
         assert_eq!(answers(&machine.received()), ["ok", "ok"]);
     });
 }
+
+#[test]
+fn a_full_pool_behind_a_reset_is_answered_in_an_alarm_of_the_other_port() {
+    for_all_delays(|machine, delay| {
+        machine.send(b"g1 x20 f3000\n");
+        machine.run_ms(300);
+        machine.received();
+        machine.send(&[b"\x18".as_slice(), &b"T1\n".repeat(60)].concat());
+        machine.run_ms(delay);
+        // The other port's sender speaks TinyG's dialect from now on.
+        machine.send_aux(b"\x04");
+        machine.run_ms(1_000);
+        assert_eq!(answers(&machine.received()).len(), 60);
+        machine.send(b"?");
+        machine.run_ms(50);
+        assert!(machine.received().starts_with(b"<Alarm|"));
+    });
+}
+
+#[test]
+fn a_kill_behind_a_reset_leaves_no_port_without_a_greeting() {
+    for_all_delays(|machine, delay| {
+        machine.send(b"g1 x20 f3000\n");
+        machine.run_ms(300);
+        machine.received();
+        machine.send(&[b"\x18".as_slice(), &b"T1\n".repeat(60)].concat());
+        machine.run_ms(delay);
+        machine.send(b"\x04");
+        machine.run_ms(1_000);
+        assert!(String::from_utf8_lossy(&machine.received()).contains("Grbl 1.1h"));
+        machine.send(b"$X\n");
+        machine.run_ms(50);
+        assert_eq!(answers(&machine.received()), ["ok"]);
+    });
+}
+
+#[test]
+fn a_report_is_told_to_its_end_when_its_line_is_dropped() {
+    for_all_delays(|machine, delay| {
+        machine.send(b"g4 p1\n$#\n");
+        machine.run_ms(100);
+        machine.send(b"?");
+        machine.run_ms(delay % 40);
+        machine.send_aux(b"\x18");
+        machine.run_ms(1_000);
+        let heard = String::from_utf8(machine.received()).unwrap();
+        let report = heard.lines().find(|line| line.starts_with('<')).expect("a report");
+        assert!(report.ends_with('>'), "{heard}");
+        assert_eq!(answers(heard.as_bytes()).len(), 2);
+    });
+}
+
+#[test]
+fn two_resets_at_rest_are_no_alarm() {
+    for_all_delays(|machine, delay| {
+        machine.send(b"\x18");
+        machine.run_ms(delay);
+        machine.send(b"\x18");
+        machine.run_ms(500);
+        let heard = String::from_utf8(machine.received()).unwrap();
+        assert!(heard.contains("Grbl 1.1h") && !heard.contains("ALARM"), "{heard}");
+        machine.send(b"g0 x1\n");
+        machine.run_ms(500);
+        assert_eq!(answers(&machine.received()), ["ok"]);
+    });
+}
+
+#[test]
+fn a_jog_that_is_cancelled_is_no_alarm_though_a_greeting_waits() {
+    for_all_delays(|machine, delay| {
+        machine.send_aux(b"{ex:2}\n$ex=2\n");
+        machine.send(b"$ex=2\n");
+        machine.run_ms(300);
+        machine.set_aux_cts(true);
+        machine.send_aux(b"$$\n$$\n");
+        machine.run_ms(300);
+        machine.send(b"g1 x20 f600\n");
+        machine.run_ms(300);
+        machine.send_aux(b"\x18");
+        machine.run_ms(300);
+        machine.send(b"$X\n");
+        machine.run_ms(300);
+        machine.send(b"$J=X12F500\n");
+        machine.run_ms(300 + delay);
+        machine.send(b"\x85");
+        machine.run_ms(500);
+        machine.received();
+        machine.send(b"?");
+        machine.run_ms(50);
+        assert!(machine.received().starts_with(b"<Idle|"));
+    });
+}
+
+#[test]
+fn a_start_up_line_that_stops_keeps_nobody_from_a_reset() {
+    for_all_delays(|machine, delay| {
+        machine.send(b"$N0=M0\n$N1=G20\n");
+        machine.run_ms(300);
+        machine.send(b"~");
+        machine.run_ms(300);
+        machine.send(b"$N1=G20\n\x18");
+        machine.run_ms(200);
+        machine.send(b"g0 x1\n$G\n");
+        machine.run_ms(delay);
+        machine.received();
+        machine.send(b"\x18");
+        machine.send_aux(b"\x18");
+        machine.run_ms(500);
+        assert!(String::from_utf8_lossy(&machine.received()).contains("Grbl 1.1h"));
+        machine.send(b"?");
+        machine.run_ms(50);
+        assert!(machine.received().starts_with(b"<"));
+    });
+}
+
+#[test]
+fn questions_behind_a_percent_sign_take_no_room() {
+    let machine = booted();
+    machine.send(b"m0\n");
+    machine.run_ms(50);
+    machine.send(&[&b"T1\n".repeat(20), b"%\n".as_slice()].concat());
+    machine.run_ms(50);
+    machine.received();
+    for _ in 0..300 {
+        machine.send(b"?");
+        machine.run_ms(40);
+        assert!(machine.received().starts_with(b"<"));
+    }
+    machine.send(b"~");
+    machine.run_ms(500);
+    let heard = answers(&machine.received());
+    assert!(heard.iter().all(|answer| answer == "ok") && heard.len() == 21, "{heard:?}");
+}

@@ -94,6 +94,8 @@ pub enum Value {
     SlotsFree,
     /// Free bytes of the receive ring buffer.
     BytesFree,
+    /// How many bytes the sender may have in flight when none wait.
+    BytesInAll,
     /// Position in machine coordinates, in units of a `Length`.
     MachinePosition(u8),
     /// Position in work coordinates, in units of a `Length`.

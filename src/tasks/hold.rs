@@ -73,9 +73,7 @@ pub fn abandon(links: &Links) {
             // A probing that has failed has begun the alarm itself: its line is answered when the result has been told.
             let probed = port.speech.get().is_in_order() && links.probe.is_news();
             lines.terminate_from(probed.into(), dropped());
-            if !port.is_resetting() {
-                cut_up_to(port, &mut lines, uart::newest(port.number));
-            }
+            cut_up_to(port, &mut lines, uart::newest(port.number));
         }
     }
     drop_queue(links);
@@ -99,12 +97,28 @@ pub fn refuse_older(links: &Links, pool: &mut LinePool) {
     }
 }
 
-/// Cuts the stream of a port: behind `slot` of its receive ring, or, if that is `None`, where the reader is.
+/// Cuts the stream of a port: behind `slot` of its receive ring, or, if that is `None`, where the reader is. Does
+/// nothing on a port with a reset of its own: the greeting waits for the cut where that reset stands, and what is
+/// behind that cut may have no room before the greeting.
 fn cut_up_to(port: &Port, lines: &mut LinePool, slot: Option<u8>) {
+    if !port.is_resetting() {
+        cut_here(port, lines, slot);
+    }
+}
+
+/// Cuts the stream of a port as [`cut_up_to`] does, on any port.
+fn cut_here(port: &Port, lines: &mut LinePool, slot: Option<u8>) {
     match slot {
         Some(_) => port.cut.set(slot),
         None if port.cut.get().is_none() => lines.terminate_partial(dropped()),
         None => {}
+    }
+}
+
+/// Cuts the stream of a port behind a slot of its receive ring, unless the port has a reset of its own.
+pub fn cut_looked(port: &Port, slot: Option<u8>) {
+    if slot.is_some() && !port.is_resetting() {
+        port.cut.set(slot);
     }
 }
 
@@ -185,7 +199,8 @@ fn act(links: &Links, port: &Port, characters: u8) {
     }
     if characters & RESET != 0 {
         if starts_over(links, port) {
-            let works = is_moving(links, port);
+            // The end of the program, which an earlier reset has queued, is no motion.
+            let works = !links.is_resetting() && is_moving(links, port);
             return start_over(links, port, uart::last_cut(port.number), works);
         }
         reset();
@@ -285,7 +300,10 @@ pub fn flush_here() {
 #[inline(always)]
 pub fn here(links: &Links) {
     if machine::is_to_cut() {
-        cut(links, links.port(USB), uart::newest(USB), machine::Event::Cut);
+        // Nothing is cut a second time on a port with a reset of its own.
+        let port = links.ports.iter().find(|port| !port.is_resetting());
+        let port = port.unwrap_or(links.port(USB));
+        cut(links, port, uart::newest(port.number), machine::Event::Cut);
     }
 }
 
@@ -297,12 +315,16 @@ fn cut(links: &Links, port: &Port, slot: Option<u8>, event: machine::Event) {
     machine::take(event);
     links.signs.percent.set(false);
     for each in &links.ports {
-        let slot = if each.number == port.number { slot } else { uart::newest(each.number) };
         let mut lines = each.lines.borrow_mut();
+        let is_own = each.number == port.number;
+        if is_own && each.is_resetting() {
+            // What waits for the greeting would keep the reader from the cut.
+            lines.drop_unanswered();
+        }
         lines.terminate(dropped());
-        // On a port with a reset of its own, the cut is where that reset stands.
-        if each.number == port.number || !each.is_resetting() {
-            cut_up_to(each, &mut lines, slot);
+        match is_own {
+            true => cut_here(each, &mut lines, slot),
+            false => cut_up_to(each, &mut lines, uart::newest(each.number)),
         }
     }
     drop_queue(links);

@@ -581,7 +581,8 @@ impl LinePool {
     }
 
     /// Returns the line to process next. Data lines, and faults, which keep their place among them, are returned only
-    /// if `data` is wanted. Where lines keep their order, a line that asks or sets something is returned in any case.
+    /// if `data` is wanted. Where lines keep their order, a line that asks or sets something is returned in any case, and
+    /// so is a line that is never answered.
     pub fn next(&self, data: bool) -> Option<(LineId, Class)> {
         let index = match self.controls {
             0 if !data && !self.is_command() => return None,
@@ -591,11 +592,14 @@ impl LinePool {
         self.entries.get(index).map(|e| (LineId(index as u8), e.class))
     }
 
-    /// Whether lines keep their order, and the oldest begins with a dollar sign and is no jog. Such a line waits for
-    /// no motion.
+    /// Whether lines keep their order, and the oldest begins with a dollar sign and is no jog, or is never answered.
+    /// Such a line waits for no motion.
     fn is_command(&self) -> bool {
         if !self.in_order {
             return false;
+        }
+        if self.entries.first().is_some_and(|first| first.class == Class::Gone) {
+            return true;
         }
         let mut text = self.text(LineId(0)).iter().filter(|byte| **byte != b' ');
         text.next() == Some(&b'$')

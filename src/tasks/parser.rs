@@ -35,7 +35,7 @@ use super::tx::Tx;
 use crate::hal::event::{Event, is_wanted, set_asked, wake_after, wake_after_transmitted};
 use crate::hal::serial::{PORTS, USB};
 use crate::machine::{self, Cycle};
-use crate::protocol::{Answers, Notice, Request, Speech, asks_alarm, jog};
+use crate::protocol::{Answers, Notice, Request, Speech, asks_alarm};
 use crate::status::Status;
 use answer::{Answer, finish, go_on, has_room, leave};
 use block::{has_room_for_startup, is_working, job_line};
@@ -273,9 +273,6 @@ impl Parser {
             return go_on(links, port, session, awaited);
         }
         if port.asks_report() {
-            if port.awaits_greeting() && !machine::is_flushing() {
-                return false;
-            }
             if begin_report(port, session) {
                 return go_on(links, port, session, false);
             }
@@ -388,11 +385,14 @@ impl Parser {
         let flushes = machine::is_flushing();
         let any = data || flushes || port.number != links.feeder.get();
         let (id, class) = port.lines.borrow().next(any)?;
-        // A line that follows a reset waits for the greeting, and then for the start-up lines.
-        let starts = || port.speech.get().is_in_order() && links.job.get().starts_up();
+        // A line that follows a reset waits for the greeting, and then for the start-up lines that are told there.
+        let starts = || {
+            port.speech.get().is_in_order()
+                && links.job.get().starts_up()
+                && links.told().number == port.number
+        };
         let waits = (flushes && class == Class::Data)
-            || (port.awaits_greeting() && class != Class::Gone)
-            || starts();
+            || (class != Class::Gone && (port.awaits_greeting() || starts()));
         if !matches!(session, Session::Idle) || waits {
             return None;
         }
@@ -534,7 +534,7 @@ fn begin(
         if status == Status::Again {
             // The line number counts only when the line is begun for good.
             port.speech.set(before);
-            if machine::cycle() == Cycle::Jog || jog(block.of(line)).is_some() {
+            if machine::cycle() == Cycle::Jog {
                 *deferred = Deferred::Line;
             }
             return Begun::Again;

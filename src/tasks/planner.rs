@@ -688,7 +688,7 @@ impl Planner {
             links.except(Status::KillJob);
         }
         links.notices.flushed.set(ended && !machine::is_alarmed());
-        if links.is_interrupted() && !machine::is_alarmed() {
+        if killed && links.is_interrupted() && !machine::is_alarmed() {
             // Before any other line is begun: lines that have come since the reset are refused.
             machine::start_alarmed();
         }

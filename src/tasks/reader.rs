@@ -401,7 +401,7 @@ fn look_ahead(links: &Links, port: &Port, scan: &mut Scan, ring: &mut Window<'_>
         if machine::is_alarmed() {
             hold::refuse_older(links, &mut pool);
             // What has been looked through came before the control line, or is that line.
-            port.cut.set(scan.looked.checked_sub(1).map(|last| ring.slot(last)).or(port.cut.get()));
+            hold::cut_looked(port, scan.looked.checked_sub(1).map(|last| ring.slot(last)));
         }
     }
     scan.look_for_stops(links, port, &mut pool, ring);

@@ -18,8 +18,10 @@ use super::overrides;
 use super::ports::{Port, REPORT};
 use super::spindle;
 use crate::boards::outputs;
+use crate::hal::event::Event;
+use crate::hal::flags;
 use crate::hal::ring::Window;
-use crate::hal::serial::{GO, MARKS};
+use crate::hal::serial::{CUT, GO, MARKS};
 use crate::protocol::Speech;
 use crate::realtime::Asked;
 
@@ -44,7 +46,8 @@ pub fn pick(links: &Links, port: &Port, ring: &mut Window<'_>) -> u8 {
     let mut n = 0;
     while n < ring.len() {
         let byte = ring.get(n);
-        closes &= byte >= MARKS || byte == GO;
+        // The slot of a mark counts until the control task has acted on its character.
+        closes &= byte >= MARKS || byte == GO || (byte == CUT && !flags::has(Event::Realtime));
         if port.waits_for_question() && byte == ASKS && !within {
             decide(links, port);
         }

@@ -90,6 +90,8 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
             tell(links, port, notice).await;
             // In one turn: no line comes between the greeting and the start-up lines.
             if greets_anew() && port.take_asked(GREETS) && !opened {
+                // If it may feed the machine, start-up lines are told there.
+                links.may_feed(port);
                 start_up(links);
             }
         }

@@ -151,7 +151,7 @@ pub fn build(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Option<u
         text(out, text!("A,"));
         int(out, machine.value(Value::BlocksFree));
         out.put(b',');
-        int(out, machine.value(Value::BytesFree));
+        int(out, machine.value(Value::BytesInAll));
         close(out);
         return Some(2);
     }

@@ -139,8 +139,8 @@ impl Answers for Request {
 
     fn dropped(&mut self) {
         match self.command {
-            // The line has not run: that is refused by whoever runs it.
-            _ if self.block.is_some() => {}
+            // A report is in the midst of its line, or the line has not run, which whoever runs it refuses.
+            _ if self.report.is_some() || self.block.is_some() => {}
             Command::Gcode if self.at == 0 => self.at = DROPPED,
             Command::StoreStartup(_) if self.at != 0 => self.status = Status::Alarmed,
             Command::Gcode | Command::Nothing => {}

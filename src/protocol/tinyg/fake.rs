@@ -175,7 +175,7 @@ impl Machine for Fake {
             Value::Coordinates | Value::FeedMode => 1,
             Value::MotionMode => 4,
             Value::QueueFree => 32,
-            Value::SlotsFree | Value::BytesFree => 7,
+            Value::SlotsFree | Value::BytesFree | Value::BytesInAll => 7,
             Value::BlockLine | Value::FinishedLine => self.line,
             Value::Position(0) => self.position,
             Value::MachinePosition(_) => i32::MIN,

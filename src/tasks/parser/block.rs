@@ -165,15 +165,11 @@ fn enter(jogs: bool) {
 fn carry_out(links: &Links, block: &[u8], declined: bool) -> (Status, bool) {
     let words = jog(block);
     let jogs = machine::cycle() == Cycle::Jog;
-    if words.is_some() {
-        let works = !jogs && is_working(links);
-        if machine::is_held() || machine::is_checking() || (works && links.moves_last.get()) {
-            return (Status::NotAccepted, true);
-        }
-        if works {
-            // A jog waits for other jogs, and for lines that move nothing.
-            return (Status::Again, true);
-        }
+    if words.is_some()
+        && (machine::is_held() || machine::is_checking() || (!jogs && is_working(links)))
+    {
+        // A jog waits for nothing but other jogs: the character that ends a jog must find it under way.
+        return (Status::NotAccepted, true);
     }
     if jogs && words.is_none() && !block.is_empty() && is_working(links) {
         // The end of a jog drops what is queued. So nothing that has been answered may be queued behind a jog.

@@ -5,6 +5,7 @@ use kerf_macros::small;
 use super::{View, queue_free};
 use crate::capability::Capability;
 use crate::gcode::modal::{Coolant, Turn};
+use crate::hal::serial::capacity;
 use crate::hal::{gpio, uart, watchdog};
 use crate::machine;
 use crate::motion::queue;
@@ -32,6 +33,7 @@ pub(super) fn value(view: &mut View<'_>, value: Value) -> i32 {
         Value::QueueAdded => view.links.queue_count.take_added(),
         Value::QueueRemoved => view.links.queue_count.take_removed(),
         Value::SlotsFree => view.port.promise(&view.port.lines.borrow()).into(),
+        Value::BytesInAll => capacity(view.port.number).into(),
         Value::BytesFree => uart::room(view.port.number).into(),
         Value::MachinePosition(axis) => view.position(axis.into()).0,
         Value::Position(axis) => {
