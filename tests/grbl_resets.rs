@@ -227,3 +227,35 @@ fn questions_behind_a_percent_sign_take_no_room() {
     let heard = answers(&machine.received());
     assert!(heard.iter().all(|answer| answer == "ok") && heard.len() == 21, "{heard:?}");
 }
+
+#[test]
+fn a_greeting_that_waited_for_a_list_comes_though_the_machine_stops() {
+    for_all_delays(|machine, delay| {
+        machine.send(b"$N0=M8\n$N1=M0\n");
+        machine.run_ms(300);
+        machine.send(b"~");
+        machine.run_ms(300);
+        machine.send_aux(b"$$\n");
+        machine.run_ms(delay);
+        machine.send(b"\x18");
+        machine.send_aux(b"\x18");
+        machine.run_ms(1_000);
+        for heard in [machine.received(), machine.received_aux()] {
+            assert!(String::from_utf8_lossy(&heard).contains("Grbl 1.1h"));
+        }
+    });
+}
+
+#[test]
+fn a_hold_in_an_alarm_keeps_nothing_waiting() {
+    for_all_delays(|machine, delay| {
+        machine.send(b"g1 x20 f800\n");
+        machine.run_ms(300);
+        machine.send_aux(b"\x18");
+        machine.run_ms(delay);
+        machine.received();
+        machine.send(b"g0 x6\n$SLP\n!");
+        machine.run_ms(1_000);
+        assert_eq!(answers(&machine.received()).len(), 2);
+    });
+}

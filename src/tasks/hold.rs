@@ -383,7 +383,10 @@ fn is_moving(links: &Links, port: &Port) -> bool {
     !rests && view.carries_out()
 }
 
-/// Whether there is anything to hold.
+/// Whether there is anything to hold. In an alarm nothing moves, and lines that wait are refused.
 fn is_busy(links: &Links) -> bool {
+    if machine::is_alarmed() {
+        return false;
+    }
     links.has_data() || View::of(links, links.feeder()).is_busy()
 }

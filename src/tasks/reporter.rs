@@ -269,6 +269,8 @@ fn split(telling: &mut Telling, port: &Port, tx: &mut Tx) -> bool {
 /// Tells `notice` on a port, a part at a time: for a millisecond in one turn, if there is room. For a queue report,
 /// returns how many blocks the report says are free; that may have changed while the transmitter was waited for.
 async fn tell(links: &Links, port: &Port, notice: Notice) -> usize {
+    // What changes meanwhile is looked at afterwards, also if the machine has come to rest by then.
+    links.reporter_wake.set_polling(false);
     let mut tx = match notice {
         Notice::Status | Notice::Exception(_) => port.tx_behind_answers().await,
         _ => port.tx.lock().await,
