@@ -29,6 +29,23 @@ fn answers(heard: &[u8]) -> Vec<String> {
     heard.lines().filter(is_answer).map(str::to_owned).collect()
 }
 
+/// Sends to a machine, lets time pass, and returns what its first port has said since it was heard last.
+fn heard_after(machine: &Machine, bytes: &[u8], ms: u64) -> String {
+    machine.send(bytes);
+    machine.run_ms(ms);
+    String::from_utf8(machine.received()).expect("text")
+}
+
+/// Returns the answers in [`heard_after`].
+fn answers_after(machine: &Machine, bytes: &[u8], ms: u64) -> Vec<String> {
+    answers(heard_after(machine, bytes, ms).as_bytes())
+}
+
+/// Begins a long move, lets 300 ms pass, and forgets what has been said.
+fn begin_move(machine: &Machine, line: &[u8]) {
+    heard_after(machine, line, 300);
+}
+
 /// Calls `case` on a machine of its own for each delay from 0 to 200 ms.
 fn for_all_delays(case: impl Fn(&Machine, u64) + Copy + Send + 'static) {
     let delays = (0..40).chain((40..200).step_by(7));
@@ -61,18 +78,14 @@ fn a_reset_in_motion_stops_the_lines_of_the_other_port() {
 #[test]
 fn lines_behind_a_reset_are_answered_though_the_other_port_resets_too() {
     for_all_delays(|machine, delay| {
-        machine.send(b"g1 x20 f800\n");
-        machine.run_ms(300);
-        machine.received();
+        begin_move(machine, b"g1 x20 f800\n");
         machine.send(b"\x18$G\ng0 x5\n");
         machine.run_ms(delay);
         machine.send_aux(b"\x18$I\n");
         machine.run_ms(1_000);
         assert_eq!(answers(&machine.received()).len(), 2);
         assert_eq!(answers(&machine.received_aux()).len(), 1);
-        machine.send(b"$X\n$G\n");
-        machine.run_ms(500);
-        assert_eq!(answers(&machine.received()), ["ok", "ok"]);
+        assert_eq!(answers_after(machine, b"$X\n$G\n", 500), ["ok", "ok"]);
     });
 }
 
@@ -89,44 +102,33 @@ fn the_end_of_a_program_that_is_cut_short_is_refused() {
         machine.set_input(X_MIN, true);
         machine.run_ms(1_000);
         assert_eq!(answers(&machine.received()), ["ok", "error:9"]);
-        machine.send(b"$X\n$G\n");
-        machine.run_ms(500);
-        assert_eq!(answers(&machine.received()), ["ok", "ok"]);
+        assert_eq!(answers_after(machine, b"$X\n$G\n", 500), ["ok", "ok"]);
     });
 }
 
 #[test]
-fn a_full_pool_behind_a_reset_is_answered_in_an_alarm_of_the_other_port() {
+fn a_full_pool_behind_a_reset_is_answered_though_the_other_port_kills_the_job() {
     for_all_delays(|machine, delay| {
-        machine.send(b"g1 x20 f3000\n");
-        machine.run_ms(300);
-        machine.received();
+        begin_move(machine, b"g1 x20 f3000\n");
         machine.send(&[b"\x18".as_slice(), &b"T1\n".repeat(60)].concat());
         machine.run_ms(delay);
-        // The other port's sender speaks TinyG's dialect from now on.
         machine.send_aux(b"\x04");
         machine.run_ms(1_000);
         assert_eq!(answers(&machine.received()).len(), 60);
-        machine.send(b"?");
-        machine.run_ms(50);
-        assert!(machine.received().starts_with(b"<Alarm|"));
+        assert!(heard_after(machine, b"?", 50).starts_with("<Alarm|"));
     });
 }
 
 #[test]
 fn a_kill_behind_a_reset_leaves_no_port_without_a_greeting() {
     for_all_delays(|machine, delay| {
-        machine.send(b"g1 x20 f3000\n");
-        machine.run_ms(300);
-        machine.received();
+        begin_move(machine, b"g1 x20 f3000\n");
         machine.send(&[b"\x18".as_slice(), &b"T1\n".repeat(60)].concat());
         machine.run_ms(delay);
         machine.send(b"\x04");
         machine.run_ms(1_000);
         assert!(String::from_utf8_lossy(&machine.received()).contains("Grbl 1.1h"));
-        machine.send(b"$X\n");
-        machine.run_ms(50);
-        assert_eq!(answers(&machine.received()), ["ok"]);
+        assert_eq!(answers_after(machine, b"$X\n", 50), ["ok"]);
     });
 }
 
@@ -155,9 +157,7 @@ fn two_resets_at_rest_are_no_alarm() {
         machine.run_ms(500);
         let heard = String::from_utf8(machine.received()).unwrap();
         assert!(heard.contains("Grbl 1.1h") && !heard.contains("ALARM"), "{heard}");
-        machine.send(b"g0 x1\n");
-        machine.run_ms(500);
-        assert_eq!(answers(&machine.received()), ["ok"]);
+        assert_eq!(answers_after(machine, b"g0 x1\n", 500), ["ok"]);
     });
 }
 
@@ -181,9 +181,7 @@ fn a_jog_that_is_cancelled_is_no_alarm_though_a_greeting_waits() {
         machine.send(b"\x85");
         machine.run_ms(500);
         machine.received();
-        machine.send(b"?");
-        machine.run_ms(50);
-        assert!(machine.received().starts_with(b"<Idle|"));
+        assert!(heard_after(machine, b"?", 50).starts_with("<Idle|"));
     });
 }
 
@@ -203,9 +201,7 @@ fn a_start_up_line_that_stops_keeps_nobody_from_a_reset() {
         machine.send_aux(b"\x18");
         machine.run_ms(500);
         assert!(String::from_utf8_lossy(&machine.received()).contains("Grbl 1.1h"));
-        machine.send(b"?");
-        machine.run_ms(50);
-        assert!(machine.received().starts_with(b"<"));
+        assert!(heard_after(machine, b"?", 50).starts_with('<'));
     });
 }
 
@@ -218,9 +214,7 @@ fn questions_behind_a_percent_sign_take_no_room() {
     machine.run_ms(50);
     machine.received();
     for _ in 0..300 {
-        machine.send(b"?");
-        machine.run_ms(40);
-        assert!(machine.received().starts_with(b"<"));
+        assert!(heard_after(&machine, b"?", 40).starts_with('<'));
     }
     machine.send(b"~");
     machine.run_ms(500);

@@ -17,8 +17,8 @@ pub const FLASH: u64 = 253_800;
 pub const DATA: u64 = 500;
 /// Bytes of `.data` and `.bss` together, of the chip's 8192. The velocities beside the keys of the look-ahead take
 /// 130 bytes. [`FREE_STACK`] remains beside the cap. On the board of the lathe surface speed takes the last of it,
-/// the flag that says whether lines are merged takes 8 more, because statics end at a multiple of 8, and the place of
-/// the last probing on the axes that do not probe takes 16: it has to stay when they move.
+/// the flag that says whether lines are merged takes 8 more, because statics end at a multiple of 8, and the
+/// place of the last probing on the axes that do not probe, and whether the last line moves, take 16 together.
 pub const STATIC_RAM: u64 = 6_088;
 /// Bytes that must remain between the statics and the deepest stack found by analysis.
 pub const FREE_STACK: i64 = 400;

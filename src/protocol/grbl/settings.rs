@@ -470,8 +470,8 @@ fn set_axis(what: u8, axis: u8, to: Number, machine: &mut impl Machine) -> Resul
     }
 }
 
-/// Sets the steps per millimetre of an axis, by the travel per turn of each of its motors. If one of them cannot have
-/// its travel, none is changed. An axis without a motor has no steps.
+/// Sets the steps per millimetre of an axis, by the travel per turn of each of its motors. Checks all motors first: a
+/// travel out of range is refused and changes no motor. An axis without a motor is refused.
 #[small]
 fn set_steps(axis: u8, to: Number, machine: &mut impl Machine) -> Result<(), Status> {
     let to = to.fixed(3, false).filter(|to| *to > 0).ok_or(Status::OutOfRange)?;
