@@ -12,11 +12,10 @@ use embassy_sync::mutex::Mutex;
 use heapless::Vec;
 
 use crate::config::Settings;
-use crate::dda::{SEGMENTS, Segment};
 use crate::gcode::command::Commands;
 use crate::gcode::interpreter::Interpreter;
 use crate::hal::eeprom::Eeprom;
-use crate::hal::ring::Producer;
+use crate::hal::segments::Segments;
 use crate::hal::serial::{AUX, AllEnds, PORTS, Received, USB, hardware};
 use crate::hal::{LINE_BYTES, stepper, uart, watchdog};
 use crate::machine::{Notices, Probe, Signs};
@@ -213,7 +212,7 @@ tasks! {
         level: Interrupt,
         common: InterruptEnd<Common>,
         blocks: BlockSource,
-        segments: Producer<Segment, SEGMENTS>
+        segments: Segments
     ) = exec::run;
     fn reader_task(
         links: &'static Links,

@@ -22,7 +22,6 @@ mod window;
 pub use view::ConsumerView;
 pub use window::Window;
 
-pub use crate::Ceiling;
 pub use crate::byte::Index;
 use crate::byte::{SharedByte, SharedIndex};
 
@@ -122,6 +121,12 @@ impl<T: Copy, const N: usize> Ring<T, N> {
         usize::from(if head >= tail { used } else { used.wrapping_add(N as Index) })
     }
 
+    /// Returns how many of `waiting` values the consumer may look at where they lie: all but the newest of a full ring,
+    /// which [`Producer::replace_newest`] may write to.
+    fn settled(waiting: usize) -> usize {
+        if N > 2 { waiting.min(N - 2) } else { waiting }
+    }
+
     /// Returns the slot filled last, `None` if it has been taken.
     pub fn newest(&self) -> Option<u8> {
         let head = self.head.get();
@@ -192,10 +197,12 @@ impl<T: Copy, const N: usize> Producer<T, N> {
         (after != self.0.tail.get()).then_some(after)
     }
 
-    /// Writes a slot behind `head`: a vacant slot, or the slot of `tail` if nothing has been taken from it.
+    /// Writes a slot behind `head`, which is vacant, or is the slot of `tail` if nothing has been taken from it; or the
+    /// newest slot of a full ring.
     #[inline(always)]
     fn write(&mut self, index: Index, value: T) {
-        // SAFETY: a slot behind `head` is the producer's until `head` moves onto it.
+        // SAFETY: a slot behind `head` is the producer's until `head` moves onto it, and the consumer stays away from the
+        // newest slot of a full ring (`Ring::settled`).
         unsafe { self.0.slot(index).write(value) };
     }
 
@@ -248,7 +255,7 @@ impl<T: Copy, const N: usize> Producer<T, N> {
             return None;
         }
         // SAFETY: the slot was written by this producer, which alone could overwrite it, and the
-        // consumer never writes to slots; the borrow of `self` keeps `push` and `amend` away.
+        // consumer never writes to slots; the borrow of `self` keeps away what writes to them.
         Some(unsafe { &*self.0.slot(self.index_of(back)) })
     }
 
@@ -310,26 +317,32 @@ impl<T: Copy, const N: usize> Producer<T, N> {
         count as u8
     }
 
-    /// Changes a value pushed earlier; `back` 0 is the newest. Returns `false` if it has been released.
+    /// Replaces the newest value of a full ring. Returns `false` if the ring has room.
     ///
-    /// The consumer is interrupt mode, which cannot run meanwhile: `_ceiling` proves it.
-    pub fn amend(&mut self, _ceiling: &Ceiling, back: usize, change: impl FnOnce(&mut T)) -> bool {
-        if back >= self.0.used() {
-            return false;
-        }
-        // SAFETY: the witness says that the consumer cannot run, and it holds no reference into
-        // the ring while it does not run: `Consumer` gives out copies only.
-        change(unsafe { &mut *self.0.slot(self.index_of(back)) });
-        true
+    /// Either end may preempt the other: a consumer that has been interrupted is never looking at the newest value of a
+    /// full ring, and interrupts are off while it is replaced.
+    pub fn replace_newest(&mut self, value: T) -> bool {
+        const { assert!(N > 2, "a ring of one value has none that is older than its newest") };
+        crate::mask(|| {
+            let full = self.free() == 0;
+            if full {
+                self.write(self.0.head.get(), value);
+            }
+            full
+        })
     }
 
     /// Changes a value pushed earlier; `back` 0 is the newest. Returns `false` if it has been released, or if another
     /// value is released just then.
     ///
-    /// The consumer may be any interrupt. Interrupts are off while `change` runs, so it has to be short. Cost:
-    /// interrupts off for 8 cycles more than `change` takes.
+    /// Interrupts are off while `change` runs, so it has to be short. Cost: interrupts off for 8 cycles more than
+    /// `change` takes.
+    ///
+    /// # Safety
+    /// The consumer looks at values only at the producer's level or in an interrupt above it, and keeps no reference
+    /// to one: none exists while the producer runs.
     #[inline(always)]
-    pub fn amend_masked(&mut self, back: usize, change: impl FnOnce(&mut T)) -> bool {
+    pub unsafe fn amend_masked(&mut self, back: usize, change: impl FnOnce(&mut T)) -> bool {
         let tail = self.0.tail.get();
         let Some(index) = self.waiting(back) else { return false };
         // The address is computed before interrupts are off.
@@ -337,8 +350,7 @@ impl<T: Copy, const N: usize> Producer<T, N> {
         crate::mask(|| {
             let waits = self.0.tail.get() == tail;
             if waits {
-                // SAFETY: the consumer has not released it, cannot run, and holds no reference into the ring while it
-                // does not.
+                // SAFETY: the consumer has not released it, cannot run, and by the contract holds no reference to it.
                 change(unsafe { &mut *slot });
             }
             waits
@@ -426,16 +438,18 @@ impl<T: Copy, const N: usize> Consumer<T, N> {
         self.0.tail()
     }
 
-    /// Returns what `look` makes of the value `ahead` places behind the oldest. `None` if no value waits there.
+    /// Returns what `look` makes of the value `ahead` places behind the oldest. `None` if no value waits there, and for
+    /// the newest value of a full ring, which the producer may replace.
     #[inline]
     pub fn peek<R>(&self, ahead: usize, look: impl FnOnce(&T) -> R) -> Option<R> {
-        if ahead >= self.0.used() {
+        if ahead >= Ring::<T, N>::settled(self.0.used()) {
             return None;
         }
         let tail = self.0.tail.get() as usize;
         let index = tail + 1 + ahead;
         let index = if index >= N { index - N } else { index };
-        // SAFETY: the slot is the consumer's until `tail` moves onto it and the producer wraps.
+        // SAFETY: the slot is the consumer's until `tail` moves onto it and the producer wraps. It is not the one that
+        // `replace_newest` writes to.
         Some(look(unsafe { &*self.0.slot(index as Index) }))
     }
 
@@ -448,7 +462,8 @@ impl<T: Copy, const N: usize> Consumer<T, N> {
         }
     }
 
-    /// Returns the oldest values, as many as lie side by side; empty only if none waits.
+    /// Returns the oldest values, as many as lie side by side; empty only if none waits. The newest value of a full ring
+    /// is not among them, because the producer may replace it.
     #[inline]
     pub fn waiting(&self) -> &[T] {
         // Read once: the producer may move it meanwhile.
@@ -457,11 +472,11 @@ impl<T: Copy, const N: usize> Consumer<T, N> {
         let start = next::<N>(tail);
         let len = match head {
             _ if head == tail => 0,
-            _ if head >= start => usize::from(head - start) + 1,
+            _ if head >= start => Ring::<T, N>::settled(usize::from(head - start) + 1),
             _ => N - usize::from(start),
         };
-        // SAFETY: `head` has moved onto or past these slots, so they are filled, and the consumer's
-        // until `tail` moves, which takes `&mut self`.
+        // SAFETY: `head` has moved onto or past these slots, so they are filled, and the consumer's until `tail` moves,
+        // which takes `&mut self`. `replace_newest` writes to none of them.
         unsafe { core::slice::from_raw_parts(self.0.slot(start), len) }
     }
 
@@ -549,7 +564,8 @@ mod tests {
             assert_eq!(p.push(99), Err(99));
             assert!(p.slot(99).is_none());
             assert_eq!(c.len(), 3);
-            assert_eq!(c.peek(2, |v| *v), Some(round * 10 + 2));
+            assert_eq!(c.peek(1, |v| *v), Some(round * 10 + 1));
+            assert_eq!(c.peek(2, |v| *v), None, "the newest of a full ring");
             assert_eq!(c.peek(3, |v| *v), None);
             let got: Vec<u16> = core::iter::from_fn(|| c.pop()).collect();
             assert_eq!(got, [round * 10, round * 10 + 1, round * 10 + 2]);
@@ -565,13 +581,36 @@ mod tests {
         c.release();
         p.push(4).expect("room");
         assert_eq!((p.pushed(0), p.pushed(2), p.pushed(3)), (Some(&4), Some(&2), None));
-        assert!(p.amend(&Ceiling::new(), 1, |v| *v = 30));
-        assert!(!p.amend(&Ceiling::new(), 3, |v| *v = 0));
-        assert!(p.amend_masked(2, |v| *v += 10));
+        // SAFETY: all ends are used in turn, and no reference is kept.
+        let mut amend = |back, by| unsafe { p.amend_masked(back, |v| *v += by) };
+        assert!(amend(1, 27) && amend(2, 10) && !amend(3, 10));
         assert_eq!((p.copy_of(2), p.copy_of(3)), (Some(12), None));
-        assert!(!p.amend_masked(3, |v| *v = 0));
         let got: Vec<u16> = core::iter::from_fn(|| c.pop()).collect();
         assert_eq!(got, [12, 30, 4]);
+    }
+
+    #[test]
+    fn the_newest_value_of_a_full_ring_is_replaced_unseen() {
+        for at in 0..8 {
+            let (mut p, mut c) = ring::<8>();
+            for v in 0..at {
+                p.push(v).expect("room");
+                c.release();
+            }
+            p.push_all(10..16);
+            assert!(!p.replace_newest(99), "there is room");
+            assert_eq!(p.push(16), Ok(()));
+            let (seen, first) = (c.waiting().to_vec(), c.waiting().as_ptr());
+            assert!(!seen.is_empty() && !seen.contains(&16), "{seen:?}");
+            assert!(p.replace_newest(99));
+            // Whoever has looked at the values before finds all of them as they were.
+            assert_eq!((c.waiting(), c.waiting().as_ptr()), (&seen[..], first));
+            c.release_many(seen.len() as u8);
+            assert!(!p.replace_newest(98), "there is room again");
+            let rest: Vec<u16> = core::iter::from_fn(|| c.pop()).collect();
+            let got: Vec<u16> = seen.into_iter().chain(rest).collect();
+            assert_eq!(got, [10, 11, 12, 13, 14, 15, 99]);
+        }
     }
 
     #[test]

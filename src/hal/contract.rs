@@ -16,10 +16,10 @@
 
 use super::imp;
 use super::resets::Cause;
-use super::ring::Producer;
+use super::segments::Segments;
 use super::serial::{AllEnds, Flow};
 use crate::boards::MOTORS;
-use crate::dda::{Dda, SEGMENTS, Segment, Ticks};
+use crate::dda::{Dda, Segment, Ticks};
 use crate::drivers::REGISTERS;
 use crate::encoder::Pulses;
 use crate::realtime::Asked;
@@ -72,7 +72,7 @@ contract! {
     trait Stepper in stepper {
         /// Sets the timer up and returns the filling end of the segment ring, which belongs to exec. Start-up, before
         /// interrupts are on; `None` after the first time.
-        fn start() -> Option<Producer<Segment, SEGMENTS>>;
+        fn start() -> Option<Segments>;
         /// Starts the ticks if they have stopped. Exec calls it after it has queued a segment.
         fn go();
         /// Stops the ticks at once, wherever the motors are; they stay stopped until [`release`](Stepper::release).

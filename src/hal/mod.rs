@@ -31,6 +31,7 @@ pub mod flags;
 pub mod primitives;
 pub mod progmem;
 pub mod resets;
+pub mod segments;
 pub mod serial;
 
 #[cfg(target_arch = "avr")]

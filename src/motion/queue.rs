@@ -13,8 +13,8 @@ pub use super::source::{BlockSource, Constraint};
 use super::speed_constraints::SpeedConstraints;
 use super::tail::{Key, Tail};
 use crate::hal::exec;
-use crate::hal::ring::{Ceiling, Index, Prefilled, Ring};
-use crate::hal::{Interrupt, LOOK_AHEAD, Thread};
+use crate::hal::ring::{Index, Prefilled, Ring};
+use crate::hal::{Ceiling, Interrupt, LOOK_AHEAD, Thread};
 
 /// Blocks the planner can queue, plus one slot that stays empty. Sequence numbers have one bit less than an
 /// [`Index`].

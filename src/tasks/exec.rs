@@ -15,7 +15,7 @@ use crate::encoder::Encoder;
 use crate::hal::Interrupt;
 use crate::hal::arithmetic::product;
 use crate::hal::event::{self, Event};
-use crate::hal::ring::{Prefilled, Producer};
+use crate::hal::segments::Segments;
 use crate::hal::{TIMER_HZ, encoder as sensors, exec, flags, stepper, uart};
 use crate::machine::{self, Alarm};
 use crate::motion::exec::{Exec, Step, take_heat, take_override};
@@ -51,7 +51,7 @@ pub fn run(
     level: Interrupt,
     common: InterruptEnd<Common>,
     blocks: BlockSource,
-    segments: Producer<Segment, SEGMENTS>,
+    segments: Segments,
 ) -> impl Future<Output = Never> {
     async move {
         // A variable of its own: it would otherwise be built on the stack and copied.
@@ -93,7 +93,7 @@ struct Runner<'a> {
     rests: bool,
     /// At the next turn, `waiting` is to be told whether thread mode has been idle since the last segment.
     asked: bool,
-    segments: Prefilled<Segment, SEGMENTS>,
+    segments: Segments,
     blocks: BlockSource,
     machine: &'a mut Exec,
 }
@@ -111,10 +111,9 @@ impl<'a> Task<'a> {
     fn new(
         common: InterruptEnd<Common>,
         blocks: BlockSource,
-        segments: Producer<Segment, SEGMENTS>,
+        segments: Segments,
         machine: &'a mut Exec,
     ) -> Self {
-        let segments = segments.prefilled(Segment::default());
         let (waiting, finished) = (Waiting::new(), Finished::new());
         let (rests, asked) = (true, false);
         let runner = Runner { waiting, finished, rests, asked, segments, blocks, machine };
@@ -321,9 +320,9 @@ impl Runner<'_> {
             let mode = Segment::mode_of(moving);
             machine.lead((waits.ticks, waits.period), out, |increment| {
                 // Two pieces, so that a step waits for 31 cycles at most. The first piece moves nothing.
-                segments.producer().amend_masked(back, |segment| {
+                segments.amend(back, |segment| {
                     (segment.backwards, segment.mode) = (backwards, mode);
-                }) && segments.producer().amend_masked(back, |segment| {
+                }) && segments.amend(back, |segment| {
                     if let Some(of) = segment.increment.get_mut(motor) {
                         *of = increment;
                     }

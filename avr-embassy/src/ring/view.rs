@@ -12,7 +12,7 @@ pub struct ConsumerView<T: 'static> {
     /// Points to a `Ring<T, N>`. The fields of a `Ring<T, 1>` lie at the same places in it, except the slots after
     /// the first.
     ring: NonNull<Ring<T, 1>>,
-    /// The highest index: one less than a power of two.
+    /// The highest index: one less than a power of two, and at least 3.
     pub(super) last: Index,
     /// The view gives out references into the ring.
     values: PhantomData<&'static T>,
@@ -24,7 +24,7 @@ unsafe impl<T: Send> Send for ConsumerView<T> {}
 impl<T: Copy, const N: usize> Consumer<T, N> {
     /// Turns this end into one without the size in its type.
     pub fn into_view(self) -> ConsumerView<T> {
-        const { assert!(N.is_power_of_two()) };
+        const { assert!(N.is_power_of_two() && N > 2) };
         ConsumerView {
             ring: NonNull::from(self.0).cast(),
             last: (N - 1) as Index,
@@ -67,7 +67,8 @@ impl<T: Copy> ConsumerView<T> {
         self.ring().tail()
     }
 
-    /// Returns the oldest values, as many as lie side by side; empty only if none waits.
+    /// Returns the oldest values, as many as lie side by side; empty only if none waits. The newest value of a full ring
+    /// is not among them, because the producer may replace it.
     #[inline(always)]
     pub fn waiting(&self) -> &[T] {
         // Read once: the producer may move it meanwhile.
@@ -76,11 +77,11 @@ impl<T: Copy> ConsumerView<T> {
         let start = self.next(tail);
         let len = match head {
             _ if head == tail => 0,
-            _ if head >= start => usize::from(head - start) + 1,
+            _ if head >= start => usize::from((head - start + 1).min(self.last - 1)),
             _ => usize::from(self.last - start) + 1,
         };
-        // SAFETY: `head` has moved onto or past these slots, so they are filled, and the consumer's
-        // until `tail` moves, which takes `&mut self`.
+        // SAFETY: `head` has moved onto or past these slots, so they are filled, and the consumer's until `tail` moves,
+        // which takes `&mut self`. `Producer::replace_newest` writes to none of them.
         unsafe { core::slice::from_raw_parts(self.slot(start), len) }
     }
 
@@ -140,7 +141,7 @@ mod tests {
 
     #[test]
     fn a_view_tells_all_in_order() {
-        goes_round::<2>();
+        goes_round::<4>();
         goes_round::<64>();
         goes_round::<256>();
     }

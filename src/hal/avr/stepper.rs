@@ -13,7 +13,8 @@ use crate::boards::{ACTIVE, MOTORS, Timer, each_motor};
 use crate::dda::Drivers;
 use crate::dda::{Dda, SEGMENTS, Segment};
 use crate::hal::byte::SharedByte;
-use crate::hal::ring::{Producer, Ring};
+use crate::hal::ring::Ring;
+use crate::hal::segments::Segments;
 
 const _: () = assert!(matches!(ACTIVE.step_timer, Timer::T1), "the step timer is timer 1");
 
@@ -84,7 +85,7 @@ pub(super) static STATE: Owned = Owned(UnsafeCell::new(Dda::new()));
 
 /// Sets the timer up and returns the filling end of the segment ring. Before interrupts are on; `None` after the
 /// first time.
-pub fn start() -> Option<Producer<Segment, SEGMENTS>> {
+pub fn start() -> Option<Segments> {
     // The interrupt is the consumer.
     let (producer, _) = SEGMENT_RING.split()?;
     // SAFETY: interrupts are off, nobody else looks.
@@ -92,7 +93,8 @@ pub fn start() -> Option<Producer<Segment, SEGMENTS>> {
         TCCR1B.write_volatile(HALT);
         TIMSK1.write_volatile(1 << DUE);
     }
-    Some(producer)
+    // SAFETY: the step interrupt alone reads the ring, and copies each segment.
+    Some(unsafe { Segments::new(producer) })
 }
 
 /// Whether the interrupt of the ticks is enabled: always true after [`start`].

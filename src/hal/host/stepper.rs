@@ -6,7 +6,8 @@ use std::vec::Vec;
 use super::{NEVER, exec, inputs, now};
 use crate::boards::{MOTORS, inputs as board_inputs};
 use crate::dda::{Dda, Pins, SEGMENTS, Segment};
-use crate::hal::ring::{Consumer, Producer, Ring};
+use crate::hal::ring::{Consumer, Ring};
+use crate::hal::segments::Segments;
 
 const FIRST_TICK: u64 = 400;
 
@@ -111,10 +112,11 @@ impl Pins for Pinned {
 }
 
 /// Sets the timer up and returns the filling end of the segment ring; `None` after the first time.
-pub fn start() -> Option<Producer<Segment, SEGMENTS>> {
+pub fn start() -> Option<Segments> {
     let (producer, consumer) = ring().split()?;
     stepper().segments.replace(Some(consumer));
-    Some(producer)
+    // SAFETY: the mocked step interrupt alone reads the ring. It never runs within exec, and copies each segment.
+    Some(unsafe { Segments::new(producer) })
 }
 
 /// Starts the ticks if they have stopped.

@@ -5,10 +5,9 @@ use std::boxed::Box;
 use std::collections::VecDeque;
 use std::vec::Vec;
 
-use super::{NEVER, exec, flags, now};
+use super::{NEVER, flags, now};
 use crate::baud;
 use crate::boards::ACTIVE;
-use crate::hal::Thread;
 use crate::hal::event::Event;
 use crate::hal::ring::{Consumer, Producer, Ring};
 use crate::hal::serial::{
@@ -46,10 +45,8 @@ impl<const N: usize> Fill for Producer<u8, N> {
     }
 
     fn mark(&mut self, mark: u8) {
-        if Producer::push(self, mark).is_err() {
-            // SAFETY: everything here is one thread, and neither exec nor the reader runs now.
-            let thread = unsafe { Thread::assume() };
-            exec::lock(thread, |ceiling| self.amend(ceiling, 0, |newest| *newest = mark));
+        if !self.replace_newest(mark) {
+            Fill::push(self, mark);
         }
     }
 
@@ -296,11 +293,8 @@ pub fn lost_ends(port: u8) -> u16 {
 
 /// Returns how many bytes may come before one is lost, at most 254: one less than the receive ring has room for.
 pub fn room(port: u8) -> u8 {
-    let (size, used) = match port {
-        AUX => (AUX_RING, aux_rx().used()),
-        _ => (RX_RING, usb_rx().used()),
-    };
-    (size - 2).saturating_sub(used) as u8
+    let used = if port == AUX { aux_rx().used() } else { usb_rx().used() };
+    serial::capacity(port).saturating_sub(used as u8)
 }
 
 /// Whether half of the second port's receive ring is full. The other half lasts 3 ms, so a task with much to do then

@@ -24,10 +24,9 @@ use heapless::Deque;
 
 use super::gpio::{self, Unit};
 use super::usb::{self, PACKET};
-use super::{drivers, eeprom, exec, flags, mask, time};
+use super::{drivers, eeprom, flags, mask, time};
 use crate::baud;
 use crate::boards::{ACTIVE, Usart};
-use crate::hal::Thread;
 use crate::hal::event::Event;
 use crate::hal::ring::{Consumer, Producer, Ring};
 use crate::hal::serial::{
@@ -82,14 +81,7 @@ impl Filling {
 
     /// Puts a mark where there is room, else replaces the newest byte by it.
     fn mark(&mut self, mark: u8) {
-        if self.is_full() {
-            // SAFETY: the reader, which is a task of thread mode, does not run within the handler.
-            let thread = unsafe { Thread::assume() };
-            exec::lock(
-                thread,
-                |ceiling| either!(self, ring => ring.amend(ceiling, 0, |newest| *newest = mark)),
-            );
-        } else {
+        if !either!(self, ring => ring.replace_newest(mark)) {
             self.push(mark);
         }
     }
@@ -647,11 +639,8 @@ pub fn lost_ends(port: u8) -> u16 {
 /// Returns how many bytes may come before one is lost, at most 254: one less than the receive ring has room for.
 /// Thread mode.
 pub fn room(port: u8) -> u8 {
-    let (size, used) = match port {
-        AUX => (AUX_RING, AUX_RX.used()),
-        _ => (RX_RING, USB_RX.used()),
-    };
-    (size - 2).saturating_sub(used) as u8
+    let used = if port == AUX { AUX_RX.used() } else { USB_RX.used() };
+    serial::capacity(port).saturating_sub(used as u8)
 }
 
 /// Whether half of the second port's receive ring is full. Thread mode.

@@ -28,7 +28,8 @@ use embassy_rp::interrupt::{DMA_IRQ_0, InterruptExt};
 use super::{exec, gpio, mask};
 use crate::boards::{ACTIVE, MOTORS};
 use crate::dda::{Dda, SEGMENTS, Segment};
-use crate::hal::ring::{Producer, Ring};
+use crate::hal::ring::Ring;
+use crate::hal::segments::Segments;
 use feeder::FEEDER;
 pub use machine::{Place, place};
 
@@ -51,11 +52,12 @@ static BEGINS: AtomicBool = AtomicBool::new(false);
 static PULSE_US: AtomicU32 = AtomicU32::new(2);
 
 /// Sets PIO, DMA and pins up, and returns the filling end of the segment ring. Start-up; `None` after the first time.
-pub fn start() -> Option<Producer<Segment, SEGMENTS>> {
+pub fn start() -> Option<Segments> {
     let (producer, consumer) = RING.split()?;
     feeder::start(consumer);
     machine::start();
-    Some(producer)
+    // SAFETY: the feeder alone reads the ring, in the interrupt of the DMA, and copies each segment.
+    Some(unsafe { Segments::new(producer) })
 }
 
 /// Starts the steps if they have stopped. Exec calls it after it has queued a segment.
