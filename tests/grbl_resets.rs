@@ -253,3 +253,23 @@ fn a_hold_in_an_alarm_keeps_nothing_waiting() {
         assert_eq!(answers(&machine.received()).len(), 2);
     });
 }
+
+#[test]
+fn start_up_lines_wait_for_a_jog_of_the_other_port() {
+    for_all_delays(|machine, delay| {
+        heard_after(machine, b"$N1=G21\n", 300);
+        machine.send_aux(b"M0\n");
+        machine.run_ms(300);
+        machine.send_aux(b"M2\n$G\nG0X4F3000\nG4P0.05\n$X\n$SLP\n");
+        machine.run_ms(300);
+        machine.received_aux();
+        machine.send_aux(b"\x18");
+        machine.run_ms(delay);
+        // Carried out, or refused because the machine still comes to rest.
+        let mut heard = heard_after(machine, b"$J=G91 X2 F1200\n", 1_000);
+        assert_eq!(answers(heard.as_bytes()).len(), 1, "{heard}");
+        heard += &String::from_utf8_lossy(&machine.received_aux());
+        assert_eq!(heard.matches(">G21:ok").count(), 1, "{heard}");
+        assert_eq!(answers_after(machine, b"$G\n", 200), ["ok"]);
+    });
+}

@@ -38,7 +38,7 @@ use crate::machine::{self, Cycle};
 use crate::protocol::{Answers, Notice, Request, Speech, asks_alarm};
 use crate::status::Status;
 use answer::{Answer, finish, go_on, has_room, leave};
-use block::{has_room_for_startup, is_working, job_line};
+use block::{has_room_for_startup, is_working, job_line, waits_for_jog};
 
 /// How many turns in a row an answer leaves to answers on other ports that have had no turn yet.
 const PATIENCE: u8 = 8;
@@ -170,7 +170,7 @@ impl Parser {
         }
         match self.next_line(data) {
             Some(chosen) => self.take(chosen, declined),
-            None if free && runs_job && !links.job.get().is_over() => {
+            None if free && runs_job && !links.job.get().is_over() && !waits_for_jog(links) => {
                 if !has_room_for_startup(links) {
                     self.lacking |= 1 << links.told().number;
                     return Turn::Nothing;
@@ -425,7 +425,7 @@ impl Parser {
             let waited = core::mem::replace(&mut asked, true);
             let woken = links.parser_wake.poll(cx);
             let mut ready = woken.is_ready();
-            if self.deferred != Deferred::No {
+            if self.deferred != Deferred::No || waits_for_jog(links) {
                 ready |= waited;
                 wake_after(links.thread, Event::Tick, cx.waker());
             }

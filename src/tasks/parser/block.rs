@@ -34,6 +34,13 @@ pub(super) fn has_room_for_startup(links: &Links) -> bool {
     !tells || has_room(links.told()) == Some(true)
 }
 
+/// Whether the next line of a built-in job waits for the end of a jog.
+#[inline(never)]
+#[small]
+pub(super) fn waits_for_jog(links: &Links) -> bool {
+    machine::cycle() == Cycle::Jog && !links.job.get().is_none() && is_working(links)
+}
+
 /// Carries out the next line of a built-in job. A line that is refused is told by an exception report. The end of the
 /// job is told by the reporter, when everything has been carried out.
 #[inline(never)]
