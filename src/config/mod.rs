@@ -23,7 +23,7 @@ pub mod words;
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 pub use name::Name;
-pub use number::{Digits, Fixed, Number};
+pub use number::{Digits, Fixed, Number, hex};
 pub use ratio::StepRatio;
 pub use setting::{Owner, Place, Setting};
 pub use words::Words;

@@ -1,10 +1,12 @@
-//! Decimal numbers without floats: text to fixed point and back.
+//! Decimal numbers without floats: text to fixed point and back. Bits as hexadecimal.
 //!
 //! Conversions round half away from zero and are otherwise exact, inches included (an inch is 25.4 mm). A number is
 //! first divided by ten with truncation, then rounded in the last division. This keeps the result exact, because the
 //! truncated part can never lift a value over a tie.
 //!
 //! Cost on AVR: a few thousand cycles a conversion (64-bit arithmetic). Never used on the motion path.
+
+use heapless::Vec;
 
 use crate::progmem;
 
@@ -223,6 +225,25 @@ impl Number {
     }
 }
 
+/// Returns 32 bits as hexadecimal, such as `0x2a`.
+#[inline(never)]
+#[small]
+pub fn hex(bits: i32) -> Vec<u8, 10> {
+    let mut text = Vec::new();
+    // There is room for ten bytes.
+    let mut put = |byte| text.push(byte).is_ok();
+    let _ = put(b'0') && put(b'x');
+    let mut begun = false;
+    for place in (0..8u8).rev() {
+        let digit = (bits >> (4 * place)) as u8 & 15;
+        begun |= digit != 0 || place == 0;
+        if begun {
+            put(if digit < 10 { b'0' + digit } else { b'a' - 10 + digit });
+        }
+    }
+    text
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -236,6 +257,13 @@ mod tests {
 
     fn read(text: &str, decimals: u8, inches: bool) -> Option<i32> {
         Number::parse(text.as_bytes()).and_then(|n| n.fixed(decimals, inches))
+    }
+
+    #[test]
+    fn bits_are_written_without_leading_zeros() {
+        for (bits, text) in [(0, "0x0"), (0x2a, "0x2a"), (0x1000, "0x1000"), (-1, "0xffffffff")] {
+            assert_eq!(hex(bits), text.as_bytes());
+        }
     }
 
     #[test]

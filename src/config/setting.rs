@@ -11,7 +11,8 @@ use super::table::{HOMING, IDLE, Kind, MODE, RADIUS, SettingRow, row_of};
 use super::words::Words;
 use crate::boards::{ACTIVE, MOTORS};
 use crate::capability::Capability;
-use crate::progmem::Slice;
+use crate::progmem::{Slice, Text};
+use crate::text;
 use crate::units::{AXES, FIRST_ROTARY};
 
 const FIRST_MOTOR: u8 = system::COUNT as u8;
@@ -394,6 +395,11 @@ impl Setting {
     /// Whether the setting is in EEPROM only.
     pub fn is_cold(self) -> bool {
         (Self::WARM..Self::COLD).contains(&self.0)
+    }
+
+    /// The text of a setting whose kind is [`Kind::Text`].
+    pub fn text(self) -> Text {
+        if self.row().max != 0 { text!(env!("CARGO_PKG_VERSION")) } else { text!("0000-KERF") }
     }
 
     /// Whether the setting is written as hexadecimal.

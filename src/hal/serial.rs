@@ -20,13 +20,14 @@ pub const RX_RING: usize = 256;
 /// Size of the receive ring of the second port, a power of two.
 pub const AUX_RING: usize = 64;
 
+/// Size of each transmit ring, a power of two.
+pub const TX_RING: usize = 128;
+
 /// Returns how many bytes may come before one is lost, when none wait in the receive ring of a port.
 pub const fn capacity(port: u8) -> u8 {
     let size = if PORTS > 1 && port == AUX { AUX_RING } else { RX_RING };
     (size - 2) as u8
 }
-/// Size of each transmit ring, a power of two.
-pub const TX_RING: usize = 128;
 
 /// Bytes below this are marks. No line of text contains one: a byte with such a value that comes from outside is
 /// replaced by [`STRAY`].

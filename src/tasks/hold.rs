@@ -100,7 +100,7 @@ pub fn refuse_older(links: &Links, pool: &mut LinePool) {
 /// Cuts the stream of a port: behind `slot` of its receive ring, or, if that is `None`, where the reader is. Does
 /// nothing on a port with a reset of its own: the greeting waits for the cut where that reset stands, and what is
 /// behind that cut may have no room before the greeting.
-fn cut_up_to(port: &Port, lines: &mut LinePool, slot: Option<u8>) {
+pub fn cut_up_to(port: &Port, lines: &mut LinePool, slot: Option<u8>) {
     if !port.is_resetting() {
         cut_here(port, lines, slot);
     }
@@ -112,13 +112,6 @@ fn cut_here(port: &Port, lines: &mut LinePool, slot: Option<u8>) {
         Some(_) => port.cut.set(slot),
         None if port.cut.get().is_none() => lines.terminate_partial(dropped()),
         None => {}
-    }
-}
-
-/// Cuts the stream of a port behind a slot of its receive ring, unless the port has a reset of its own.
-pub fn cut_looked(port: &Port, slot: Option<u8>) {
-    if slot.is_some() && !port.is_resetting() {
-        port.cut.set(slot);
     }
 }
 

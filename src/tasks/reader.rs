@@ -401,7 +401,9 @@ fn look_ahead(links: &Links, port: &Port, scan: &mut Scan, ring: &mut Window<'_>
         if machine::is_alarmed() {
             hold::refuse_older(links, &mut pool);
             // What has been looked through came before the control line, or is that line.
-            hold::cut_looked(port, scan.looked.checked_sub(1).map(|last| ring.slot(last)));
+            if let Some(last) = scan.looked.checked_sub(1) {
+                hold::cut_up_to(port, &mut pool, Some(ring.slot(last)));
+            }
         }
     }
     scan.look_for_stops(links, port, &mut pool, ring);

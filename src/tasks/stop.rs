@@ -63,7 +63,7 @@ impl Scan {
                     if let Some(alarm) = asks_alarm(&line, port.is_plain()).filter(|_| whole) {
                         alarm::raise(links, alarm);
                         pool.terminate(hold::dropped());
-                        hold::cut_looked(port, Some(ring.slot(n)));
+                        hold::cut_up_to(port, pool, Some(ring.slot(n)));
                         self.begun += 1;
                     }
                     line.clear();

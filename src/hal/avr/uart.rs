@@ -379,12 +379,9 @@ pub fn lost_ends(port: u8) -> u16 {
 
 /// Returns how many bytes may come before one is lost, at most 254: one less than the receive ring has room for.
 pub fn room(port: u8) -> u8 {
-    let (size, used) = if PORTS > 1 && port == AUX {
-        (AUX_RING, AUX_SHARED.rx.used())
-    } else {
-        (RX_RING, USB_SHARED.rx.used())
-    };
-    (size - 2).saturating_sub(used) as u8
+    let is_aux = PORTS > 1 && port == AUX;
+    let used = if is_aux { AUX_SHARED.rx.used() } else { USB_SHARED.rx.used() };
+    serial::capacity(port).saturating_sub(used as u8)
 }
 
 /// Whether half of the second port's receive ring is full. The other half lasts 3 ms, so a task with much to do then

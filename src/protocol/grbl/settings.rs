@@ -4,18 +4,17 @@
 //! without a setting in Kerf is shown with a fixed value, and accepts only that value.
 
 use super::report::LOWERED;
-use super::write::{bits, fixed, text};
+use super::write::{fixed, text};
 use crate::boards::MOTORS;
 use crate::capability::Capability;
 use crate::config::name::{Name, token};
 use crate::config::table::Kind;
-use crate::config::{Fixed, Number, Owner, Setting};
+use crate::config::{Fixed, Number, Owner, Setting, hex};
 use crate::kinematics;
 use crate::progmem;
 use crate::protocol::steps::{named, turned};
 use crate::protocol::{Machine, Out, Warning};
 use crate::status::Status;
-use crate::text;
 use crate::units::AXES;
 
 progmem! {
@@ -287,9 +286,8 @@ pub fn by_name(name: &[u8]) -> Option<Setting> {
 pub fn put_named(setting: Setting, machine: &mut impl Machine, out: &mut impl Out) {
     let (row, value) = (setting.row(), machine.setting(setting));
     match row.kind {
-        Kind::Text if row.max != 0 => text(out, text!(env!("CARGO_PKG_VERSION"))),
-        Kind::Text => text(out, text!("0000-KERF")),
-        Kind::Data | Kind::Job => bits(out, value),
+        Kind::Text => text(out, setting.text()),
+        Kind::Data | Kind::Job => out.put_all(hex(value).iter().copied()),
         _ => fixed(out, Fixed { value, decimals: row.stored }),
     }
 }
@@ -300,7 +298,7 @@ pub fn put_named(setting: Setting, machine: &mut impl Machine, out: &mut impl Ou
 pub fn set_named(setting: Setting, text: &[u8], machine: &mut impl Machine) -> Result<(), Status> {
     match text {
         [b'0', b'x' | b'X', digits @ ..] if setting.is_data() => {
-            put_value(machine, Some(setting), hex(digits)?)
+            put_value(machine, Some(setting), parse_hex(digits)?)
         }
         _ => put(machine, Some(setting), parse(text)?),
     }
@@ -308,7 +306,7 @@ pub fn set_named(setting: Setting, text: &[u8], machine: &mut impl Machine) -> R
 
 /// Parses up to eight hexadecimal digits.
 #[small]
-fn hex(digits: &[u8]) -> Result<i32, Status> {
+fn parse_hex(digits: &[u8]) -> Result<i32, Status> {
     if !(1..=8).contains(&digits.len()) {
         return Err(Status::BadNumber);
     }

@@ -26,21 +26,6 @@ pub fn speed(out: &mut impl Out, thousandths: i32, inches: bool) {
     fixed(out, if inches { value.inches(1) } else { value.rounded(0) });
 }
 
-/// Writes 32 bits as hexadecimal, such as `0x2a`.
-#[inline(never)]
-#[small]
-pub fn bits(out: &mut impl Out, bits: i32) {
-    text(out, crate::text!("0x"));
-    let mut begun = false;
-    for place in (0..8u8).rev() {
-        let digit = (bits >> (4 * place)) as u8 & 15;
-        begun |= digit != 0 || place == 0;
-        if begun {
-            out.put(if digit < 10 { b'0' + digit } else { b'a' - 10 + digit });
-        }
-    }
-}
-
 /// Writes a line end.
 pub fn line_end(out: &mut impl Out) {
     out.put_plain(plain!("\r\n"));

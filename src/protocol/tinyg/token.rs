@@ -13,7 +13,7 @@ use crate::machine::Alarm;
 use crate::progmem::Text;
 use crate::protocol::{Machine, Value};
 use crate::units::AXES;
-use crate::{named, plain, progmem, text};
+use crate::{named, plain, progmem};
 
 const FIRST_SINGLE: u16 = Setting::NUMBERS as u16;
 const FIRST_VECTOR: u16 = FIRST_SINGLE + SINGLE_COUNT as u16;
@@ -170,8 +170,7 @@ impl Token {
             Some(Subject::Setting(setting)) => {
                 let row = setting.row();
                 return match row.kind {
-                    Kind::Text if row.max != 0 => Shown::Text(text!(env!("CARGO_PKG_VERSION"))),
-                    Kind::Text => Shown::Text(text!("0000-KERF")),
+                    Kind::Text => Shown::Text(setting.text()),
                     Kind::Data | Kind::Job => Shown::Data(machine.setting(setting)),
                     _ => {
                         let value = machine.setting(setting);

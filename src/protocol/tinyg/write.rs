@@ -3,11 +3,11 @@
 use super::format::{COMMA, EXPAND, Format, HUSHED, MUTE, SILENT, STRICT, WRAPPED};
 use super::token::Shown;
 use super::variation::Variation;
-use crate::config::{Digits, Fixed, Settings};
+use crate::config::{Digits, Fixed, Settings, hex};
+use crate::plain;
 use crate::progmem::{Plain, Text};
 pub use crate::protocol::{Ending, Out};
 use crate::status::Status;
-use crate::{plain, text};
 
 /// Writes a line end.
 pub fn put_line_end(settings: &Settings, out: &mut impl Out) {
@@ -181,15 +181,7 @@ impl<'a, O: Out> Writer<'a, O> {
 
     /// Writes 32 bits as hexadecimal, such as `0x2a`.
     pub fn bits(&mut self, bits: i32) {
-        self.text(text!("0x"));
-        let mut begun = false;
-        for place in (0..8u8).rev() {
-            let digit = (bits >> (4 * place)) as u8 & 15;
-            begun |= digit != 0 || place == 0;
-            if begun {
-                self.byte(if digit < 10 { b'0' + digit } else { b'a' - 10 + digit });
-            }
-        }
+        hex(bits).iter().for_each(|byte| self.byte(*byte));
     }
 
     /// Opens an object.

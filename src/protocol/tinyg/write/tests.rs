@@ -1,6 +1,7 @@
 use super::*;
 use crate::config::{Name, Setting, Settings};
 use crate::protocol::Checksum;
+use crate::text;
 use std::string::String;
 use std::vec::Vec;
 
