@@ -10,9 +10,8 @@ use crate::capability::Capability;
 use crate::config::name::{Name, token};
 use crate::config::table::Kind;
 use crate::config::{Fixed, Number, Owner, Setting, hex};
-use crate::kinematics;
 use crate::progmem;
-use crate::protocol::steps::{named, turned};
+use crate::protocol::steps::{motor_of, named, set_steps, steps};
 use crate::protocol::{Machine, Out, Warning};
 use crate::status::Status;
 use crate::units::AXES;
@@ -133,17 +132,6 @@ fn mask(machine: &mut impl Machine, token: [u8; 4]) -> i32 {
     bits
 }
 
-/// Returns the first motor of an axis.
-#[small]
-fn motor_of(machine: &mut impl Machine, axis: u8) -> Option<u8> {
-    (0..MOTORS as u8).find(|motor| moves(machine, *motor, axis))
-}
-
-fn moves(machine: &mut impl Machine, motor: u8, axis: u8) -> bool {
-    let drives = read(machine, of_motor(motor, token("ma"))) as u8;
-    kinematics::stands_for(drives) == axis
-}
-
 /// Splits a number from 100 on: which of the four settings of an axis, and which axis.
 #[small]
 fn split(number: u8) -> Option<(u8, u8)> {
@@ -208,14 +196,6 @@ fn axis_value(what: u8, axis: u8, machine: &mut impl Machine) -> Fixed {
 fn travel(axis: u8, machine: &mut impl Machine) -> (i32, i32) {
     let low = read(machine, of_axis(axis, token("tn")));
     (low, read(machine, of_axis(axis, token("tm"))))
-}
-
-/// Returns the steps per millimetre of an axis, in thousandths.
-#[small]
-fn steps(axis: u8, machine: &mut impl Machine) -> i32 {
-    let Some(motor) = motor_of(machine, axis) else { return 0 };
-    let turn = read(machine, of_motor(motor, token("tr")));
-    turned(machine, motor, turn)
 }
 
 /// Sets a numbered setting to the value in `text`. [`Status::Again`] as of `Machine::set_row`: the whole call has to
@@ -448,7 +428,10 @@ fn set_homing(bits: i32, machine: &mut impl Machine) -> Result<(), Status> {
 #[small]
 fn set_axis(what: u8, axis: u8, to: Number, machine: &mut impl Machine) -> Result<(), Status> {
     match what {
-        0 => set_steps(axis, to, machine),
+        0 => {
+            motor_of(axis, machine).ok_or(Status::UnrecognizedName)?;
+            set_steps(axis, to, machine, |machine, turn, to| put_value(machine, Some(turn), to))
+        }
         1 => {
             put(machine, of_axis(axis, token("vm")), to)?;
             put(machine, of_axis(axis, token("fr")), to)
@@ -465,34 +448,5 @@ fn set_axis(what: u8, axis: u8, to: Number, machine: &mut impl Machine) -> Resul
                 put_value(machine, of_axis(axis, token("tm")), high)
             }
         }
-    }
-}
-
-/// Sets the steps per millimetre of an axis, by the travel per turn of each of its motors. Checks all motors first: a
-/// travel out of range is refused and changes no motor. An axis without a motor is refused.
-#[small]
-fn set_steps(axis: u8, to: Number, machine: &mut impl Machine) -> Result<(), Status> {
-    let to = to.fixed(3, false).filter(|to| *to > 0).ok_or(Status::OutOfRange)?;
-    motor_of(machine, axis).ok_or(Status::UnrecognizedName)?;
-    for sets in [false, true] {
-        for motor in 0..MOTORS as u8 {
-            if moves(machine, motor, axis) {
-                set_turn(motor, to, sets, machine)?;
-            }
-        }
-    }
-    Ok(())
-}
-
-/// Checks the travel per turn with which a motor has `steps` per millimetre, in thousandths; and `sets` it.
-#[inline(never)]
-#[small]
-fn set_turn(motor: u8, steps: i32, sets: bool, machine: &mut impl Machine) -> Result<(), Status> {
-    let travel = of_motor(motor, token("tr"));
-    let turn = turned(machine, motor, steps);
-    match travel {
-        Some(travel) if !travel.accepts(turn) => Err(Status::OutOfRange),
-        travel if sets => put_value(machine, travel, turn),
-        _ => Ok(()),
     }
 }

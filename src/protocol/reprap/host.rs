@@ -8,6 +8,7 @@ use crate::config::Fixed;
 use crate::gcode::overrides::{Change, Override};
 use crate::machine::{Alarm, Cycle, Doing};
 use crate::progmem::Text;
+use crate::protocol::steps::axis_of;
 use crate::protocol::{Cold, Extruder, Machine, Out, Value};
 use crate::status::Status;
 use crate::text;
@@ -258,7 +259,7 @@ fn motors_off(block: &[u8], machine: &mut impl Machine) -> Step {
     }
     let axes = if named == ALL { 0 } else { named } | u8::from(extruder) << EXTRUDER;
     for motor in 0..crate::boards::MOTORS as u8 {
-        if settings::axis_of(motor, machine).is_some_and(|axis| axes & 1 << axis != 0) {
+        if axis_of(motor, machine).is_some_and(|axis| axes & 1 << axis != 0) {
             machine.energize(Some(motor), false);
         }
     }

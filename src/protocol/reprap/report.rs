@@ -1,11 +1,11 @@
 //! The reports of M105, M114, M115, M119.
 
 use super::host::{Step, count};
-use super::settings;
 use super::write::{fixed, int, length, line_end, text};
 use crate::boards::inputs;
 use crate::config::Fixed;
 use crate::plain;
+use crate::protocol::steps::motor_of;
 use crate::protocol::{Machine, Out, Value};
 use crate::text;
 
@@ -69,7 +69,7 @@ pub fn position(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Optio
     if at == 4 {
         text(out, text!("Count"));
     }
-    if let Some(motor) = settings::motor_of(axis, machine) {
+    if let Some(motor) = motor_of(axis, machine) {
         count(letter, machine.value(Value::Steps(motor)), out);
     }
     if at < 7 {

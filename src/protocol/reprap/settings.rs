@@ -6,13 +6,11 @@ use super::command::number;
 use super::host::Step;
 use super::tuning;
 use super::write::{fixed, line_end, text};
-use crate::boards::MOTORS;
 use crate::config::name::token;
 use crate::config::{Fixed, Number, Owner};
 use crate::gcode::tables::TableRow;
-use crate::kinematics;
 use crate::progmem::Text;
-use crate::protocol::steps::{named, turned};
+use crate::protocol::steps::{named, set_steps, steps};
 use crate::protocol::{Machine, Out};
 use crate::status::Status;
 use crate::text;
@@ -27,19 +25,6 @@ const LISTED: [u16; 5] = [92, 203, 201, 205, 206];
 #[small]
 pub fn read(machine: &mut impl Machine, owner: Owner, token: [u8; 4]) -> i32 {
     named(owner, token).map_or(0, |setting| machine.setting(setting))
-}
-
-/// Returns the axis that a motor moves. For a motor that drives X and Y together this is the axis that it stands for.
-#[small]
-pub fn axis_of(motor: u8, machine: &mut impl Machine) -> Option<u8> {
-    let drives = u8::try_from(read(machine, Owner::Motor(motor), token("ma"))).ok()?;
-    Some(kinematics::stands_for(drives)).filter(|axis| *axis < 6)
-}
-
-/// Returns the first motor of an axis.
-#[small]
-pub fn motor_of(axis: u8, machine: &mut impl Machine) -> Option<u8> {
-    (0..MOTORS as u8).find(|motor| axis_of(*motor, machine) == Some(axis))
 }
 
 /// Returns those of `axes` that home at their upper ends, as bits.
@@ -66,18 +51,15 @@ fn setting(code: u16) -> Option<([u8; 4], i32)> {
 #[inline(never)]
 #[small]
 fn value(code: u16, axis: u8, machine: &mut impl Machine) -> Fixed {
-    match (setting(code), motor_of(axis, machine)) {
+    match (setting(code), code) {
         (Some((token, factor)), _) => {
             let found = named(Owner::Axis(axis), token);
             let decimals = found.map_or(0, |found| found.row().stored);
             let value = read(machine, Owner::Axis(axis), token) / factor;
             Fixed { value, decimals }.rounded(3)
         }
-        (None, Some(motor)) if code == 92 => {
-            let turn = read(machine, Owner::Motor(motor), token("tr"));
-            Fixed { value: turned(machine, motor, turn), decimals: 3 }
-        }
-        (None, _) if code == 206 => {
+        (None, 92) => Fixed { value: steps(axis, machine), decimals: 3 },
+        (None, 206) => {
             let at = machine.value(crate::protocol::Value::TableRow(TableRow::system(0), axis));
             Fixed { value: at, decimals: 4 }.rounded(3)
         }
@@ -187,7 +169,10 @@ fn set_axis(code: u16, axis: u8, to: Number, machine: &mut impl Machine) -> Resu
         return Err(Status::Again);
     }
     match code {
-        92 => set_steps(axis, to, machine),
+        92 => set_steps(axis, to, machine, |machine, turn, to| match machine.setting(turn) == to {
+            true => Ok(()),
+            false => machine.set(turn, to).map(|_| ()),
+        }),
         203 => {
             // M203 is in mm/s.
             let by_second = to.fixed(3, false).filter(|to| (0..=i32::MAX / 60).contains(to));
@@ -216,24 +201,4 @@ pub fn put_number(
     let setting = named(owner, token).ok_or(Status::UnrecognizedName)?;
     let value = machine.settings().check(setting, to, false)?;
     machine.set(setting, value).map(|_| ())
-}
-
-/// Sets the steps per millimetre of an axis, by the travel per turn of each of its motors.
-#[small]
-fn set_steps(axis: u8, to: Number, machine: &mut impl Machine) -> Result<(), Status> {
-    let to = to.fixed(3, false).filter(|to| *to > 0).ok_or(Status::OutOfRange)?;
-    for motor in 0..MOTORS as u8 {
-        if axis_of(motor, machine) == Some(axis) {
-            let turn = turned(machine, motor, to);
-            let setting = named(Owner::Motor(motor), token("tr"));
-            let setting = setting.ok_or(Status::UnrecognizedName)?;
-            if !setting.accepts(turn) {
-                return Err(Status::OutOfRange);
-            }
-            if machine.setting(setting) != turn {
-                machine.set(setting, turn)?;
-            }
-        }
-    }
-    Ok(())
 }
