@@ -7,17 +7,17 @@ const PREFACE: &str = "\
 
 <!-- Made from `boards/*.rs` by `cargo xtask docs`: change it there. -->
 
-Which wire goes where, for each board. Check it against your shield **before** you connect a spindle or a heater.
+The pins of each board. Check them against your shield **before** you connect a spindle or a heater.
 
-- **A CNC Shield V3 for the Arduino Uno does not fit.** It plugs into a Mega, but its pins are others: motors would not move, and outputs would be switched
-  by chance. `mega2560-grbl` means the pins of grbl for the *Mega*: steps on D24 to D27.
-- **Switches** go between the input and ground. No resistor is needed. Normally open or closed: `st` for those at the axes, `saf` for the door, `est` for the
-  emergency stop. The probe closes.
-- **Outputs are 5 V logic**, a few milliamperes. Relays, coils and spindles need a driver. An inverter with an input of 0 to 10 V
-  needs a converter from PWM to 0 to 10 V, and a common ground. During a reset nobody drives the pins: fit pull-down resistors, 10 kOhm, where
+- **A CNC Shield V3 for the Arduino Uno does not fit.** It plugs into a Mega, but its pins differ: motors would not move, and outputs would switch
+  at random. `mega2560-grbl` means the pins of grbl for the *Mega*: steps on D24 to D27.
+- **Switches** go between the input and ground. You need no resistor. Set normally open or closed by `st` for the axes, `saf` for the door, `est` for the
+  emergency stop. The probe is normally open.
+- **Outputs are 5 V logic** (3.3 V on an RP2040), a few milliamperes. Relays, coils and spindles need a driver. An inverter with an input of 0 to 10 V
+  needs a converter from PWM to 0 to 10 V, and a common ground. During a reset the pins float: fit pull-down resistors, 10 kOhm, where
   something must stay off.
-- **The emergency stop input is an addition.** The emergency stop itself cuts the power of motors and spindle.
-- Long wires of switches pick up noise. Shield them, keep them away from those of the spindle, and prefer normally closed ones.
+- **The emergency stop input is additional.** The emergency stop itself must cut the power of motors and spindle.
+- Long switch wires pick up noise. Shield them, keep them away from spindle cables, and prefer normally closed switches.
 
 ";
 
@@ -166,15 +166,15 @@ fn about(board: &Board) -> &'static str {
             "An Arduino Mega 2560 with RAMPS 1.4: X, Y, Z and the first extruder (E0) as A."
         }
         "pico-cnc" => {
-            "A Raspberry Pi Pico on a breakout board, with four drivers. **Its pins are 3.3 V** and take no more: see [the RP2040](rp2040.md)."
+            "A Raspberry Pi Pico on a breakout board, with four drivers. **Its pins are 3.3 V** and tolerate no more: see [the RP2040](rp2040.md)."
         }
         "pico-cnc6" => {
-            "A Raspberry Pi Pico with six drivers: two more motors may share an axis with another, or move B and C. **3.3 V**, as `pico-cnc`."
+            "A Raspberry Pi Pico with six drivers: the two additional motors may share an axis with another motor, or move B and C. **3.3 V**, as `pico-cnc`."
         }
         "skr-pico" => {
-            "A BTT SKR Pico v1.0: motor 4 is its driver E. FAN1 cools the print, FAN2 and FAN3 are spindle and mist, the servo's pin is the spindle's speed. **3.3 V**, as `pico-cnc`. \
-             A jumper for DIAG puts the driver's pin in the place of the switches of X, Y or Z, for [homing by a stall](rp2040.md#homing-by-a-stall): without a switch there. \
-             The jumper of E stays off: its pin is the emergency stop's."
+            "A BTT SKR Pico v1.0: motor 4 is its driver E. FAN1 cools the print, FAN2 and FAN3 are spindle and mist, the servo pin is the spindle's PWM. **3.3 V**, as `pico-cnc`. \
+             A DIAG jumper connects the driver's pin instead of the switch of X, Y or Z, for [homing by a stall](rp2040.md#homing-by-a-stall): remove the switch then. \
+             Leave the jumper of E off: its pin is the emergency stop's."
         }
         _ => "",
     }
@@ -222,9 +222,9 @@ pub fn markdown() -> String {
         }
         text += "\n";
         if is_ramps {
-            text += "D10, D8 and D9 are hot end, bed and fan ([printing.md](printing.md#wiring-ramps)); they are low until a line switches them on, and after every fault. D16 is the firmware's own: leave it open.\n\n";
+            text += "D10, D8 and D9 are hot end, bed and fan ([printing.md](printing.md#wiring-ramps)); they are off (low) until a line switches them on, and after every fault. Kerf uses D16 internally: leave it open.\n\n";
         } else {
-            text += "D16 is the firmware's own: leave it open.\n\n";
+            text += "Kerf uses D16 internally: leave it open.\n\n";
         }
     }
     text += &ALL.into_iter().filter(|board| is_numbered(board)).map(numbered).collect::<String>();
