@@ -1,14 +1,15 @@
-//! Pressure advance: the extruder is ahead of its line by K times the velocity that is planned for it, so that what leaves the nozzle follows
-//! the velocity along the path.
+//! Pressure advance: the extruder is ahead of its line by K times its planned velocity, so that the flow from the
+//! nozzle follows the velocity along the path. This distance is the *lead*.
 //!
 //! Owned by [`Prep`](super::prep::Prep), at the exec level. Lines that both push filament and travel have a lead;
-//! retractions, moves of the extruder alone, and travels have none. After a line with a lead, the motor gives the
-//! lead back in the segments of the lines that follow, and at a standstill in segments of its own. The lead is
-//! counted in whole phase units, apart from the line, so that nothing of it is left at rest.
+//! retractions, moves of the extruder alone, and travels have none. After a line with a lead, the motor takes the lead
+//! back in the segments of the lines that follow, and at a standstill in segments of its own. The lead is counted in
+//! whole phase units, separately from the line, so that it is exactly 0 at a standstill.
 //!
-//! For each stretch, exec tells how fast the machine is at its end ([`Advance::aim`]). Each segment takes the motor
-//! towards the lead for this velocity ([`Advance::travel`]), within the velocity and the acceleration of the axis.
-//! Where the lead jumps, as at the end of a line that pushes, the motor is therefore later than the model demands.
+//! For each stretch, exec passes the velocity at the end of the stretch ([`Advance::aim`]). Each segment moves the
+//! motor towards the lead for this velocity ([`Advance::travel`]), within the velocity and acceleration limits of the
+//! axis. Where the lead jumps, as at the end of a line that pushes, the motor is therefore later than the model
+//! demands.
 //!
 //! Units: phase units, s. Cost on AVR: 1,100 cycles a line, 3,000 a segment; with K 0 and no lead left 10.
 
@@ -31,18 +32,18 @@ pub const EXTRUDERS: usize = Capability::Printer.is_built_in() as usize;
 
 /// The unit of K, s.
 const UNIT_S: f32 = 1e-4;
-/// A shorter stretch counts as this long, s.
+/// The least duration of a stretch in computations, s.
 const SHORTEST: f32 = 1e-4;
 /// The longest lead, phase units: 30,000 steps.
 const MOST: f32 = 1e9;
-/// A lead that may stay while other motors move, phase units: 1/32 step.
+/// A lead so small that it may stay while other motors move, phase units: 1/32 step.
 const LITTLE: u32 = 1 << 10;
 
-/// [`refine`] knows a way to 1/32 of the unit in which it is counted. This is the exponent of 32.
+/// [`refine`] stores a distance to 1/32 of the unit in which it is counted. This is the exponent of 32.
 const MORE_LOG2: u8 = 5;
-/// What rounding to 1/512 step takes off two ways, or adds to them, phase units.
+/// The error of two distances that are rounded to 1/512 step, phase units.
 const ROUNDING: f32 = STEP as f32 / 256.0;
-/// How much filament a mean covers at most: 2 to this power slacks, 0.1 mm.
+/// The most filament that a mean covers, as a power of two in slacks: 0.1 mm.
 const ENOUGH_LOG2: i8 = 6;
 
 /// The parameters of the extruder's lead.
@@ -56,7 +57,8 @@ pub struct Lead {
     pub accel: Short,
     /// Velocity limit of the motor with its lead, steps/s, not 0.
     pub velocity: Short,
-    /// By how much the ways of lines that push alike may differ, phase units: see [`Lead::slack`].
+    /// The largest difference of extruder distances between lines with one extrusion rate, phase units: see
+    /// [`Lead::slack`].
     pub slack: Short,
 }
 
@@ -65,16 +67,16 @@ impl Lead {
     pub const NONE: Self =
         Self { motor: 0, time: 0, accel: Short::ZERO, velocity: Short::ZERO, slack: Short::ZERO };
 
-    /// Returns the slack of a motor with so many steps/mm: 0.0012 mm of filament, since files may have three
-    /// decimals, and the rounding to parts of a step.
+    /// Returns the slack of a motor with `steps` steps/mm: 0.0012 mm of filament, since files may have three decimals,
+    /// plus the rounding to parts of a step.
     pub fn slack(steps: f32) -> Short {
         Short::new(steps * (12.0 * STEP as f32 / Length::PER_MM as f32) + ROUNDING)
     }
 }
 
-/// Notes in a line that pushes filament how far its extruder goes: to 1/512 step, or to 1/32 step where ways are in
-/// whole steps. The ends of lines are known to 1/16 step only. That may be a tenth of a short line, and the lead
-/// would be off by as much. `travel` is that of the extruder's axis, in units of [`Length`].
+/// Stores in a line that pushes filament the exact distance of its extruder: to 1/512 step, or to 1/32 step where
+/// distances are in whole steps. The ends of lines are known to 1/16 step only, which may be a tenth of a short line
+/// and would make the lead wrong by as much. `travel` is that of the extruder's axis, in units of [`Length`].
 ///
 /// Called by the planner while there is a K. Cost: 1,400.
 #[inline(never)]
@@ -94,7 +96,7 @@ pub fn refine(line: &mut Line, motor: usize, ratio: StepRatio, travel: i32) {
 pub struct Advance {
     /// Whether there is a K, or a lead.
     pub(super) on: bool,
-    /// Whether the running block has a lead, or takes one back.
+    /// Whether the running block has a lead, or takes back an earlier one.
     pub(super) leads: bool,
     pub(super) motor: u8,
     /// Whether the motor goes backwards in the last segment with a lead.
@@ -103,11 +105,11 @@ pub struct Advance {
     time: f32,
     /// Acceleration limit of the lead, steps/s^2.
     accel: Short,
-    /// By how much the ways of lines that push alike may differ, phase units.
+    /// The largest difference of extruder distances between lines with one extrusion rate, phase units.
     slack: Short,
     /// The motor's velocity limit, phase units in 256 CPU cycles.
     rate: u16,
-    /// How far the motor has gone in lines that push alike, phase units, and how long these lines were, mm.
+    /// The motor's distance in lines with one extrusion rate, phase units, and the length of these lines, mm.
     pushed: (f32, f32),
     /// The lead in the running block for each mm/s of its velocity, phase units.
     factor: f32,
@@ -149,7 +151,7 @@ impl Advance {
     pub fn set(&mut self, lead: &Lead) {
         const PER_256: f32 = STEP as f32 * 256.0 / TIMER_HZ as f32;
         self.time = f32::from(lead.time) * UNIT_S;
-        // With a K of 0 the other parameters stay: what is left of the lead is taken back within them.
+        // With a K of 0 the other parameters stay: they limit how the remaining lead is taken back.
         if lead.time != 0 {
             self.motor = lead.motor;
             self.accel = lead.accel;
@@ -190,13 +192,13 @@ impl Advance {
         mean
     }
 
-    /// Whether no lead is left, except for so little that it may stay until the machine rests.
+    /// Whether no lead is left, except for a remainder so small that it may stay until the machine stands still.
     fn is_over(&self) -> bool {
         self.made.unsigned_abs() < LITTLE && !some(self.speed)
     }
 
-    /// Whether the block needs no lead, and the motor is where its line is, except for so little that it may stay
-    /// until the machine rests.
+    /// Whether the block needs no lead and none is left, except for a remainder so small that it may stay until the
+    /// machine stands still.
     pub fn is_done(&self) -> bool {
         !some(self.factor) && self.goal == 0 && self.is_over()
     }
@@ -219,7 +221,7 @@ impl Advance {
         (self.factor, self.goal, self.pace) = (0.0, 0, 0.0);
     }
 
-    /// Makes the present position of the motor, which rests, that of its line.
+    /// Sets the lead to 0 at the present position of the motor, which stands still.
     pub fn cut(&mut self) {
         self.end();
         (self.made, self.speed, self.leads) = (0, 0.0, false);
@@ -245,13 +247,13 @@ impl Advance {
             return 0;
         }
         if ticks == 1 && want.unsigned_abs() < LITTLE {
-            // Exactly: a single tick is long enough for so little.
+            // The goal is reached exactly: a single tick is long enough for so small a distance.
             self.speed = 0.0;
             return want;
         }
         let time = seconds(ticks, period);
-        // How late the lead is, and how fast it catches up, both relative to a goal that moves at `pace`. So a goal
-        // that moves steadily is caught up with.
+        // How late the lead is, and how fast it catches up, both relative to a goal that moves at `pace`. So the lead
+        // reaches a goal that moves steadily.
         let late = want as f32 - self.pace * time;
         let far = size(late);
         let speed = turned(self.speed - self.pace, late);
@@ -268,8 +270,8 @@ impl Advance {
         per_tick(rounded(self.speed * time), ticks)
     }
 
-    /// Sets the goal to 0, because the machine rests. Returns whether so little lead is left that a single tick takes
-    /// it back.
+    /// Sets the goal to 0, because the machine stands still. Returns whether the remaining lead is so small that a
+    /// single tick takes it back.
     pub fn rest(&mut self) -> bool {
         (self.goal, self.pace) = (0, 0.0);
         let little = self.made.unsigned_abs() < LITTLE;
@@ -285,7 +287,8 @@ impl Advance {
         most.clamp(1, STEP.into()) as i32
     }
 
-    /// Counts a segment in which the motor goes `more` farther than its line in each tick, where `wanted` was asked for.
+    /// Counts a segment in which the motor moves `more` phase units farther than its line in each tick; `wanted` was
+    /// requested.
     #[inline(never)]
     pub fn note(&mut self, more: i32, wanted: i32, (ticks, period): (u16, u16)) {
         let far = more * i32::from(ticks);
@@ -297,7 +300,8 @@ impl Advance {
     }
 }
 
-/// Returns how far the extruder goes in a line, as [`refine`] has noted, phase units; 0 if it goes back or stands.
+/// Returns the distance of the extruder in a line, as stored by [`refine`], phase units; 0 if it moves backwards or
+/// stands.
 #[inline(always)]
 pub(super) fn pushed(way: i16, line: &Line) -> u32 {
     const LOG2: u8 = STEP_LOG2 - MORE_LOG2;
@@ -308,7 +312,7 @@ pub(super) fn pushed(way: i16, line: &Line) -> u32 {
     (far as u32) << if line.extent.has_whole_steps() { LOG2 } else { LOG2 - PARTS_LOG2 }
 }
 
-/// Returns a way in the parts that [`refine`] knows.
+/// Returns a distance in the parts of a step of [`refine`].
 fn in_parts(way: i16) -> i32 {
     i32::from(way) << MORE_LOG2
 }
@@ -331,7 +335,7 @@ fn rounded(x: f32) -> i32 {
     if x.is_sign_negative() { -size } else { size }
 }
 
-/// Returns a way divided by `ticks`, rounded, and no more than a step.
+/// Returns a distance divided by `ticks`, rounded, and no more than a step.
 #[inline(never)]
 #[small]
 fn per_tick(way: i32, ticks: u16) -> i32 {

@@ -1,9 +1,9 @@
 //! A block: one straight move, dwell or synchronised command, as the planner leaves it for exec.
 //!
-//! Units: mm (degrees for a rotary-only move), seconds, motor steps. The size of a block decides how far Kerf looks
-//! ahead, and each byte of it is there 62 times. So limits take two bytes each, and the line number three. The sign
-//! of a length tells in which unit distances are counted ([`Extent`]). A line needs no tag, because no line has a
-//! [`Reserve`] of 0. A block has 30 bytes on AVR.
+//! Units: mm (degrees for a rotary-only move), seconds, motor steps. The size of a block bounds the look-ahead: there
+//! are 62 blocks in RAM. So limits take two bytes each, and the line number three. The sign of a length tells in which
+//! unit distances are counted ([`Extent`]). A line needs no tag, because no line has a [`Reserve`] of 0. A block has 30
+//! bytes on AVR.
 
 use super::advance::Lead;
 use super::factors::{Factors, Reserve};
@@ -16,11 +16,11 @@ use crate::gcode::command::Surface;
 use crate::gcode::heating::Heat;
 use crate::gcode::overrides::Change;
 
-/// Blocks know their ends to 1/16 step. This is the logarithm of the number of parts of a step.
+/// Ends of blocks are stored to 1/16 step. This is the logarithm of the number of parts of a step.
 pub const PARTS_LOG2: u8 = 4;
 
-/// The least and the greatest fraction at a block's end, in 1/16 step from the whole step next to it. Both are less
-/// than half a step, so that rounding errors cannot make another whole step the next one.
+/// The least and the greatest fraction at a block's end, in 1/16 step from the nearest whole step. Both are less than
+/// half a step, so that rounding errors cannot change which whole step is the nearest.
 pub const FRACTIONS: (i8, i8) = (-7, 6);
 
 /// A block of the queue.
@@ -32,7 +32,7 @@ pub struct Block {
 }
 
 impl Block {
-    /// Whether the block is not a line, but the machine goes on over it.
+    /// Whether the block is an action that does not stop the machine.
     #[small]
     pub fn is_aside(&self) -> bool {
         matches!(
@@ -47,7 +47,7 @@ impl Block {
         )
     }
 
-    /// A block of the line with this N word, 0 for none; at most [`N_MAX`](crate::gcode::command::N_MAX).
+    /// Returns a block of the line with this N word, 0 for none; at most [`N_MAX`](crate::gcode::command::N_MAX).
     #[inline(always)]
     pub fn new(body: Body, line: u32) -> Self {
         Self { body, line: number(line) }
@@ -95,7 +95,7 @@ pub enum QueuedAction {
     Dwell(u32),
     /// G28.3: sets the motor positions.
     SetPosition([i32; MOTORS]),
-    /// Changes what the drivers ask for, from here on.
+    /// Changes the timing that the drivers require, from here on.
     Drivers(Drivers),
     /// M3 to M9, S: sets the outputs and the speed of the spindle.
     Outputs(Outputs),
@@ -147,13 +147,13 @@ pub struct Outputs {
     pub speed: f32,
 }
 
-/// The length of a line, and the unit of its way. The last 8 of the float's 24 bits hold what the way does not say of
-/// an extruder ([`Extent::refine`]). So the length is as good as 16 bits are, 0.002 %.
+/// The length of a line, and the unit of its motor distances. The last 8 of the float's 24 bits hold the finer part of
+/// an extruder's distance ([`Extent::refine`]). So the length has 16 bits, 0.002 %.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Extent(f32);
 
 impl Extent {
-    /// The extent of a line `length` mm long, with a way in whole steps or in 1/16 step.
+    /// Returns the extent of a line `length` mm long, with distances in whole steps or in 1/16 step.
     #[inline(always)]
     pub fn new(length: f32, whole_steps: bool) -> Self {
         Self(if whole_steps { -length } else { length })
@@ -165,19 +165,19 @@ impl Extent {
         size(self.0)
     }
 
-    /// Keeps how much farther an extruder goes than its way says, in 1/32 of the unit of the way.
+    /// Stores how much farther an extruder moves than its `way`, in 1/32 of the unit of `way`.
     #[inline(always)]
     pub fn refine(&mut self, more: i8) {
         self.0 = f32::from_bits(self.0.to_bits() & !0xFF | u32::from(more as u8));
     }
 
-    /// Returns what [`Extent::refine`] has kept; any number if nothing has been kept.
+    /// Returns what [`Extent::refine`] has stored; any number if nothing has been stored.
     #[inline(always)]
     pub fn more(self) -> i8 {
         self.0.to_bits() as i8
     }
 
-    /// Whether the way is in whole steps, not in 1/16 step.
+    /// Whether distances are in whole steps, not in 1/16 step.
     #[inline(always)]
     pub fn has_whole_steps(self) -> bool {
         self.0.is_sign_negative()
@@ -187,7 +187,7 @@ impl Extent {
 /// A straight move.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Line {
-    /// Signed way of each motor, from the end of the block before: in 1/16 step, or in steps if it is too far for
+    /// Signed distance of each motor, from the end of the block before: in 1/16 step, or in steps if it is too long for
     /// that.
     pub way: [i16; MOTORS],
     /// Path length, and the unit of `way`.

@@ -1,24 +1,25 @@
-//! Merges short moves that lie on a line: what a program says in many lines, one block does.
+//! Merges short, nearly collinear moves into one block.
 //!
-//! Owned by the planner, which keeps one [`Chain`]: the lines since the last block. A line joins the chain if all
-//! ends that the program has named in it so far are within the tolerance of the straight way from the chain's start
-//! to the new end. Then the driven path is within the tolerance of every point of the programmed path, and the other
-//! way round, because both are straight between two ends.
+//! The planner owns one [`Chain`]: the lines since the last block. A line joins the chain if all its programmed end
+//! points so far lie within the tolerance of the straight line from the chain's start to the new end point. Then the
+//! driven path is within the tolerance of every point of the programmed path, and vice versa, because both are straight
+//! between end points.
 //!
-//! **What it keeps.** No end but the last. The axis that goes farthest is the dominant one, and no line of a chain
-//! goes back along it. For each of the other axes ([`Minor`]) the chain keeps the steepest and the least steep way
-//! that pass within the tolerance of all ends before the last. A new end must lie between the two; then it narrows
-//! them in turn. All is in integers and exact: lines that lie on one line to the unit of [`Length`] are merged
-//! whatever the tolerance.
+//! **State.** The chain stores only its last end point. The dominant axis is the one that travels farthest in the first
+//! line; no line of a chain reverses it. For each other axis ([`Minor`]) the chain stores the highest and the lowest
+//! slope that pass within the tolerance of all earlier end points. A new end point must lie between these two slopes,
+//! and then narrows them. The arithmetic is exact, in integers: lines that are collinear to the unit of [`Length`] are
+//! merged whatever the tolerance.
 //!
-//! **The tolerance.** The driven and the programmed path are compared where the dominant axis is as far. The distance
-//! there is never less than the true distance, so that for one other axis the tolerance holds as it is. With two other
-//! axes, each gets 0.7 of it.
+//! **Tolerance.** The deviation of the driven path is measured at equal positions of the dominant axis. It is never
+//! less than the true distance between the paths. If one other axis moves, it gets the whole tolerance; if two move,
+//! each gets 0.7 of it.
 //!
-//! **How long it gets.** At most what takes [`TIME_MS`] at its feed along any axis, or 3.2 mm. Reports name a line
-//! that much too early at most. Lines that each take longer are not merged.
+//! **Length.** No axis travels farther in a chain than in [`TIME_MS`] at the feed, nor farther than 3.2 mm. A report
+//! names a line early by at most that distance. Lines that are longer than that are not merged.
 //!
-//! Only linear axes, and only lines at the same feed. Cost on AVR: 900 cycles for a line that goes on, 600 for one that begins.
+//! Only lines of linear axes, at one feed, are merged. Cost on AVR: 900 cycles for a line that joins, 600 for one that
+//! begins a chain.
 
 use kerf_macros::small;
 
@@ -27,20 +28,20 @@ use crate::gcode::command::Feed;
 use crate::hal::arithmetic::product;
 use crate::units::{AXES, FIRST_ROTARY, Length, PerAxis};
 
-/// The longest time that a chain takes at its feed.
+/// The longest travel of an axis in a chain, as time at the feed.
 pub const TIME_MS: u16 = 12;
 
-/// How far a feed of 1 mm/min goes in that time, in units of [`Length`], as a power of two.
+/// The distance at 1 mm/min in [`TIME_MS`], in units of [`Length`], as a power of two.
 const FEED_LOG2: i8 = 1;
 const _: () = assert!(Length::PER_MM as u32 * TIME_MS as u32 == 60_000 << FEED_LOG2);
 
-/// The farthest that any axis goes in a chain: with the tolerance it fits 16 bits.
+/// The longest travel of any axis in a chain, units of [`Length`]: with the tolerance it fits 16 bits.
 const MOST: u16 = 0x7E00;
 
 /// The axes other than the dominant one.
 const MINORS: usize = FIRST_ROTARY - 1;
 
-/// A slope: how far an axis goes (`way`) while the dominant axis goes `over`.
+/// A slope: an axis travels `way` while the dominant axis travels `over`, in units of [`Length`].
 #[derive(Clone, Copy, Debug, Default)]
 struct Slope {
     way: i16,
@@ -48,14 +49,14 @@ struct Slope {
 }
 
 impl Slope {
-    /// Returns the slope that goes `way` farther.
+    /// Returns a slope whose travel is larger by `way`.
     #[inline(always)]
     fn beside(&self, way: i16) -> Self {
         Self { way: self.way + way, over: self.over }
     }
 }
 
-/// The slopes between which the way of an axis has to stay.
+/// The slopes of an axis between which the next end point must lie.
 #[derive(Clone, Copy, Debug, Default)]
 struct Minor {
     low: Slope,
@@ -63,16 +64,16 @@ struct Minor {
 }
 
 impl Minor {
-    /// Returns the slopes that pass an end within the tolerance.
+    /// Returns the lowest and the highest slope that pass within the tolerance of an end point.
     #[inline(never)]
     fn past(end: &Slope, tolerance: i16) -> Self {
         Self { low: end.beside(-tolerance), high: end.beside(tolerance) }
     }
 
-    /// Whether the way to this end stays between the slopes. If so, the end has to be passed from now on.
+    /// Whether an end point lies between the slopes. If so, narrows the slopes to pass within its tolerance.
     ///
-    /// Two slopes are compared by what each goes over the product of both lengths, below 2^30; the slopes beside the end differ from its own by
-    /// the tolerance times the other length.
+    /// Slopes are compared by cross-multiplication; products are below 2^30. The slopes at the edges of the tolerance
+    /// differ from the end point's own slope by the tolerance times the other `over`.
     #[inline(never)]
     fn pass(&mut self, end: &Slope, tolerance: i16) -> bool {
         let (low, at_low) = (times(self.low.way, end.over), times(end.way, self.low.over));
@@ -97,14 +98,14 @@ impl Minor {
 /// Lines that become one block.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Chain {
-    /// The way from the start of the chain to its end.
+    /// Travel from the start of the chain to its end, units of [`Length`].
     way: PerAxis<i16>,
     /// mm/min.
     feed: f32,
-    /// How far the dominant axis may go at most.
+    /// Longest travel of the dominant axis.
     most: u16,
-    /// What was asked for, see [`Commands::blend`](crate::gcode::command::Commands::blend); 0 if no line may join the
-    /// chain.
+    /// The requested tolerance plus one, see [`Commands::blend`](crate::gcode::command::Commands::blend); 0 if no line
+    /// may join the chain.
     blend: u8,
     /// The tolerance of each axis.
     tolerance: i16,
@@ -143,7 +144,7 @@ impl Chain {
         }
         (self.feed, self.blend) = (feed, blend);
         let tolerance = u16::from(blend - 1);
-        // With two other axes, both may be off by this much.
+        // If both other axes move, each gets 0.7 of the tolerance.
         let both = ends.iter().all(|way| *way != 0);
         self.tolerance = if both { product(tolerance, 181) >> 8 } else { tolerance.into() } as i16;
         self.moved = 0;
@@ -158,7 +159,7 @@ impl Chain {
         true
     }
 
-    /// Returns a way that no line joins. No axis may go farther than 16 bits hold.
+    /// Returns a move that no line joins. The travel of each axis must fit 16 bits.
     #[inline(never)]
     #[small]
     pub fn closed(from: &PerAxis<Length>, to: &PerAxis<Length>) -> Self {
@@ -191,13 +192,13 @@ impl Chain {
         end
     }
 
-    /// The feed of the chain; `None` if no line may go on with it.
+    /// The feed of the chain; `None` if the chain is closed.
     pub fn feed(&self) -> Option<Feed> {
         (!self.is_closed()).then_some(Feed::PerMinute(self.feed))
     }
 
-    /// Goes on to `to`, if all ends of the chain, which begins at `from`, are near enough to the straight way there.
-    /// Returns whether it does. After a line that did not join, no other line may.
+    /// Extends the chain, which begins at `from`, to the end point `to`, if all its end points are within the tolerance
+    /// of the straight line to `to`. Returns whether it did. After `false`, no other line may join.
     #[inline(never)]
     pub fn go_on(
         &mut self,
@@ -221,12 +222,12 @@ impl Chain {
         }
         let mut bit = 1;
         for (minor, &way) in self.minors.iter_mut().zip(&ends) {
-            // After a line of next to nothing, another axis may go farther than the dominant one.
+            // If the first line was very short, another axis may now travel farther than the dominant one.
             if way.unsigned_abs() > self.most {
                 return false;
             }
             if self.moved & bit == 0 && way != 0 {
-                // Two axes that move have less of the tolerance each, so a second one does not join.
+                // The tolerance was set for one other axis that moves, so a second one may not begin to move.
                 if self.moved != 0 {
                     return false;
                 }
@@ -243,7 +244,7 @@ impl Chain {
         true
     }
 
-    /// Sets the way of the chain; rotary axes do not move.
+    /// Sets the travel of the chain; rotary axes do not move.
     #[inline(always)]
     fn take(&mut self, way: [i16; FIRST_ROTARY]) {
         for (place, way) in self.way.iter_mut().zip(way) {
@@ -252,7 +253,7 @@ impl Chain {
     }
 }
 
-/// Returns the way of the dominant axis, and the ways of the axes after it in cyclic order.
+/// Returns the travel of the dominant axis, and that of the axes after it in cyclic order.
 #[inline(always)]
 fn turned([x, y, z]: [i16; FIRST_ROTARY], dominant: u8) -> (i16, [i16; MINORS]) {
     match dominant {
@@ -262,7 +263,7 @@ fn turned([x, y, z]: [i16; FIRST_ROTARY], dominant: u8) -> (i16, [i16; MINORS]) 
     }
 }
 
-/// Sets the way from `from` to `to`. Returns false if an axis goes too far, or a rotary axis moves.
+/// Writes the travel from `from` to `to`. Returns false if an axis travels too far, or a rotary axis moves.
 #[inline(never)]
 fn go(from: &PerAxis<Length>, to: &PerAxis<Length>, ways: &mut [i16; FIRST_ROTARY]) -> bool {
     let mut axes = from.iter().zip(to);
@@ -277,7 +278,7 @@ fn go(from: &PerAxis<Length>, to: &PerAxis<Length>, ways: &mut [i16; FIRST_ROTAR
     axes.all(|(from, to)| from == to)
 }
 
-/// Returns a product with a number below 2^15.
+/// Returns the signed product; `b` is below 2^15.
 #[inline(always)]
 fn times(a: i16, b: u16) -> i32 {
     let size = product(a.unsigned_abs(), b) as i32;

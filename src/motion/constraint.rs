@@ -18,18 +18,18 @@
 //!
 //! # Clear
 //!
-//! A scan answers one question: how far on may the machine still be at the steady velocity u, and for which
-//! constraint does it have to slow down then? The answer, [`Clear`], holds for every lower velocity as well, because
-//! less distance is needed from there ([`Clear::narrow`]). It stays true when blocks are added: they never make the
-//! distance to a standstill shorter.
+//! A scan finds out how far on the machine may keep the steady velocity u, and for which constraint it then has to slow
+//! down. The answer, [`Clear`], holds for every lower velocity as well, because slowing down from a lower velocity
+//! takes less distance ([`Clear::narrow`]). It stays true when blocks are added: they never make the distance to a
+//! standstill shorter.
 //!
 //! # Work
 //!
-//! A scan looks at no more than [`EXACT`] constraints exactly, each slower than all before it: a machine that has
-//! slowed down to one of them may keep that velocity past all that are no slower. One more constraint answers for all
-//! that follow, by its key: keys rise, and `(u + k)^2 <= key` is enough for any of them. So the work has a bound,
-//! whatever is queued. It is done in integers (`need`). Cost on AVR: 2,000 cycles for each of these constraints, 25
-//! for each constraint that is passed over, and 1,500 for the rest.
+//! A scan computes at most [`EXACT`] constraints exactly, each slower than all before it: a machine that has slowed
+//! down to one of them may pass all that are no slower. One more constraint stands for all that follow, by its key:
+//! keys rise along the queue, and `(u + k)^2 <= key` is sufficient for any of them. So the work has a bound, whatever
+//! is queued. It is done in integers (`need`). Cost on AVR: 2,000 cycles for each of these constraints, 25 for each
+//! constraint that is passed over, and 1,500 for the rest.
 
 use super::float::{below, greater, least, scaled};
 use super::governor::{Governor, Limits};
@@ -44,13 +44,13 @@ pub trait Ahead {
     /// The square of the velocity that is allowed at the end of the block without a jerk limit.
     fn headroom(&self) -> f32;
     /// Returns the first constraint from the `n`th on that is slower than `velocity`, or firm, with its number.
-    /// Nothing beyond a firm one counts.
+    /// Constraints beyond a firm one do not apply.
     fn slower(&self, n: Index, velocity: Short) -> (Index, Constraint);
-    /// Brake potential from the end of the block to the end of the queue.
+    /// Returns the brake potential from the end of the block to the end of the queue.
     fn end(&self) -> f32;
 }
 
-/// How many constraints a scan looks at exactly.
+/// How many constraints a scan computes exactly.
 pub const EXACT: u8 = 2;
 
 /// How many constraints behind the machine a scan passes over at most.
@@ -61,18 +61,19 @@ const PASSED: u8 = 4;
 pub(super) struct Clear {
     /// The velocity that the answer is for; it holds for any lower one too.
     pub top: f32,
-    /// How far on the velocity may be steady, brake potential.
+    /// How far on the velocity may be kept, brake potential.
     pub distance: f32,
-    /// The velocity to which the machine has to slow down then.
+    /// The velocity to which the machine has to slow down after that.
     pub target: f32,
-    /// The distance from which on the target is kept, as it was when `distance` was `from`.
+    /// The distance to the place from which the target velocity is kept, as it was when `distance` was `from`.
     place: f32,
     from: f32,
-    /// Whether no constraint beyond the target is too near for it.
+    /// Whether the target velocity is low enough for all constraints beyond it.
     pub closed: bool,
-    /// Whether it is the target that bounds the velocity.
+    /// Whether the target is what bounds the velocity.
     binds: bool,
-    /// Slices since the scan. What has been driven since is subtracted in floats, so that the answer gets less exact.
+    /// Slices since the scan. The distance driven since is subtracted in floats, so that the answer gets less exact
+    /// with age.
     pub age: u8,
 }
 
@@ -80,8 +81,8 @@ pub(super) struct Clear {
 const AGE_MOST: u8 = 64;
 
 impl Clear {
-    /// The state before the first block, whose limits have it [forgotten](Self::forget). All zeros: anything else
-    /// would be copied from RAM.
+    /// The state before the first block, which calls [`Self::forget`] when it sets its limits. All zeros: other values
+    /// would take a copy in RAM.
     pub const START: Self = Self {
         top: 0.0,
         distance: 0.0,
@@ -93,7 +94,7 @@ impl Clear {
         age: 0,
     };
 
-    /// Forgets the answer. Field by field: a constant would be copied from RAM.
+    /// Forgets the answer. Field by field, because a constant would take a copy in RAM.
     #[inline(never)]
     pub fn forget(&mut self) {
         let Self { top, distance, target, place, from, closed, binds, age } = self;
@@ -102,12 +103,12 @@ impl Clear {
         (*closed, *binds, *age) = (false, false, 0);
     }
 
-    /// Returns the distance from which on the target is kept.
+    /// Returns the distance to the place from which the target velocity is kept, brake potential.
     pub fn place(&self) -> f32 {
         self.place - (self.from - self.distance)
     }
 
-    /// Makes the answer for a higher velocity one for `top`. If `top` is no faster than the target, it may be kept to
+    /// Narrows the answer for a higher velocity to `top`. If `top` is no faster than the target, it may be kept up to
     /// the place of the target.
     pub fn narrow(&mut self, top: f32) {
         if self.closed && !below(self.target, top) {
@@ -116,9 +117,10 @@ impl Clear {
         }
     }
 
-    /// Returns how long the top is kept before a ramp down to the target begins, if the top is reached `at`.
+    /// Returns for what distance, brake potential, the top is kept before a ramp down to the target begins; `at` is the
+    /// distance to where the top is reached.
     pub fn slack(&self, at: f32, kappa: f32) -> f32 {
-        // A scan is a little off, but a ramp to a standstill has to end at its place.
+        // A scan is slightly inexact, but a ramp to a standstill has to end at its place.
         let exact = self.binds && self.closed;
         let distance =
             if exact { self.place() - needed(self.top, self.target, kappa) } else { self.distance };
@@ -129,16 +131,16 @@ impl Clear {
 /// The question for a scan: a velocity to try.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Ask {
-    /// The velocity; `at` is where it would be reached.
+    /// The velocity; `at` is the distance to where it would be reached.
     pub top: f32,
     pub at: f32,
     /// The highest velocity until then.
     pub fastest: f32,
-    /// Constraints at this velocity or below must be behind the machine where it reaches the top.
+    /// Constraints at this velocity or below must lie behind the place where the top is reached.
     pub level: f32,
     /// Distance from the present state to the end of the block.
     pub here: f32,
-    /// Whether the velocity is taken in any case: the question is then how long it may be kept.
+    /// Whether the velocity is reached in any case: the question is then how long it may be kept.
     pub taken: bool,
 }
 
@@ -151,7 +153,7 @@ pub(super) fn needed(u: f32, w: f32, kappa: f32) -> f32 {
     sum * if below(drop, twice) { sqrt(scaled(kappa * drop, 3)) } else { drop + twice }
 }
 
-/// What a scan has found so far, in the units of its scale.
+/// The result of a scan so far, in the units of its scale.
 struct Scan {
     scale: Scale,
     /// The top, and (`at`) where it is reached.
@@ -164,7 +166,7 @@ struct Scan {
     low: u16,
     /// An upper bound of the distance to slow down from the top.
     most: i32,
-    /// No constraint from here on makes a difference.
+    /// Constraints from here on make no difference.
     reach: i32,
     closed: bool,
     binds: bool,
@@ -259,7 +261,7 @@ impl Scan {
         most
     }
 
-    /// Takes in a constraint that stands for all that follow: by its key, and by the key of the end of the queue.
+    /// Takes in a constraint that stands for all that follow, by its key and by the key of the end of the queue.
     #[inline(never)]
     fn look_no_further(&mut self, velocity: Short, place: i32, end: f32) {
         let scale = &self.scale;
@@ -283,7 +285,7 @@ impl Scan {
 }
 
 impl Governor {
-    /// Whether a velocity is safe. Notes how long it may be kept, if it is safe or is taken in any case.
+    /// Whether a velocity is safe. Stores in `clear` how long it may be kept, if it is safe or is reached in any case.
     #[inline(never)]
     pub(super) fn scan(&mut self, ask: &Ask, ahead: &impl Ahead) -> bool {
         self.scanned = true;

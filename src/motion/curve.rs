@@ -1,8 +1,9 @@
-//! How fast a curve may be taken, so that its axes keep to their acceleration and jerk.
+//! The velocity limit of a curve, from the acceleration and jerk limits of its axes.
 //!
 //! On a curve of radius r the path turns with an acceleration of v^2 / r, which changes with a jerk of v^3 / r^2. The
-//! radius of an arc is known ([`Curve`]). Lines that are short compared with a curve show it by how they turn
-//! ([`Bend`]). The junction deviation does not cover them: it holds for a corner with room enough around it.
+//! radius of an arc is known ([`Curve`]). That of a curve of short lines is found from the changes of direction
+//! ([`Bend`]). The junction deviation does not cover such lines: it is valid for a corner between lines that are long
+//! enough.
 //!
 //! Called by the planner and its line builder. Units: mm, s. Costs are AVR cycles.
 
@@ -21,8 +22,8 @@ use crate::units::FIRST_ROTARY;
 
 /// The share of the acceleration that turning on an arc may take.
 const TURNING: f32 = 0.75;
-/// The share that turning and slowing down may take together: on an arc they are at right angles. The rest is for the
-/// corners of the chords, at which the path turns at once.
+/// The share that turning and slowing down may take together: on an arc they are at right angles. The remainder is for
+/// the corners between chords, at which the path turns at once.
 const BOTH: f32 = 0.95;
 /// Takes the place of [`TURNING`] under a jerk limit, where slowing down may take all of the acceleration.
 const TURNING_JERK: f32 = 0.65;
@@ -30,7 +31,7 @@ const TURNING_JERK: f32 = 0.65;
 const CORNER_S: f32 = 0.01;
 /// How far rounding moves a position, as a logarithm: 0.5 um, in 2^-14 mm.
 const NOISE: Log = Log(3 * OCTAVE);
-/// A curve is plain if it turns by this many times as much as rounding of positions may turn it, as a logarithm.
+/// A curve is certain if it turns by this many times as much as rounding of positions may turn a path, as a logarithm.
 const PLAIN: i16 = 7 * OCTAVE / 2;
 /// More than the error of the logarithm of a velocity.
 const SPARE: i16 = 8;
@@ -40,8 +41,8 @@ const JERK_SPARE: i16 = 39;
 const RADIUS_LEAST: f32 = 1e-3;
 /// Changes of direction below this count as none, as in `junction`. In 2^-14.
 const STRAIGHT: u16 = 31;
-/// How many corners in a row must be like the one before them until a further one is slowed down: rounding of
-/// positions makes few such rows.
+/// How many corners in a row must be like the one before them until a further one is slowed down. Rounding of positions
+/// makes few such rows.
 const CORNERS: u8 = 1;
 /// Changes of direction beyond this, some 40 degrees, do not belong to a curve. In 2^-14.
 const CORNER: u16 = 11_000;
@@ -58,9 +59,9 @@ pub struct Curve {
 }
 
 impl Curve {
-    /// Returns the limits of an arc, and how long its chords may be, mm. The arc has this radius in the plane of
-    /// `axes`, and a `feed` in mm/min. `slope` is the length of its path over its length in the plane, more than 1
-    /// for a helix.
+    /// Returns the limits of an arc, and the longest length of its chords, mm. The arc has this radius in the plane of
+    /// `axes`, and a `feed` in mm/min. `slope` is the length of its path over its length in the plane, more than 1 for
+    /// a helix.
     ///
     /// Cost: 8,000.
     #[inline(never)]
@@ -109,7 +110,7 @@ impl Curve {
     }
 }
 
-/// How the path turned at the last corner.
+/// The change of direction at the last corner.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Bend {
     /// The change of direction of each axis, in 2^-14.
@@ -122,7 +123,7 @@ pub(super) struct Bend {
 }
 
 impl Bend {
-    /// Goes on with a chord of an arc, which gets the limits of the arc.
+    /// Continues with a chord of an arc, which gets the limits of the arc.
     #[inline(never)]
     pub(super) fn chord(&mut self, path: &mut Path, curve: &Curve) {
         *self = Self { last: Short::new(path.length), ..Self::default() };
@@ -138,10 +139,11 @@ impl Bend {
         }
     }
 
-    /// Goes on with a line, from heading `from`. Slows the line down if the last two corners are those of a curve
-    /// that cannot be taken as fast. Returns what [`turn`] returns for this corner.
+    /// Continues with a line, after one with heading `from`. Slows the line down if the last two corners are those of a
+    /// curve with a lower velocity limit. Returns the result of [`turn`] for this corner.
     ///
-    /// Cost: 400 at a corner that belongs to no curve, 800 on a curve that plainly sets no limit, else 1,000 to 1,400.
+    /// Cost: 400 at a corner that belongs to no curve, 800 on a curve that certainly sets no limit, else 1,000 to
+    /// 1,400.
     #[inline(never)]
     pub(super) fn line(&mut self, from: &Heading, path: &mut Path, dynamics: &Dynamics) -> u32 {
         let (last, before) = (self.last, self.before);
@@ -199,7 +201,7 @@ impl Bend {
     }
 }
 
-/// Returns the length of a line and of half of both lines around it, mm. `None` if the line is short compared with
+/// Returns the length of a line plus half of both neighbouring lines, mm. `None` if the line is short compared with
 /// them, as a chamfer between long lines is, or the end of a long line. Cost: 150.
 #[inline(never)]
 fn span(before: Short, line: Short, after: Short) -> Option<Log> {
@@ -227,7 +229,7 @@ fn span(before: Short, line: Short, after: Short) -> Option<Log> {
     (twice <= 8 * mantissa).then(|| Log(Log::of(twice << 4).0 + octaves))
 }
 
-/// Returns how much of a change of direction within `span` mm may come from rounding positions to three decimals, in
+/// Returns the largest change of direction within `span` mm that rounding positions to three decimals may cause, in
 /// 2^-14. Cost: 100.
 #[inline(never)]
 fn noise(span: Log) -> u16 {
@@ -251,7 +253,7 @@ fn third(log: i16) -> i16 {
     (product((log as u16).wrapping_add(UP), 0x5556) >> 16) as i16 - UP as i16 / 3
 }
 
-/// The limits of the axes that take part in a curve: the least jerk, and the acceleration, which is that of all axes
+/// The limits of the axes that take part in a curve: the least jerk, and the acceleration, which is equal for all axes
 /// unless `mixed`.
 #[derive(Default)]
 struct Sharp {
@@ -274,8 +276,8 @@ impl Sharp {
     }
 }
 
-/// Returns the acceleration that the curve may take where axes have different limits. The curve turns on, so that
-/// each axis will take part in it as much as the one that does most now.
+/// Returns the acceleration limit of the curve where axes have different limits. The curve keeps turning, so each axis
+/// will take part in it as much as the one that does most now.
 #[inline(never)]
 #[small]
 fn acceleration(both: &[u16; FIRST_ROTARY], dynamics: &Dynamics) -> Log {
@@ -297,7 +299,7 @@ fn curvature(both: Log, span: Log) -> i16 {
     both.0 - 14 * OCTAVE - span.0
 }
 
-/// Returns how fast a path of this curvature may be for an acceleration, v^2 / r, and a jerk, v^3 / r^2; 0 stands
+/// Returns the velocity limit of a path of this curvature for an acceleration, v^2 / r, and a jerk, v^3 / r^2; 0 stands
 /// for no limit. The curvature and the result are logarithms.
 #[inline(never)]
 fn fastest(curvature: i16, accel: Short, jerk: Short) -> i16 {
@@ -311,17 +313,17 @@ fn fastest(curvature: i16, accel: Short, jerk: Short) -> i16 {
     velocity
 }
 
-/// Rounds a velocity to one of eight values in an octave: 2 % up or 6 % down. So the lines of a curve have one
-/// velocity in spite of rounding.
+/// Rounds a velocity to one of eight values in an octave: 2 % up or 6 % down. So the lines of a curve have equal
+/// velocities in spite of rounding errors.
 #[inline(always)]
 fn even(velocity: i16) -> i16 {
     (velocity + OCTAVE / 32) & !(OCTAVE / 8 - 1)
 }
 
 impl Path {
-    /// Keeps to what the axes can do on a path whose direction changes by `both` within `span` mm, in 2^-14. `length`
-    /// is an upper bound of the length of `both`. What only an override asks for may be limited to up to a quarter
-    /// less.
+    /// Applies the limits of the axes on a path whose direction changes by `both`, in 2^-14, within `span` mm. `length`
+    /// is an upper bound of the length of `both`. Velocities above the feed, which only an override uses, may be up to
+    /// a quarter too low.
     #[inline(never)]
     fn keep_to_bend(
         &mut self,
@@ -343,7 +345,7 @@ impl Path {
         }
     }
 
-    /// Keeps to what the axes can do on a path whose direction changes by `both`, in 2^-14, within `span` mm.
+    /// Applies the limits of the axes on a path whose direction changes by `both`, in 2^-14, within `span` mm.
     #[inline(never)]
     fn bend(&mut self, both: &mut [u16; FIRST_ROTARY], span: Log, dynamics: &Dynamics) {
         let noise = noise(span);
@@ -368,7 +370,7 @@ impl Path {
         }
     }
 
-    /// Keeps the path to a velocity, mm/s.
+    /// Limits the velocity of the path, mm/s.
     fn slow_down(&mut self, velocity: f32) {
         self.top = least(self.top, velocity);
         self.cruise = least(self.cruise, self.top);

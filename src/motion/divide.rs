@@ -1,7 +1,7 @@
-//! Division and square root of 32 bits into 16. They take a third of the cycles of the library's division, which is
-//! by 32 bits, and of its float root. Their kernels are the chip's ([`arithmetic`]).
+//! Division and square root of 32 bits into 16. They take a third of the cycles of the library's division, which is by
+//! 32 bits, and of its float root. Each chip has its own kernels ([`arithmetic`]).
 //!
-//! Called by exec's preparation of segments and by the line builder, a few times each. No units.
+//! Called a few times by the preparation of a segment, and by the line builder for a block. No units.
 
 use crate::hal::arithmetic::{self, inverse_root, product};
 
@@ -36,11 +36,11 @@ pub struct Size {
 }
 
 impl Size {
-    /// Measures a vector whose longest part is at least 2^14, to 0.01 %. Cost: 190, where a root and a division take
-    /// 490.
+    /// Measures a vector whose largest component is at least 2^14, to 0.01 %. Cost: 190, where a root and a division
+    /// take 490.
     #[inline(always)]
     pub fn of_square(square: u32) -> Self {
-        // In 16 bits: a shift of all 32 takes a loop.
+        // In 16 bits, because a shift of 32 bits takes a loop.
         let [_, next, ..] = square.to_le_bytes();
         let mut upper = (square >> 16) as u16;
         let is_twice = upper < 0x4000;

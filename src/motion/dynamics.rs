@@ -1,4 +1,4 @@
-//! What the axes can do, in the units of motion.
+//! The limits of the axes, in the units of motion.
 //!
 //! Owned by the planner task, made from the settings when they change. Settings are integers in the units of the
 //! sender, whose conversion takes longer than planning a block.
@@ -13,11 +13,11 @@ use crate::config::StepRatio;
 use crate::math::sqrt;
 use crate::units::PerAxis;
 
-/// If the acceleration takes this long to reach its limit, s, a jerk limit has an effect.
+/// The least time, s, that the acceleration takes to reach its limit under a jerk limit with an effect.
 const JERKY_S: f32 = 1.0625 * JERK_TIME_MIN;
 
-/// Where the limits come from: the settings, in their units. Axes are 0 to 5 for X Y Z A B C. A limit that is not
-/// positive is none. For rotary axes mm stands for degrees.
+/// The source of the limits: the settings, in their units. Axes are 0 to 5 for X Y Z A B C. A value that is not
+/// positive means no limit. For rotary axes mm stands for degrees.
 pub trait MachineLimits {
     /// Traverse velocity of an axis, mm/min.
     fn velocity_max(&self, axis: usize) -> f32;
@@ -31,7 +31,7 @@ pub trait MachineLimits {
     fn junction_deviation(&self, axis: usize) -> f32;
     /// Junction acceleration, mm/min^2.
     fn junction_acceleration(&self) -> f32;
-    /// What the drivers ask for.
+    /// The pulse width and direction set-up time of the drivers.
     fn drivers(&self) -> Drivers {
         Drivers::USUAL
     }
@@ -59,19 +59,19 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// Whether all limits are those of another axis, except for the velocities.
+    /// Whether all limits but the velocities are equal to those of another axis.
     #[inline(always)]
     pub(super) fn is_like(&self, other: &Self) -> bool {
         (self.accel, self.jerk, self.deviation) == (other.accel, other.jerk, other.deviation)
     }
 
-    /// Takes over acceleration and jerk, mm/s^2 and mm/s^3; 0 or less for none. The velocities must be known. Cost:
+    /// Sets acceleration and jerk, mm/s^2 and mm/s^3; 0 or less for no limit. The velocities must be known. Cost:
     /// 3,000.
     ///
-    /// An acceleration far beyond what any ramp reaches under the jerk limit would make the potentials of
+    /// An acceleration limit far above what any ramp reaches under the jerk limit would make the potentials of
     /// `speed_constraints` coarse. Between 0 and v a ramp reaches `sqrt(J v)`, in a direction between three axes a
-    /// third more: up to half more is kept. Even the least acceleration that is kept is such that the jerk limit has
-    /// an effect ([`effective_jerk`](super::governor::effective_jerk)).
+    /// third more: the limit is lowered to one and a half of this. Even the least limit that results is such that the
+    /// jerk limit has an effect ([`effective_jerk`](super::governor::effective_jerk)).
     #[inline(never)]
     #[small]
     pub fn limit_change(&mut self, accel: f32, jerk: f32) {
@@ -93,12 +93,12 @@ pub struct Dynamics {
     pub drives: [u8; MOTORS],
     /// Highest step rate of each motor, steps/s, by the number of motors that move, less one.
     pub rates: [f32; MOTORS],
-    /// Whether lines may be merged: no motor has steps so fine that a [chain](super::chain) could have more than a
-    /// block holds, not even on CoreXY.
+    /// Whether lines may be merged: no motor has steps so fine that a [chain](super::chain) could have more steps than
+    /// a block holds, not even on CoreXY.
     pub merges: bool,
 }
 
-/// Whether a motor has at most half a step in a unit of length. Then a way of 16 bits along two axes has less than
+/// Whether a motor has at most half a step in a unit of length. Then a travel of 16 bits along two axes has less than
 /// 2^15 steps.
 #[inline(never)]
 #[small]
@@ -114,7 +114,7 @@ impl Dynamics {
         dynamics
     }
 
-    /// Takes over the limits of `machine`.
+    /// Sets the limits to those of `machine`.
     #[inline(never)]
     #[small]
     pub fn set(&mut self, machine: &(impl MachineLimits + Motors)) {

@@ -5,16 +5,17 @@
 //! a segment. A stretch ends where its block ends: a block that takes less than [`SEGMENT_S`] is one segment. Times
 //! are seconds, distances mm.
 //!
-//! No velocity profile is planned ahead. Each stretch follows from how fast the machine is, and from how fast it may
-//! be at the end of the block, which the [speed constraints](super::speed_constraints) know. Blocks that are added to
-//! the queue take effect at the next stretch.
+//! No velocity profile is planned ahead. Each stretch follows from the present velocity and from the velocity that is
+//! allowed at the end of the block, which the [speed constraints](super::speed_constraints) give. Blocks that are added
+//! to the queue take effect at the next stretch.
 //!
-//! A move without steps (shorter than a step, or of axes without motors) takes its time all the same. So many of them
-//! in a row are no faster than one long move.
+//! A move without steps (shorter than a step, or of axes without motors) takes its time too. So many of them in a row
+//! are no faster than one long move.
 //!
-//! In a feedhold the governor comes to rest ([`Governor::halt`]), over any number of lines, and then no line, dwell,
-//! output or stop begins. When the hold ends, the line goes on from where it is, and a dwell takes what is left of
-//! its time. Or [`Exec::drop_all`] forgets everything that is queued, and the last steps made are the position.
+//! In a feedhold the governor decelerates to a standstill ([`Governor::halt`]), over any number of lines, and then no
+//! line, dwell, output or stop begins. When the hold ends, the line goes on from where it is, and a dwell takes the
+//! remainder of its time. Alternatively [`Exec::drop_all`] drops everything that is queued, and the position is that of
+//! the last steps made.
 //!
 //! Cost on AVR: 6,300 cycles for a short block without a jerk limit, including [`Prep`], the task and its interrupt.
 //! A third of them are the governor's floats.
@@ -41,7 +42,7 @@ use spindle::Follows;
 /// Half CPU cycles in a second.
 const HALVES_PER_S: f32 = 2.0 * TIMER_HZ as f32;
 
-/// The ticks of a pause of 1 ms: their number, as few as periods allow, and their period.
+/// A pause of 1 ms: the number of its ticks, as few as periods allow, and their period.
 const PAUSE: (u16, u16) = pause(TIMER_HZ);
 
 /// Nominal time of a segment: the shortest that leaves two thirds of the CPU to others.
@@ -53,10 +54,10 @@ const SHORT_LOG2: i8 = -5;
 /// CPU cycles in [`SEGMENT_S`].
 const SEGMENT_CYCLES: u32 = (TIMER_HZ as f32 * SEGMENT_S) as u32;
 
-/// Above this velocity, mm/s, every line has another line behind it.
+/// At or above this velocity, mm/s, a line is always followed by another line.
 const SLOW: f32 = 5.0;
 
-/// How long a pause is, s.
+/// Duration of a pause, s.
 const PAUSE_S: f32 = 0.001;
 
 /// Length of the segments of a dwell, ms.
@@ -73,24 +74,24 @@ const fn pause(timer_hz: u32) -> (u16, u16) {
     (ticks as u16, (counts / ticks) as u16)
 }
 
-/// What [`Exec::step`] found to do.
+/// The result of [`Exec::step`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
     /// A segment to queue.
     Segment,
-    /// Nothing is to be queued, but something was done: ask again.
+    /// Something was done that needs no segment: call again.
     Again,
-    /// The outputs or the speed of the spindle have changed, at a standstill: ask again.
+    /// The outputs or the speed of the spindle have changed, at a standstill: call again.
     Switched,
-    /// X is to leave the cut, also in segments that are already queued ([`Exec::lead`]): ask again.
+    /// X is to leave the cut, also in segments that are already queued ([`Exec::lead`]): call again.
     Leaves,
-    /// An override is to change; [`take_override`] returns the change. No segment is to be queued: ask again
+    /// An override is to change; [`take_override`] returns the change. No segment is to be queued: call again
     /// afterwards.
     Override,
-    /// Heaters and the fan are to change; [`take_heat`] returns the change. No segment is to be queued: ask again
+    /// Heaters and the fan are to change; [`take_heat`] returns the change. No segment is to be queued: call again
     /// afterwards.
     Heat,
-    /// A program stop, end or change of outputs is due: ask again when the steppers stand still.
+    /// A program stop, end or change of outputs is due: call again when the steppers stand still.
     Standstill,
     /// The block queue is empty.
     Idle,
@@ -98,7 +99,7 @@ pub enum Step {
     Held,
 }
 
-/// Releases the oldest block, for which [`Step::Override`] was returned, and returns the change that it asks for.
+/// Releases the oldest block, for which [`Step::Override`] was returned, and returns its change.
 #[inline(never)]
 #[small]
 pub fn take_override(blocks: &mut BlockSource) -> Change {
@@ -109,7 +110,7 @@ pub fn take_override(blocks: &mut BlockSource) -> Change {
     }
 }
 
-/// Releases the oldest block, for which [`Step::Heat`] was returned, and returns what it asks for.
+/// Releases the oldest block, for which [`Step::Heat`] was returned, and returns its change.
 #[inline(never)]
 #[small]
 pub fn take_heat(blocks: &mut BlockSource) -> Option<Heat> {
@@ -150,7 +151,7 @@ struct Running {
     version: u8,
     /// Whether no stretch of the line has been prepared yet.
     fresh: bool,
-    /// Whether the governor has handed out the whole line; `Prep` still has some of it.
+    /// Whether the governor has handed out the whole line; `Prep` still holds a part of it.
     done: bool,
     jerk: bool,
 }
@@ -172,11 +173,11 @@ pub struct Exec {
     dwell_ms: u32,
     governor: Governor,
     prep: Prep,
-    // Even behind the largest fields, because few lines need it.
+    // Last of all, because few lines need it.
     follows: Follows,
 }
 
-/// What the governor sees of the queue.
+/// The queue as the governor sees it.
 struct QueueView<'a> {
     headroom: f32,
     blocks: &'a BlockSource,
@@ -223,7 +224,7 @@ impl Exec {
         }
     }
 
-    /// Does the next thing there is to do, and returns what it was. Writes `segment` if that is [`Step::Segment`].
+    /// Does the next piece of work, and returns what it was. Writes `segment` if that is [`Step::Segment`].
     /// `standstill`: the steppers have stopped.
     pub fn step(
         &mut self,
@@ -273,15 +274,15 @@ impl Exec {
         self.run(blocks, out, segment)
     }
 
-    /// Sets whether stretches are twice as long, which halves the CPU time of their mathematics. In a `hurry` they
-    /// are twice as long too, and the governor makes no look ahead that may wait.
+    /// Sets whether stretches are twice as long, which halves the CPU time of their mathematics. In a `hurry` they are
+    /// twice as long too, and the governor makes no scan that may wait.
     #[inline(always)]
     pub fn set_coarse(&mut self, coarse: bool, hurry: bool) {
         self.coarse = coarse || hurry;
         self.governor.set_hurry(hurry);
     }
 
-    /// Sets whether no time is left for looks ahead at the end of an acceleration.
+    /// Sets whether no time is left for scans at the end of an acceleration.
     #[inline(always)]
     pub fn set_tight(&mut self, tight: bool) {
         self.governor.set_tight(tight);
@@ -308,8 +309,8 @@ impl Exec {
         }
     }
 
-    /// Adds a pause of `ms` milliseconds, which comes before anything else. The machine is at a standstill, perhaps
-    /// in the midst of a line.
+    /// Inserts a pause of `ms` milliseconds before anything else. The machine is at a standstill, perhaps within a
+    /// line.
     pub fn wait(&mut self, ms: u16, out: &mut Snapshot) {
         if ms > 0 {
             self.dwell_ms += u32::from(ms);
@@ -325,7 +326,7 @@ impl Exec {
         let must_go_on = match &self.follows {
             _ if !Capability::Lathe.is_built_in() => false,
             Follows::Retreats(retreat) => !retreat.is_done(),
-            // A tapping pass must follow the spindle, which does not wait.
+            // A tapping pass must follow the spindle, which cannot be held.
             Follows::Angle(thread) => {
                 let ends = self.breaks_off || thread.fault().is_some() || thread.has_turned();
                 thread.is_tapping() && !ends
@@ -335,7 +336,7 @@ impl Exec {
         let goes_on = if must_go_on {
             true
         } else if running.active {
-            // Once the end of a line has been planned, all of that line is handed out.
+            // Once the end of a line has been computed, all of that line is handed out.
             running.done || !self.governor.is_at_rest()
         } else {
             !self.governor.is_at_rest() && blocks.look(is_line) == Some(true)
@@ -347,13 +348,12 @@ impl Exec {
         !goes_on
     }
 
-    /// Forgets everything that is queued. The steppers stand still: held, or stopped in the midst of a segment.
-    /// Returns the segment that [`Prep`] held back, which has not been queued. `out.target` is then where the queued
-    /// segments and the returned one end; [`Dda::settle`](crate::dda::Dda::settle) makes the last steps made the
-    /// position.
+    /// Drops everything that is queued. The steppers stand still: held, or stopped within a segment. Returns the
+    /// segment that [`Prep`] held back, which has not been queued. `out.target` is then where the queued segments and
+    /// the returned one end; [`Dda::settle`](crate::dda::Dda::settle) makes the last steps made the position.
     ///
-    /// Dropped blocks that set drivers, pressure advance or G95 still take effect, as do those that set the position
-    /// before anything moves.
+    /// Blocks that set drivers, pressure advance or G95 still take effect, as do those that set the position before the
+    /// first dropped line, dwell, output or stop.
     ///
     /// Cost: 600 a block.
     #[inline(never)]
@@ -411,7 +411,7 @@ impl Exec {
         held
     }
 
-    /// Carries out the oldest block, which is an action and not a line.
+    /// Carries out the oldest block, which is an action.
     #[inline(never)]
     fn take_up(
         &mut self,
@@ -513,8 +513,8 @@ impl Exec {
         self.prep.pause(ms * ticks, period, segment);
     }
 
-    /// Takes up the oldest block if it is a line, and returns whether it is. The line stays in the ring until its
-    /// last segment, so that the planner counts it as work in hand.
+    /// Begins the oldest block if it is a line, and returns whether it is. The line stays in the ring until its last
+    /// segment, so that the planner counts it as pending work.
     #[inline(never)]
     fn begin(&mut self, blocks: &mut BlockSource, out: &mut Snapshot) -> bool {
         blocks.enter();
@@ -598,7 +598,7 @@ impl Exec {
         };
         self.hand_out(&stretch, blocks, out, segment, |exec| {
             let running = &exec.running;
-            // Fine ticks leave no time to lay out a ramp under a jerk limit.
+            // Fine ticks leave no CPU time to lay out a ramp under a jerk limit.
             let steady = !running.jerk || exec.governor.is_far_from_ramps();
             let short = if running.jerk { !running.long } else { running.short };
             (running.long && steady, short && exec.coarse)
@@ -640,8 +640,8 @@ impl Exec {
         step(self.prep.segment(left, cycles, segment))
     }
 
-    /// Turns a stretch of a pass into a segment. Its ticks are coarse, to leave the CPU's time to exec, which asks
-    /// the spindle for each stretch.
+    /// Turns a stretch of a pass into a segment. Its ticks are coarse, to leave CPU time to exec, which reads the
+    /// spindle for each stretch.
     #[inline(never)]
     #[small]
     fn hand_out_coarsely(
@@ -654,12 +654,12 @@ impl Exec {
         self.hand_out(stretch, blocks, out, segment, |_| (false, true))
     }
 
-    /// The velocity along the path at the end of what is queued, mm/s.
+    /// The velocity along the path at the end of the queued segments, mm/s.
     pub fn velocity(&self) -> f32 {
         self.governor.velocity()
     }
 
-    /// Hands out what is left of the running line.
+    /// Hands out the remainder of the running line.
     fn end(
         &mut self,
         cycles: u32,
@@ -667,7 +667,7 @@ impl Exec {
         blocks: &mut BlockSource,
         segment: &mut Segment,
     ) -> Step {
-        // The end is exact where motion ends: the governor is at rest, or is slow at a line that no other line
+        // The end is exact where motion ends: the governor is at a standstill, or is slow in a line that no other line
         // follows.
         let exact = below(self.governor.velocity(), SLOW)
             && (self.governor.is_at_rest() || !blocks.goes_on());

@@ -1,8 +1,8 @@
-//! Overrides as motion sees them: the factors of velocities, and how far a line may be sped up.
+//! Override factors, and the limit to which each line may be sped up.
 //!
-//! Blocks are planned for twice their feed: their corners, and the potentials that these need (`speed_constraints`).
-//! How much faster than programmed a line may be run ([`Reserve`]) takes a byte. So a factor can change at any time,
-//! also for what is queued; only the keys of the speed constraints depend on it (`replan`).
+//! The corners of blocks, and the potentials that these need (`speed_constraints`), are planned for twice the feed. A
+//! byte of each line says how much faster than programmed it may be run ([`Reserve`]). So a factor can change at any
+//! time, also for queued lines; only the keys of the speed constraints depend on it (`replan`).
 //!
 //! Cost on AVR: 40 cycles for a velocity at 100 %, else 250.
 
@@ -94,7 +94,7 @@ impl Reserve {
         self.velocity_by(cruise, factor)
     }
 
-    /// Returns the velocity at which a line at `cruise` is to be run when this is its factor.
+    /// Returns the velocity at which a line at `cruise` is to be run with this factor.
     #[inline(always)]
     pub fn velocity_by(self, cruise: f32, factor: f32) -> f32 {
         if factor.to_bits() == 1.0f32.to_bits() {

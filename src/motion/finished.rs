@@ -1,9 +1,8 @@
 //! Which line has been finished, to its last step.
 //!
-//! Owned by the exec task, which is ahead of the motors by the segments that are queued. A line whose last segment
-//! has been queued is finished when the segment after that has been taken, or when the motors stand still. Two lines
-//! that wait for this are remembered, the oldest and the newest; the lines between them are passed over. Cost on AVR:
-//! 30 cycles a segment.
+//! Owned by the exec task, which is ahead of the motors by the segments that are queued. A line whose last segment has
+//! been queued is finished when the segment after that has been taken, or when the motors stand still. Of the lines
+//! that wait for this only the oldest and the newest are remembered. Cost on AVR: 30 cycles a segment.
 
 /// A line that has been queued to its last segment.
 #[derive(Clone, Copy, Debug)]
@@ -13,7 +12,7 @@ struct Queued {
     segments: u8,
 }
 
-/// Watches lines end.
+/// Tracks which lines have been finished.
 #[derive(Debug, Default)]
 pub struct Finished {
     /// Segments queued, modulo 256.
@@ -42,8 +41,8 @@ impl Finished {
         self.segments = self.segments.wrapping_add(1);
     }
 
-    /// Returns the line that has been finished meanwhile, if any, when the motors have not taken `waiting` segments
-    /// yet.
+    /// Returns the line that has been finished since the last call, if any; `waiting` segments have not been taken by
+    /// the step generator yet.
     #[inline]
     pub fn take(&mut self, waiting: usize) -> Option<u32> {
         let oldest = self.oldest?;

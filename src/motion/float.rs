@@ -18,7 +18,7 @@ pub fn less(a: f32, b: f32) -> bool {
     order(a) < order(b)
 }
 
-/// Returns an integer that is in the order of the floats: the bits of negative numbers are turned round.
+/// Returns an integer that sorts as the floats do: the bits of negative numbers are inverted.
 #[inline(always)]
 fn order(x: f32) -> i32 {
     let bits = x.to_bits() as i32;
@@ -76,8 +76,8 @@ pub fn brief_product(a: f32, b: f32) -> f32 {
     f32::from_bits(u32::from(power) << 23 | (product >> 8) & 0x7F_FFFF)
 }
 
-/// Returns the logarithm of a positive number, or up to 0.09 [`OCTAVE`]s less. Where the answer is plain, sums of
-/// logarithms decide in 20 cycles what products of floats would decide in 400.
+/// Returns the logarithm of a positive number, or up to 0.09 [`OCTAVE`]s less. Where the margin is large, a comparison
+/// of sums of logarithms takes 20 cycles, one of products of floats 400.
 #[inline(always)]
 pub fn log(x: f32) -> i32 {
     x.to_bits() as i32 - (127 << 23)

@@ -1,14 +1,14 @@
-//! The governor, which generates velocities: it decides how fast the machine goes in the next few milliseconds.
+//! The governor is the velocity generator: it decides how fast the machine goes in the next few milliseconds.
 //!
-//! Owned by exec, which asks [`Governor::stretch`] for one stretch after the other. Exec passes the distance left in
-//! the block, its velocity limit, and what is ahead ([`Ahead`]). The governor goes as fast as it may, and is always
-//! able to slow down in time for all that is queued. It does not care where blocks begin and end: a ramp goes on over
-//! any number of blocks. A limit that changes (more blocks, a lower feed) applies from the present velocity on.
+//! Owned by exec, which calls [`Governor::stretch`] for each stretch. Exec passes the distance left in the block, its
+//! velocity limit, and the constraints ahead ([`Ahead`]). The governor goes as fast as the limits allow, and can always
+//! slow down in time for all that is queued. A ramp continues over any number of blocks. A limit that changes (more
+//! blocks, a lower feed) applies from the present velocity on.
 //!
 //! Units: mm, s (degrees for a rotary-only move).
 //!
 //! Without a jerk limit its velocities are those of trapezoids (`trapezoid`). With a jerk limit it works in slices
-//! (`slice`, `rise`), with ramps that are laid out once (`ramp`), and looks at what is ahead at most once for a
+//! (`slice`, `rise`), with ramps that are laid out once (`ramp`), and scans the constraints ahead at most once for a
 //! stretch (`constraint`). The work for a stretch has a bound in every state.
 //!
 //! Cost on AVR: 1,500 to 2,500 cycles a stretch without a jerk limit. With a jerk limit 500 for a block that ends
@@ -36,11 +36,10 @@ pub struct Stretch {
     pub ends: bool,
 }
 
-/// An acceleration limit that no machine has. It stands for no limit, and keeps floats in range.
+/// The acceleration that stands for no limit, mm/s^2. It is above that of any machine, and keeps floats in range.
 pub const ACCEL_MOST: f32 = 1e6;
 
-/// A jerk limit that lets the acceleration reach its limit in less than this, s, counts as none: stretches are no
-/// shorter.
+/// A jerk limit counts as none if it lets the acceleration reach its limit in less than this time, s.
 pub(super) const JERK_TIME_MIN: f32 = 0.001;
 
 /// Returns the jerk limit to put into a block, 0 for none; `accel` is the block's acceleration. Neither is negative.
@@ -73,7 +72,7 @@ pub(super) struct Limits {
 }
 
 impl Limits {
-    /// Returns the limits, with what follows from them; without a jerk limit nothing does. Cost: 2,700 with one.
+    /// Returns the limits with the derived values, which are 0 without a jerk limit. Cost: 2,700 with one.
     pub fn new(accel: f32, jerk: f32) -> Self {
         let mut limits = Self { accel, jerk, ..Self::NONE };
         if some(jerk) {
@@ -88,7 +87,7 @@ impl Limits {
     const NONE: Self = Self { accel: 0.0, jerk: 0.0, kappa: 0.0, pace: 0.0, build: 0.0, root: 0.0 };
 }
 
-/// The velocity generator: velocity and acceleration along the path, at the end of what has been worked out.
+/// The velocity generator: velocity and acceleration along the path, at the end of the last slice.
 #[derive(Debug, Default)]
 #[repr(C)]
 pub struct Governor {
@@ -96,7 +95,7 @@ pub struct Governor {
     /// mm/s.
     pub(super) velocity: f32,
     pub(super) limits: Limits,
-    /// What has not been handed out of the last slice.
+    /// The part of the last slice that has not been handed out.
     pub(super) rest: Rest,
     /// With a jerk limit: the acceleration as a share of its limit, from 0 to 1. A ramp that runs knows its own
     /// acceleration.
@@ -112,8 +111,8 @@ pub struct Governor {
     /// Without a jerk limit: a velocity; `square` is its square.
     pub(super) squared: f32,
     pub(super) square: f32,
-    /// Without a jerk limit: stretches are twice as long, and the machine does not gain a velocity that it would soon
-    /// lose.
+    /// Without a jerk limit: stretches are twice as long, and the machine does not speed up where it would soon have to
+    /// slow down again.
     pub(super) spares: bool,
     /// Whether no time is left for scans that may wait.
     pub(super) hurry: bool,
@@ -169,8 +168,8 @@ impl Governor {
         self.velocity
     }
 
-    /// Returns the time (s) and distance (mm) that have been worked out but not handed out. [`Governor::velocity`] is
-    /// that of the end of both.
+    /// Returns the time (s) and distance (mm) that have been computed but not handed out. [`Governor::velocity`] is the
+    /// velocity at their end.
     pub fn pending(&self) -> (f32, f32) {
         (self.rest.seconds, self.rest.distance)
     }
@@ -180,7 +179,7 @@ impl Governor {
         self.limits.accel
     }
 
-    /// Whether the machine stands still, and nothing is left to be handed out.
+    /// Whether the machine stands still, and nothing remains to be handed out.
     pub fn is_at_rest(&self) -> bool {
         !some(self.velocity) && !some(self.rest.seconds)
     }
@@ -197,8 +196,8 @@ impl Governor {
         (self.wait, self.margin, self.closing) = (0, MARGIN_FIRST, false);
     }
 
-    /// Begins a block with these limits, mm/s^2 and mm/s^3. If they differ from the limits before, as much of a
-    /// deceleration goes on as can be ended in time; an acceleration ends at once.
+    /// Begins a block with these limits, mm/s^2 and mm/s^3. If they differ from the limits before, an acceleration ends
+    /// at once, and a deceleration is reduced to what can still be ended in time.
     #[inline(always)]
     pub fn begin(&mut self, accel: f32, jerk: f32) {
         if !some(jerk) && !some(self.limits.jerk) {
@@ -225,7 +224,7 @@ impl Governor {
         self.limits = Limits::new(accel, jerk);
     }
 
-    /// Takes into account that an override has changed feeds, of what runs and of what is ahead.
+    /// Takes into account that an override has changed the feeds of the running block and of those ahead.
     pub fn change_feed(&mut self) {
         (self.late, self.changed) = (true, true);
         self.clear.forget();
@@ -235,7 +234,7 @@ impl Governor {
         }
     }
 
-    /// Sets whether the CPU has no time left: then the governor makes no scans but those that it needs to go on.
+    /// Sets whether the CPU has no time left: then the governor makes only the scans that it needs to go on.
     #[inline(always)]
     pub fn set_hurry(&mut self, hurry: bool) {
         self.hurry = hurry;
@@ -257,8 +256,8 @@ impl Governor {
         self.changed = true;
     }
 
-    /// Returns the next stretch, of [`SEGMENT_S`], without a jerk limit, as `trapezoid` does. Nothing is left of
-    /// another one.
+    /// Returns the next stretch, of [`SEGMENT_S`], without a jerk limit, as `trapezoid` does. No remainder of a slice
+    /// may be left.
     pub(super) fn sharply(&mut self, left: f32, cruise: f32, headroom: f32) -> Stretch {
         self.spares = false;
         self.trapezoid(left, cruise, headroom)

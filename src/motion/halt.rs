@@ -1,12 +1,13 @@
-//! The governor's stretches in a feedhold: to a standstill as soon as the limits allow.
+//! The velocity generator in a feedhold: decelerates to a standstill as fast as the limits allow.
 //!
-//! Called by exec instead of [`Governor::stretch`] while a hold is on. Without a jerk limit a hold is plain
-//! deceleration; with one it is a ramp that is laid out when the hold begins (`ramp`). It goes on over any number of
-//! blocks, each with its own limits. Braking as hard as possible is enough for all that is planned
-//! (`speed_constraints`, `constraint`). So velocities are nowhere above those of the plan, and no corner ahead is too
-//! fast.
+//! Called by exec instead of [`Governor::stretch`] while a hold is on. Without a jerk limit a hold decelerates at the
+//! acceleration limit; with one it follows a ramp that is laid out when the hold begins (`ramp`). The deceleration
+//! continues over any number of blocks, each with its own limits. Braking as hard as possible meets every constraint
+//! ahead (`speed_constraints`, `constraint`), so that velocities are never above those without a hold, and no corner is
+//! taken too fast.
 //!
-//! At rest the governor is as if it had never moved: going on is ordinary governing, from the middle of a block.
+//! At the standstill the state of the governor is that before a first move: the resumed motion starts as any other,
+//! from the middle of a block.
 //!
 //! Units: mm, s. Cost on AVR: 2,500 cycles a stretch; with a jerk limit 6,000 for the first stretch, and 2,500 for
 //! each other.
@@ -16,7 +17,7 @@ use super::float::{greater, least, some};
 use super::governor::{Governor, Stretch};
 use crate::math::sqrt;
 
-/// A stop beyond this share of what is left of the block counts as one at its end.
+/// A stop beyond this share of the distance left in the block counts as one at its end.
 const AT_END: f32 = 0.9999;
 
 impl Governor {

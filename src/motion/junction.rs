@@ -1,8 +1,8 @@
 //! Cornering: how fast the corner between two straight moves may be taken.
 //!
-//! The corner is treated as if it were rounded by an arc that stays within the junction deviation of it. On that arc
-//! the centripetal acceleration may be the junction acceleration (the method of TinyG and grbl). The motion itself is
-//! not rounded: at the corner the velocity of each axis changes at once.
+//! The velocity limit is that of an imaginary arc that rounds the corner within the junction deviation. On that arc the
+//! centripetal acceleration is at most the junction acceleration (the method of TinyG and grbl). The path itself is not
+//! rounded: at the corner the velocity of each axis changes at once.
 //!
 //! Called by the line builder. Units: mm (degrees for rotary axes), s. Costs are AVR cycles.
 
@@ -15,14 +15,14 @@ use crate::hal::arithmetic::product;
 use crate::math::sqrt;
 use crate::units::PerAxis;
 
-/// The square of a change of direction that counts as none, about 0.1 degree: positions in units of 0.1 um turn 0.1
-/// mm segments of a straight line by as much. In 2^-28.
+/// The square of the largest change of direction that counts as none, in 2^-28. It is about 0.1 degree: rounding
+/// positions to 0.1 um turns 0.1 mm segments of a straight line by as much.
 const STRAIGHT: u32 = 1000;
-/// Beyond this the direction counts as reversed, about 0.4 degree from it; rounding decides what is left. The square
-/// of the sine of half the angle.
+/// The square of the sine of half the angle from which on a corner counts as a reversal. It is about 0.4 degree from a
+/// full reversal; closer angles are rounding errors.
 const REVERSED: f32 = 1.0 - 1e-5;
 
-/// Changes of direction beyond this, some 30 degrees, are too wide for [`rough`]: their square, in 2^-28.
+/// The square of the largest change of direction for [`rough`], in 2^-28: some 30 degrees.
 const WIDE: u32 = 1 << 26;
 /// The constant of [`rough`]: the logarithm of the square of a corner's velocity, less the logarithms of deviation
 /// and acceleration, plus the logarithm of the square of the change of direction in 2^-28. It takes `c (1 + c) = 1.9`
@@ -32,7 +32,7 @@ const STRAIGHT_ON: i16 = 30 * OCTAVE + 238 - 27;
 /// The direction of a move.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Heading {
-    /// How far each axis travels for a unit of the path, in 2^-14: up to [`ONE`].
+    /// Unit vector: the travel of each axis per unit of the path, in 2^-14, up to [`ONE`].
     pub unit: PerAxis<i16>,
     /// Junction deviation in this direction, mm.
     pub deviation: Short,
@@ -41,7 +41,7 @@ pub struct Heading {
 /// 1 in the units of a heading.
 pub const ONE: i16 = 1 << 14;
 
-/// Returns the junction deviation along `unit` of axes that have different ones. Cost: 1,000, and 900 for each axis
+/// Returns the junction deviation along `unit` where the axes' deviations differ. Cost: 1,000, and 900 for each axis
 /// that moves.
 #[inline(never)]
 #[small]
@@ -58,7 +58,7 @@ pub(super) fn mean_deviation(unit: &PerAxis<i16>, dynamics: &Dynamics) -> Short 
     if some(norm) { Short::new(sqrt(sum / norm)) } else { Short::ZERO }
 }
 
-/// How fast the blocks on both sides of a corner may be run, mm/s.
+/// The velocity limits of the blocks on both sides of a corner, mm/s.
 #[derive(Clone, Copy, Debug)]
 pub struct Velocities {
     /// At 100 %, or less.
@@ -67,12 +67,12 @@ pub struct Velocities {
     pub top: f32,
 }
 
-/// Returns the highest velocity at a corner, mm/s. The path has [turned](turn) there by `turned` between lines of
-/// these junction deviations; the junction `acceleration` is in mm/s^2. The result is 0 for a reversal, and
-/// [`f32::MAX`] where the path goes straight on or the velocity is above the top. A velocity above the cruise
-/// velocity, which only an override asks for, is up to a tenth too low.
+/// Returns the highest velocity at a corner, mm/s. The path has [turned](turn) there by `turned` between lines of these
+/// junction deviations; the junction `acceleration` is in mm/s^2. The result is 0 for a reversal, and [`f32::MAX`]
+/// where the path is straight or the velocity is above the top. A velocity above the cruise velocity, which matters
+/// under an override only, is up to a tenth too low.
 ///
-/// Cost: 300; 2,000 more for one that limits the cruise velocity.
+/// Cost: 300; 2,000 more for a corner that limits the cruise velocity.
 #[inline(never)]
 pub fn limit(
     turned: u32,
@@ -99,8 +99,8 @@ pub fn limit(
     arc(sine, deviation * acceleration, velocities.top)
 }
 
-/// Returns the velocity of a corner that is not [`WIDE`], or up to a tenth less, by logarithms: what [`arc`] returns
-/// for a cosine of 1, less the error of that. Cost: 170.
+/// Returns the velocity of a corner that is not [`WIDE`], up to a tenth too low, by logarithms: the result of [`arc`]
+/// for a cosine of 1, less the error of that approximation. Cost: 170.
 #[inline(never)]
 fn rough(sum: u32, deviation: Short, acceleration: f32) -> Short {
     if deviation == Short::ZERO || !some(acceleration) {
@@ -113,7 +113,7 @@ fn rough(sum: u32, deviation: Short, acceleration: f32) -> Short {
 /// Returns the square of the change of direction, in 2^-28. Cost: 60 + 30 for each axis whose direction changes.
 ///
 /// The velocities of the axes change by `(b - a) * velocity`, also where the two paths are measured differently
-/// (linear, rotary, both). So this difference is what counts.
+/// (linear, rotary, both). So the result is the square of this difference.
 #[inline(never)]
 pub fn turn(a: &[i16], b: &[i16]) -> u32 {
     // |b - a| = 2 sin(angle / 2): precise for small angles, which 1 - cos(angle) is not.

@@ -18,9 +18,9 @@ use crate::gcode::command::Feed;
 use crate::hal::arithmetic::product;
 use crate::math::sqrt;
 
-/// A velocity beyond all machines, mm/s: higher ones count as this.
+/// Highest velocity, mm/s, above that of any machine; higher ones are clamped to it.
 const CRUISE_MOST: f32 = 1e5;
-/// Lower velocities count as this, mm/s.
+/// Lowest velocity, mm/s; lower ones are clamped to it.
 const CRUISE_LEAST: f32 = 1e-6;
 /// The logarithm of [`BLOCK_S_MIN`], with a margin for the error of rough logarithms.
 const BLOCK_S_LOG: i16 = -10 * short::OCTAVE;
@@ -35,8 +35,8 @@ pub(super) struct LastFeed {
 }
 
 impl LastFeed {
-    /// Returns `feed`, mm/min, in mm/s, within a range in which no division goes wrong. Cost: 20; 300 for another
-    /// feed.
+    /// Converts `feed` from mm/min to mm/s, clamped so that divisions stay in the range of floats. Cost: 20; 300 for
+    /// another feed than the last.
     #[inline(always)]
     fn per_second(&mut self, feed: f32) -> f32 {
         if self.feed.to_bits() != feed.to_bits() {
@@ -110,7 +110,8 @@ impl Path {
         }
     }
 
-    /// Returns how fast a move is to be whose feed is not simply a length per minute, mm/s.
+    /// Returns the velocity, mm/s, of a traverse, of a move with an inverse time feed, or of one that mixes lengths and
+    /// angles.
     #[inline(never)]
     #[small]
     fn unusual_velocity(&self, feed: Option<Feed>, last: &mut LastFeed) -> f32 {
@@ -190,8 +191,8 @@ impl Path {
         slowest
     }
 
-    /// Whether no motor goes half a step, no axis goes 3 mm, and the move is over before exec can prepare the next
-    /// one. Cost: 10; 400 if no motor goes half a step.
+    /// Whether no motor moves half a step, no axis travels 3.3 mm, and the move takes less time than exec needs to
+    /// prepare the next one. Cost: 10; 400 if no motor moves half a step.
     #[inline(always)]
     pub(super) fn is_brief(&self) -> bool {
         self.most < HALF_STEP && self.is_short_of_time()
@@ -206,7 +207,7 @@ impl Path {
 
     /// Keeps motors within the step rate that all motors that move can have together. Chords of arcs, and blocks short
     /// enough for parts of a step, get five eighths of that rate: exec has much more to do there than in a long line.
-    /// Keeps every block long enough for exec.
+    /// Gives every block at least the time that exec needs ([`BLOCK_S_MIN`]).
     ///
     /// Cost: 300 where logarithms decide; 1,000 for a feed beyond the limit, or just below it. Velocities between the
     /// feed and the top, which only an override asks for, may be limited to up to a seventh less than the motors can do.
@@ -239,7 +240,7 @@ impl Path {
         }
     }
 
-    /// Keeps the motor that goes farthest within a step rate, which is not 0. The motor's way is in units of
+    /// Keeps the motor that moves farthest within a step rate, which is not 0. The motor's distance is in units of
     /// `2^-octaves` steps.
     #[inline(never)]
     #[small]
@@ -251,13 +252,13 @@ impl Path {
         }
     }
 
-    /// Whether the block, at its top, is over before exec can prepare the next one.
+    /// Whether the block, at its top velocity, takes less time than exec needs to prepare the next one.
     #[inline(never)]
     fn is_too_fast(&self) -> bool {
         below(self.length, self.top * BLOCK_S_MIN)
     }
 
-    /// Keeps a block long enough for exec. Cost: 300.
+    /// Gives a block at least the time that exec needs. Cost: 300.
     #[inline(never)]
     #[small]
     fn limit_time(&mut self) {
@@ -268,7 +269,7 @@ impl Path {
     }
 }
 
-/// Returns `top`, or less if an axis with this part of the heading and this velocity limit allows less.
+/// Returns `top`, or less if an axis with this part of the heading and this velocity limit requires that.
 #[inline(never)]
 fn slower(top: f32, u: i16, velocity: f32) -> f32 {
     let u = float(part(u));
@@ -299,7 +300,7 @@ pub(super) fn over(limit: Short, u: u16) -> Short {
         below <<= 1;
         power = power.wrapping_add(1);
     }
-    // The quotient less one: a mantissa leaves out its leading 1.
+    // The quotient less one, because a mantissa leaves out its leading 1.
     let mut rest = above.wrapping_sub(below);
     if above < below {
         rest = rest.wrapping_add(above);
@@ -329,7 +330,7 @@ impl Slowest {
     /// Returns the jerk limit if it has an effect, else 0.
     #[inline(always)]
     fn effective_jerk(&self) -> Short {
-        // The limit plainly has no effect if the acceleration builds up within 2^-10 s.
+        // The limit certainly has no effect if the acceleration builds up within 2^-10 s.
         let octaves = Short::octaves_between(self.least, self.jerk);
         if self.jerk == Short::ZERO || octaves >= 11 {
             return Short::ZERO;

@@ -3,15 +3,15 @@
 //! Called by the planner task. Owns the direction of the last move and the motor positions at the
 //! end of the last block. Costs are AVR cycles.
 //!
-//! Steps are the difference of two exact absolute positions, so nothing accumulates: neither rounding nor moves
-//! shorter than a step. A move without any steps (shorter than a step, or of an axis without a motor) is still a
-//! block and takes its time; otherwise the next step would come too early. A fast move of less than half a step is
-//! merged with the next one ([`Built::Merge`]). A block says where between two steps its motors arrive, to 1/16 step.
-//! So each motor knows where blocks have taken it, whatever positions are renamed to.
+//! Steps are the difference of two exact absolute positions, so neither rounding errors nor moves shorter than a step
+//! accumulate. A move without any steps (shorter than a step, or of an axis without a motor) is still a block that
+//! takes its time; otherwise the next step would come too early. A fast move of less than half a step is merged with
+//! the next one ([`Built::Merge`]). A block stores where between two steps its motors arrive, to 1/16 step. So each
+//! motor position is known even when coordinates are redefined.
 //!
 //! A ramp may go over many blocks. Without a jerk limit each block may have its own acceleration limit: what its axes
-//! allow in its direction. With a jerk limit, acceleration and jerk must stay alike for as long as possible: then
-//! they are those of the slowest axis that moves, whatever the direction.
+//! allow in its direction. With a jerk limit, acceleration and jerk should stay equal over as many blocks as possible,
+//! so they are those of the slowest axis that moves, whatever the direction.
 
 use super::block::{Block, Extent, Line as Move, QueuedAction};
 use super::curve::{Bend, Curve};
@@ -55,18 +55,18 @@ pub struct Line<'a> {
     pub may_merge: bool,
 }
 
-/// What becomes of a move.
+/// The result of building a move.
 #[derive(Clone, Copy, Debug)]
 pub enum Built {
     /// The move has no length.
     Nothing,
-    /// A block. The corner before it may be taken at this velocity, mm/s, or one so much higher than the block can be
-    /// run at that it is no limit.
+    /// A block. The value is the velocity limit of the corner before it, mm/s; it may be above any velocity of the
+    /// block, and is then no limit.
     Line(f32),
-    /// More steps than a block holds: the move is to be made in this many parts.
+    /// More steps than a block holds: the move must be divided into this many parts.
     Parts(u16),
-    /// Less than half a step, and over before exec could prepare it: the next move begins where this move begins. The
-    /// way of each axis fits 16 bits.
+    /// The move is less than half a step, and shorter than exec needs to prepare it: the next move begins where this
+    /// move begins. The travel of each axis fits 16 bits.
     Merge,
 }
 
@@ -75,7 +75,7 @@ pub enum Built {
 // In this order: AVR reaches a field within 63 bytes of the first in one instruction.
 #[repr(C)]
 pub struct Builder {
-    /// The highest velocity that the machine could have in the last move, mm/s; 0 if it stands still after it.
+    /// The highest velocity possible in the last move, mm/s; 0 if the machine stands still after it.
     top: f32,
     /// The feed of the last move.
     feed: LastFeed,
@@ -83,13 +83,12 @@ pub struct Builder {
     heading: Heading,
     /// Motors at the end of the last block.
     motors: [Motor; MOTORS],
-    /// How the path has turned so far.
+    /// The curvature of the path so far.
     bend: Bend,
 }
 
 impl Builder {
-    /// Makes the block for a move, and puts it into `out` if it returns [`Built::Line`]. Otherwise nothing is
-    /// changed.
+    /// Makes the block for a move, and writes it to `out` if it returns [`Built::Line`]. Otherwise nothing is changed.
     ///
     /// Cost: 3,500 + 1,300 for each axis that moves with its motor, for short moves.
     #[inline(never)]
@@ -155,8 +154,8 @@ impl Builder {
         Built::Line(entry)
     }
 
-    /// Makes a way that is too far for parts of a step in whole steps: motors keep the fraction of a step that they
-    /// have. Returns 0, or in how many parts the steps would fit blocks; nothing has moved then.
+    /// Moves in whole steps, for distances too long for parts of a step; motors keep their fraction of a step. Returns
+    /// 0, or the number of parts in which the steps would fit blocks; nothing has moved then.
     #[inline(never)]
     #[small]
     fn stride(
@@ -192,8 +191,8 @@ impl Builder {
         parts
     }
 
-    /// Takes the first `driven` motors back to where the move begins. `ways` is what they have gone, in parts of a
-    /// step. Cost: 1,500 for each motor that has moved.
+    /// Moves the first `driven` motors back to where the move begins. `ways` are the distances they have moved, in
+    /// parts of a step. Cost: 1,500 for each motor that has moved.
     #[inline(never)]
     #[small]
     fn undo(
@@ -252,7 +251,7 @@ impl Builder {
     }
 }
 
-/// Returns in how many parts of at most [`STEPS_MAX`] steps a way can be made.
+/// Returns into how many parts of at most [`STEPS_MAX`] steps a distance divides.
 #[inline(never)]
 fn parts_of(steps: u64) -> u16 {
     // Rounding the ends of a part may add a step.
@@ -260,8 +259,8 @@ fn parts_of(steps: u64) -> u16 {
 }
 
 impl Path {
-    /// Takes the motors to the end of the move, and sets in `ways` how far each goes, in parts of a step. Returns how
-    /// many motors it has done: all, or those before the first whose way does not fit.
+    /// Moves the motors to the end of the move, and writes the distance of each to `ways`, in parts of a step. Returns
+    /// how many motors have been moved: all, or those before the first whose distance does not fit.
     #[inline(never)]
     fn drive(
         &mut self,
@@ -298,7 +297,7 @@ impl Path {
         MOTORS as u8
     }
 
-    /// Takes up that a motor goes `way`.
+    /// Takes into account that a motor moves by `way`.
     #[inline(always)]
     fn go(&mut self, way: u16) {
         if way != 0 {

@@ -1,11 +1,11 @@
-//! The distance that it takes to slow down, computed in integers for a scan (`constraint`).
+//! The distance needed to slow down, computed in integers for a scan (`constraint`).
 //!
-//! Floats would cost four times as much on AVR. A scan is about velocities up to a known one. So the unit of velocity
-//! is the power of four that gives this velocity 12 to 14 bits. The unit of distance is its square, or more where a
-//! deceleration takes much distance to build up. Velocities are rounded so that the distance comes out longer, by
-//! some 0.05 %.
+//! Floats would cost four times as much on AVR. The highest velocity of a scan is known. The unit of velocity is the
+//! power of four that gives this velocity 12 to 14 bits. The unit of distance is the square of the unit of velocity, or
+//! larger where a deceleration takes much distance to build up. Velocities are rounded so that the distance comes out
+//! longer, by some 0.05 %.
 //!
-//! Called at exec level. Units outside: velocities mm/s, distances brake potential, (mm/s)^2 (`constraint`).
+//! Called at exec level. Units at the interface: velocities mm/s, distances brake potential, (mm/s)^2 (`constraint`).
 
 use super::divide::root;
 use super::float::{scaled, some, whole};
@@ -13,10 +13,10 @@ use super::governor::Limits;
 use super::short::Short;
 use crate::hal::arithmetic::product;
 
-/// Bits of the fastest velocity, or one more.
+/// Bits of the highest velocity, or one more.
 const BITS: i16 = 12;
 
-/// Distances end here: `END` is further on than the most that it takes to slow down, `BEHIND` is behind the machine.
+/// Distances are clamped to these. `END`, ahead, is more than slowing down ever takes; `BEHIND` is behind the machine.
 const END: u32 = 3 << 29;
 const BEHIND: u32 = 1 << 29;
 
@@ -31,9 +31,10 @@ pub(super) struct Scale {
     distance: i8,
     /// By how many bits the unit of distance is more than the square of the unit of velocity.
     coarse: u8,
-    /// Twice kappa, rounded up; all ones if that is beyond any velocity here.
+    /// Twice kappa, rounded up; all ones if that is above any velocity of the scale.
     twice: u16,
-    /// The root of 8 kappa, 16 bits; `long` is by how many bits its product with the root of a velocity is too long.
+    /// The root of 8 kappa, 16 bits; `long` is the number of bits by which its product with the root of a velocity is
+    /// too long.
     root: u16,
     long: u8,
 }
@@ -51,8 +52,8 @@ impl Scale {
         let (exponent, _) = parts(fastest);
         let unit = (exponent.max(LEAST) - BITS) & !1;
         let (of_root, root) = parts(limits.root);
-        // `need` multiplies the root by 256 times the root of a velocity, and drops 16 bits: the product is too small by
-        // this power of two.
+        // `need` multiplies the root by 256 times the root of a velocity, and drops 16 bits. The product is too small
+        // by this power of two.
         let more = of_root - (unit >> 1) - 7;
         // The distance of some hundred slices at this velocity is to be within range as well.
         let slices = exponent + parts(limits.accel).0 - unit - unit - 28;
@@ -122,13 +123,13 @@ impl Scale {
         stop + (stop >> 3)
     }
 
-    /// Returns an upper bound of the distance to slow down from `from` to what a key says: to `to` at its place, or
-    /// to whatever comes behind it, which has higher keys. Cost: 100.
+    /// Returns an upper bound of the distance to slow down from `from` for a key: to `to` at its place, or to any
+    /// constraint after it, which has a higher key. Cost: 100.
     pub fn by_key(&self, from: u16, to: u16) -> i32 {
         if self.twice > from {
             return END as i32;
         }
-        // Below twice kappa a key is that of a standstill.
+        // A key below twice kappa is that of a standstill.
         let to = if to < self.twice { 0 } else { to };
         (product(from + to, from - to + self.twice) >> self.coarse) as i32 + 1
     }

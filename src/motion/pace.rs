@@ -1,8 +1,8 @@
-//! How close ticks may come, so that the step interrupt, exec and everything else have enough time.
+//! The shortest tick periods that leave enough CPU time to the step interrupt, exec and everything else.
 //!
-//! Owned by [`Prep`](super::prep::Prep); the planner and the settings ask for the highest rates. The step interrupt
-//! waits out each pulse. So the wider a pulse is, the further apart ticks must be. Times are CPU cycles unless they
-//! are named otherwise.
+//! Owned by [`Prep`](super::prep::Prep); the planner and the settings read the highest step rates. The step interrupt
+//! waits for the end of each pulse, so wider pulses require longer tick periods. Times are CPU cycles unless stated
+//! otherwise.
 
 use crate::boards::{MOTORS, STEPS_BY_UNIT};
 use crate::dda::Ticks;
@@ -17,20 +17,20 @@ impl Drivers {
     /// The default of the settings.
     pub const USUAL: Self = Self { pulse_us: 2, setup_us: 1 };
 
-    /// By how much ticks are longer than usual: by the time that the interrupt waits, and half of it, so that
-    /// everything else keeps its share of the time.
+    /// By how much tick periods are longer than usual: one and a half times the additional wait of the interrupt, so
+    /// that everything else keeps its share of the CPU.
     const fn extra(self) -> u16 {
         let waits = self.waits();
         waits + waits / 2
     }
 
-    /// By how much pulses are longer than those with which the tick periods were measured.
+    /// By how much pulses are longer than the pulses with which the tick periods were measured.
     const fn waits(self) -> u16 {
         self.pulse_us.saturating_sub(PULSE_US) as u16 * CYCLES_PER_US
     }
 
-    /// By how much the shortest, the fine and the coarse ticks are longer. A unit that makes pulses by itself is
-    /// ready for the next pulse half a microsecond after one.
+    /// By how much the shortest, the fine and the coarse tick periods are longer. Step generators in hardware are ready
+    /// for the next pulse half a microsecond after a pulse.
     const fn spread(self) -> [u16; 3] {
         let extra = self.extra();
         if STEPS_BY_UNIT {
@@ -45,7 +45,7 @@ impl Drivers {
         self.setup_us as u16 * CYCLES_PER_US
     }
 
-    /// Returns the highest step rate of each of `motors` that move together, steps per second. It is a step on
+    /// Returns the highest step rate of each of `motors` that move together, steps per second. This is one step in
     /// every tick, except with two motors, where that would leave exec too little time for ramps.
     pub const fn step_rate_max(self, motors: usize) -> f32 {
         let usual = usual(if motors == 0 { 0 } else { motors - 1 });
@@ -53,7 +53,7 @@ impl Drivers {
     }
 }
 
-/// Tick periods with usual pulses, by the number of motors, less one. Not a table, which would be in RAM.
+/// Tick periods with usual pulses, by the number of motors, less one. Not a table, which would take RAM.
 const fn usual(motors: usize) -> Ticks {
     match motors {
         0 => const { TICKS[0] },
@@ -63,20 +63,21 @@ const fn usual(motors: usize) -> Ticks {
     }
 }
 
-/// The pace of blocks so short that they are a single segment: 2^22 / the tick period.
+/// The pace of blocks so short that they are one segment: 2^22 / the tick period.
 pub const COARSEST: u16 = per(TICKS[0].coarsest);
 
-/// How close ticks may come, for some number of motors that move.
+/// Limits of the tick period for a given number of motors that move.
 #[derive(Clone, Copy, Debug)]
 pub struct Pace {
     /// Shortest tick period: the step interrupt with this many motors, a short interrupt before it, and
     /// some time for everything else.
     pub shortest: u16,
-    /// 2^22 / the tick period of steady motion: as fine as leaves exec and the planner a third of the CPU.
+    /// 2^22 / the tick period of steady motion, as short as leaves exec and the planner a third of the CPU.
     pub fine: u16,
     /// 2^22 / the tick period of short blocks, for which exec and the planner need more of the CPU.
     pub coarse: u16,
-    /// From this tick period on pulses wait for the interrupt's worst latency ([`crate::dda::Segment::settle`]).
+    /// From this tick period on each pulse is delayed by the interrupt's worst latency
+    /// ([`crate::dda::Segment::settle`]).
     pub settles: u16,
 }
 
@@ -113,7 +114,7 @@ mod tests {
             Drivers { pulse_us, ..Drivers::USUAL }.step_rate_max(motors).round() as u32
         };
         assert_eq!([1, 2].map(|us| rate(us, 1)), [100_000; 2]);
-        // Pulses are 8 us longer: that makes ticks longer by 128 cycles and half of that.
+        // Pulses are 8 us longer: that makes tick periods longer by 128 cycles and half of that.
         assert_eq!((rate(10, 1), rate(10, 4)), (45_455, 31_311));
         let [usual, wide] = [2, 10].map(|pulse_us| paces(Drivers { pulse_us, setup_us: 1 }));
         for (usual, wide) in usual.iter().zip(&wide) {

@@ -1,9 +1,9 @@
-//! The way of a straight move: how long it is, and in which direction.
+//! The path of a straight move: its length and its direction.
 //!
 //! Called by the line builder. Works in integers of 15 bits where these are exact enough, at a third of the cycles of
 //! floats. The length of a long move decides how evenly its steps come, so it is computed in floats.
 //!
-//! Units: those of [`Length`] on the way in, mm (or degrees) on the way out.
+//! Units: input in those of [`Length`], output in mm (or degrees).
 
 use kerf_macros::small;
 
@@ -15,19 +15,18 @@ use crate::hal::arithmetic::product;
 use crate::math::sqrt;
 use crate::units::{FIRST_ROTARY, Length, PerAxis};
 
-/// The longest part of a normalized way has at least this many units.
+/// The largest component of a normalized travel is at least this.
 const MOST: u32 = 1 << 14;
 
-/// Whether there is a way.
+/// The result of measuring a move.
 pub(super) enum Way {
     None,
     Near,
-    /// Farther than [`Length`] holds.
+    /// The travel exceeds the range of [`Length`].
     Far,
 }
 
-/// The way of a move, and what limits it. Filled in place, because moving it costs as much as a multiplication of
-/// floats.
+/// The path of a move, and its limits. Filled in place, because copying it costs as much as a multiplication of floats.
 #[derive(Default)]
 pub(super) struct Path {
     /// Travel of each axis, in units of [`Length`].
@@ -36,12 +35,12 @@ pub(super) struct Path {
     pub(super) length: f32,
     /// Travel of each axis for a unit of length.
     pub(super) heading: Heading,
-    /// By which factor the way of the rotary axes is longer than that of the linear ones, if both move and it is
-    /// longer; else 0.
+    /// The length of the rotary axes' path (degrees) over that of the linear axes' path (mm), if both move and the
+    /// ratio is above 1; else 0.
     pub(super) stretch: f32,
     /// The axes that move: a bit for each, the first axis lowest.
     pub(super) moved: u8,
-    /// How far the motor goes that goes farthest, in parts of a step; `moving` is how many motors move.
+    /// The distance of the motor that moves farthest, in parts of a step; `moving` is the number of motors that move.
     pub(super) most: u16,
     pub(super) moving: u8,
     /// Whether `most` is in whole steps.
@@ -58,10 +57,11 @@ pub(super) struct Path {
 }
 
 impl Path {
-    /// Measures length and direction: to 0.01 %, for a single axis exactly.
+    /// Measures length and direction, to 0.01 %; exact for a single axis.
     ///
-    /// The length is that of the linear axes, or of the rotary ones (degrees) if they have the longer way. The feed
-    /// is that of the linear axes where they move; it is raised by the factor by which the length is longer.
+    /// The length is that of the linear axes' path, or of the rotary axes' path (degrees) if that is longer. The feed
+    /// applies to the linear axes where they move, so it is multiplied by [`Self::stretch`] where the length is that of
+    /// the rotary axes.
     #[inline(never)]
     pub(super) fn measure(&mut self, from: &PerAxis<Length>, to: &PerAxis<Length>) -> Way {
         let mut all = 0u32;
@@ -98,7 +98,7 @@ impl Path {
                 *u = share(*u, size.reciprocal);
             }
         }
-        // Long moves leave the time to be measured exactly, so that their steps come evenly.
+        // Long moves are measured exactly, so that their steps are even; there is time for it.
         self.length = if shift > 0 {
             length_of(&self.travel)
         } else {
@@ -124,7 +124,7 @@ impl Path {
     }
 }
 
-/// Reduces the travel to 15 bits and a sign. Returns the power of two that takes it back. `bits` is the union of the
+/// Reduces the travel to 15 bits and a sign. Returns the power of two that restores it. `bits` is the union of the
 /// sizes.
 #[inline(never)]
 fn normalize(unit: &mut PerAxis<i16>, travel: &PerAxis<i32>, bits: u32) -> i8 {
@@ -149,7 +149,7 @@ fn normalize(unit: &mut PerAxis<i16>, travel: &PerAxis<i32>, bits: u32) -> i8 {
     -shift
 }
 
-/// Does what [`normalize`] does for travel of more than 15 bits, where there is time.
+/// As [`normalize`], for travel of more than 15 bits; slower.
 #[inline(never)]
 #[small]
 fn normalize_far(unit: &mut PerAxis<i16>, travel: &PerAxis<i32>, mut bits: u32) -> i8 {
@@ -185,7 +185,7 @@ fn length_of(travel: &PerAxis<i32>) -> f32 {
     1e-4 * if below(linear, rotary) { rotary } else { linear }
 }
 
-/// Returns the factor by which the way of the rotary axes is longer than that of the linear ones.
+/// Returns the length of the rotary axes' path over that of the linear axes' path.
 #[inline(never)]
 fn stretch(travel: &PerAxis<i32>) -> f32 {
     let (linear, rotary) = travel.split_at(FIRST_ROTARY);
@@ -201,7 +201,7 @@ fn exact_norm(travel: &[i32]) -> f32 {
     sqrt(sum)
 }
 
-/// Returns a part of a vector in the units of a heading, rounded down, by less than 2. `reciprocal` is that of the
+/// Returns a component of a vector in the units of a heading, rounded down by less than 2. `reciprocal` is that of the
 /// vector's length, in 2^-30. Cost: 45.
 #[inline(never)]
 fn share(part: i16, reciprocal: u16) -> i16 {
@@ -209,8 +209,8 @@ fn share(part: i16, reciprocal: u16) -> i16 {
     if part < 0 { -share } else { share }
 }
 
-/// Returns a float from its first 16 bits, and the exponent that it has if the top bit is 1. The top bit may be 0,
-/// but then the next bit is 1. Cost: 30.
+/// Returns a float from its first 16 bits and the exponent that applies if the top bit is 1. The top bit may be 0, but
+/// then the next bit is 1. Cost: 30.
 #[inline(never)]
 pub(super) fn composed(bits: u16, power: i16) -> f32 {
     let (mantissa, power) =

@@ -3,40 +3,38 @@
 //! Owned by the exec task, which calls [`Prep::begin`] for a block and then [`Prep::segment`] or
 //! [`Prep::last`] for each stretch of it.
 //!
-//! The motor that goes farthest in a block is dominant. Its increment is `STEP / 2^k`, so that it steps on every
-//! `2^k`th tick exactly, with no jitter. `k` is as large as the shortest tick period allows: the other motors may
-//! step on any tick, and fine ticks keep them close to their true times too. If all motors that move go equally far,
-//! there are no other motors. Then `k` is 0 as far as possible, and the interrupt has next to nothing to do
-//! (lockstep).
+//! The motor that moves farthest in a block is dominant. Its increment is `STEP / 2^k`, so that it steps on every
+//! `2^k`th tick exactly, without jitter. `k` is as large as the shortest tick period allows: the other motors step on
+//! any tick, and finer ticks bring them closer to their exact times. If all motors that move go equally far (lockstep),
+//! there are no other motors. Then `k` is 0 if possible, which leaves the least work to the interrupt.
 //!
-//! A stretch is cut to whole ticks. The distance that is cut off is still in `left` and comes with the next stretch,
-//! as does its time: nothing is lost.
+//! A stretch is cut to whole ticks. The distance that is cut off stays in `left`, and is made with the next stretch;
+//! its time is carried over too.
 //!
-//! The other motors get the rounded increment, and [`Minor::owed`] remembers exactly what rounding took. When that
-//! comes to half a unit a tick or more in a segment, the increment is corrected by a unit a tick. What is owed is
-//! carried from segment to segment, and over the end of the block, so that rounding errors do not add up.
+//! The other motors get the rounded increment, and [`Minor::owed`] holds the exact rounding error. When this error is
+//! half a unit a tick or more in a segment, the increment is corrected by one unit a tick. The error is carried from
+//! segment to segment, and over the end of the block, so that rounding errors do not add up.
 //!
 //! **Ends of blocks.** A block ends where its line ends, to 1/16 step ([`PART`]). If blocks ended on whole steps, a
-//! curve of short lines would be rounded twice: at its corners, and at the steps between them. Ticks rarely fit
-//! this distance. So the last stretch of a block takes the nearest number of whole ticks. What each motor is then short
-//! of, or ahead by, is its `debt`: how far lines have told it to go, less how far segments have, modulo 2^16. The
-//! next block starts from where the motors are, and so pays the debt. The time of the missing part is carried over
-//! with it. A dominant motor thus keeps its phase, and its steps stay even, over any number of blocks.
+//! curve of short lines would be rounded twice: at its corners, and at the steps between them. The distance of a block
+//! is rarely a whole number of ticks, so the last stretch takes the nearest number of whole ticks. The difference that
+//! remains for a motor is its `debt`: the distance that lines require, less the distance in segments, modulo 2^16. The
+//! next block starts from where the motors are, which includes the debt in its distances. The time of the missing part
+//! is carried over with it. A dominant motor thus keeps its phase, and its steps stay even, over any number of blocks.
 //!
-//! **Ends of motion.** A block that comes to rest, or that no line follows, is made to its very end (`exact`), with
-//! finer ticks for the remainder if necessary. That end is so much less than half a step from the whole step to which
-//! it is rounded ([`FRACTIONS`](super::block::FRACTIONS)) that rounding errors cannot lead to another step. So the
-//! position is exact whenever the machine rests. Distances in blocks of more than 2,030 steps do not fit 1/16 steps:
-//! these blocks are a whole number of steps long, and keep the fraction with which they begin.
+//! **Ends of motion.** A block that ends at a standstill, or that no line follows, is made to its exact end (`exact`),
+//! with finer ticks for the remainder if necessary. This end is so much closer than half a step to the whole step to
+//! which it is rounded ([`FRACTIONS`](super::block::FRACTIONS)) that rounding errors cannot lead to another step. So
+//! the position is exact whenever the machine stands still. Distances of more than 2,030 steps do not fit 16 bits in
+//! 1/16 steps: such blocks are a whole number of steps long, and keep the fraction with which they begin.
 //!
-//! **Ends of segments.** A segment with one or two ticks a step ends on a step of the dominant motor as far as
-//! possible. So the next step is in time even if a later segment has one tick a step. A segment with more ticks a
-//! step ends in the middle between two steps: a tick without a pulse leaves the interrupt time to load the next
-//! segment.
+//! **Ends of segments.** A segment with one or two ticks a step ends on a step of the dominant motor if possible. So
+//! the next step is in time even if the next segment has one tick a step. A segment with more ticks a step ends in the
+//! middle between two steps, because in a tick without a pulse the interrupt has time to load the next segment.
 //!
-//! **Pressure advance.** An extruder is ahead of its line by its lead ([`advance`](super::advance)). The lead is
-//! added to segments that are otherwise complete, and is counted apart from the line. So all that is said here of
-//! ends holds for what the line asks for, and at rest there is no lead ([`Prep::relax`]).
+//! **Pressure advance.** An extruder is ahead of its line by its lead ([`advance`](super::advance)). The lead is added
+//! to segments that are otherwise complete, and is counted separately. So the rules above hold for the line without the
+//! lead, and at a standstill there is no lead ([`Prep::relax`]).
 //!
 //! Cost on AVR: 600 cycles a segment and 200 for each motor that moves; 400 for `begin`, and 300 for each
 //! motor when `k` changes.
@@ -68,13 +66,13 @@ const PART_LOG2: u8 = STEP_LOG2 - PARTS_LOG2;
 /// Half a step, in 1/16 step.
 const HALF: u8 = 1 << (PARTS_LOG2 - 1);
 
-/// Most ticks of a segment that has more ticks than its steps need.
+/// Most ticks of a segment with more than one tick a step.
 const LIMIT_MAX: u16 = 2000;
 
 /// Longest stretch, CPU cycles.
 pub const CYCLES_MAX: u32 = 1 << 20;
 
-/// Longest time of moves without steps that is kept for later, CPU cycles: a minute.
+/// Longest time of moves without steps that is carried over, CPU cycles: a minute.
 const KEPT_MAX: u32 = (1 << 30) - 1;
 
 /// Longest period of a tick, CPU cycles.
@@ -86,19 +84,19 @@ pub const FINE_LOG2: i8 = -4;
 /// Latest cycle of a tick at which the interrupt may become ready for its pulses.
 const SETTLE: u8 = 76;
 
-/// Latest cycle of its first tick at which the directions of a segment stand.
+/// Latest cycle of its first tick at which the direction pins of a segment are set.
 const TURNED: u16 = 158;
 
-/// Ticks and period of a segment for motors that move beside a block that stands still.
+/// Ticks and period of a segment for a retreat while the motors of the block stand still.
 const ASIDE: (u16, u16) = (64, 500);
 
-/// Ticks and period of a segment in which motors beside a block go no farther than 1/32 step.
+/// Ticks and period of a segment in which the motors of a retreat move no farther than 1/32 step.
 const ASIDE_LITTLE: (u16, u16) = (1, 16_000);
 
 /// A lockstep segment that is shorter than this many steps has at least half this many ticks.
 const LOCKSTEP_TICKS: u16 = 16;
 
-/// A segment longer than this, in cycles, has the time for [`LOCKSTEP_TICKS`]; a shorter one may not.
+/// A segment longer than this, in cycles, has time for [`LOCKSTEP_TICKS`]; a shorter one may have not.
 const LOCKSTEP_CYCLES: u32 = LOCKSTEP_TICKS as u32 * TICKS[0].coarsest as u32;
 
 /// The state of the preparation of one block.
@@ -127,16 +125,16 @@ pub struct Prep {
     fine: bool,
     /// Whether ticks are to be as few as in a block of one segment.
     coarse: bool,
-    /// Whether a motor has turned round and no segment has the new direction yet.
+    /// Whether a motor has reversed and no segment has the new direction yet.
     turned: bool,
-    /// How long directions must stand before the first step, CPU cycles.
+    /// Direction set-up time before the first step, CPU cycles.
     setup: u16,
-    /// Distance of the dominant motor in the line itself, without debts, signed, in the units of `most`.
+    /// Distance of the dominant motor in the line without debts, signed, in the units of `most`.
     own: i16,
     /// How far the dominant motor is past half a step, in its direction, at the block's end: 1/16 step, modulo 16.
     past: u8,
-    /// Phase units, positive forwards: how far blocks have told a motor to go, the running one included, less how far segments
-    /// have. Modulo 2^16; at the end of a block it is less than that.
+    /// The distance of a motor in blocks, the running one included, less its distance in segments: phase units,
+    /// positive forwards, modulo 2^16. At the end of a block its size is below that.
     debt: [i16; MOTORS],
     /// How far the end of the block is past the point half a step before its rounded whole step, in 1/16 step.
     fraction: [u8; MOTORS],
@@ -149,7 +147,7 @@ pub struct Prep {
 }
 
 impl Prep {
-    /// A preparation without a block.
+    /// The state without a block.
     pub const fn new() -> Self {
         const MINOR: Minor = Minor { way: 0, increment: 0, remainder: 0, owed: 0 };
         Self {
@@ -177,7 +175,7 @@ impl Prep {
         }
     }
 
-    /// Sets what the drivers ask for, from the next block on.
+    /// Sets the timing that the drivers require, from the next block on.
     #[inline(never)]
     #[small]
     pub fn set_drivers(&mut self, drivers: Drivers) {
@@ -188,7 +186,7 @@ impl Prep {
     /// Takes the segment that comes before any other. Returns false if there is none.
     #[inline(always)]
     pub fn held(&mut self, out: &mut Segment) -> bool {
-        // Looked at first: taking nothing costs as much as taking something.
+        // Tested first, because taking `None` costs as much as taking a segment.
         self.held.is_some() && self.release(out)
     }
 
@@ -206,21 +204,21 @@ impl Prep {
         (self.fine, self.coarse) = (fine, coarse);
     }
 
-    /// Phase units that the dominant motor still has to go in the block, without what segments cover.
+    /// Phase units of the dominant motor in the block that no segment covers yet.
     pub fn left(&self) -> u32 {
         self.left
     }
 
-    /// How far the line itself takes the dominant motor in the block, without debts, phase units. What a debt adds
-    /// belongs to the first stretch, as does its time.
+    /// The distance of the dominant motor in the line without debts, phase units. The distance and time of a debt
+    /// belong to the first stretch.
     pub fn own(&self) -> u32 {
         product(self.own.unsigned_abs(), if self.parts { PART } else { STEP })
     }
 
-    /// Returns `cycles` and the time that has been kept, at least 1.
+    /// Returns `cycles` plus the time carried over, at least 1.
     #[inline(always)]
     fn with_kept(&self, cycles: u32) -> u32 {
-        // What is kept is below 2^30.
+        // The time carried over is below 2^30.
         let sum = self.time.wrapping_add(cycles as i32);
         if sum > 0 { sum as u32 } else { 1 }
     }
@@ -231,13 +229,13 @@ impl Prep {
         self.time
     }
 
-    /// Forgets time that has not been used: the machine stands still.
+    /// Drops the time carried over, because the machine stands still.
     pub fn rest(&mut self) {
         self.time = 0;
     }
 
     /// Prepares a stretch of `cycles`, up to [`CYCLES_MAX`], at the end of which the dominant motor has about `left`
-    /// phase units to go. Returns false, and no segment, when the time is kept for the next stretch.
+    /// phase units to go. Returns false, and no segment, when the time is carried over to the next stretch.
     pub fn segment(&mut self, left: u32, cycles: u32, out: &mut Segment) -> bool {
         let travel = self.left.saturating_sub(left);
         let cycles = self.with_kept(cycles);
@@ -288,25 +286,25 @@ impl Prep {
     }
 
     /// Prepares the whole of a block that begins, in `cycles`, which are no more than a few milliseconds. Returns
-    /// false, and no segment, when the block has no steps; the time is kept then.
+    /// false, and no segment, when the block has no steps; its time is then carried over.
     ///
-    /// Makes what `last` makes of such a block, in fewer cycles. Cost: 700, and 400 for each motor but the dominant
-    /// one.
+    /// The result is that of `last` for such a block, in fewer cycles. Cost: 700, and 400 for each motor but the
+    /// dominant one.
     #[inline(never)]
     pub fn whole(&mut self, cycles: u32, exact: bool, out: &mut Segment) -> bool {
         let cycles = self.with_kept(cycles);
         let most = self.most;
         let limit = self.limit(cycles, COARSEST);
-        // The time that has been kept may be long.
+        // The time carried over may be long.
         if exact || most == 0 || !self.parts || cycles >> 24 != 0 {
             return self.last_of(cycles, limit, exact, out);
         }
         if most < u16::from(HALF) {
-            // Less than half a step. Nothing moves yet: the next block goes this distance too.
+            // Less than half a step: nothing moves, and the next block includes this distance.
             self.left = 0;
             return self.last_of(cycles, limit, exact, out);
         }
-        // Begins with ticks of 1/16 step, and makes them finer or coarser. `time / most` stays the period.
+        // Starts from ticks of 1/16 step, and makes them finer or coarser. The period stays `time / most`.
         let (mut ticks, mut step, mut time) = (most, PART, cycles);
         if ticks > limit {
             let (mut half, mut upper) = (0, (PART >> 8) as u8);
@@ -390,8 +388,8 @@ impl Prep {
         }
     }
 
-    /// Prepares the last stretch of the block, all that is left of it, in `cycles`: to the very end if `exact`, else
-    /// to the nearest number of ticks. Returns false, and no segment, when nothing is left; the time is kept then.
+    /// Prepares the last stretch of the block, the whole remainder, in `cycles`: to its exact end if `exact`, else to
+    /// the nearest number of ticks. Returns false, and no segment, when nothing is left; the time is then carried over.
     pub fn last(&mut self, cycles: u32, exact: bool, out: &mut Segment) -> bool {
         let cycles = self.with_kept(cycles);
         let limit = self.most_ticks(cycles, self.left);
@@ -420,7 +418,7 @@ impl Prep {
             // Too much for one segment. This segment takes a part; the rest comes with the next call.
             ticks = TICKS_MAX.into();
         } else if !exact {
-            // The nearest number: what is over is never more than half a tick.
+            // The nearest number: the error is at most half a tick.
             ticks += u32::from(left as u16 & (tick - 1) > tick / 2);
             self.left = product(ticks as u16, tick);
         }
@@ -428,15 +426,15 @@ impl Prep {
         true
     }
 
-    /// Returns the paces for the motors that move. With a motor above the second, the interrupt goes through all
-    /// motors (`dda::WIDE`), so that two motors take as long as three.
+    /// Returns the paces for the motors that move. With a motor above the second, the interrupt handles all motors
+    /// (`dda::WIDE`), so that two motors take as long as three.
     fn paces(&self) -> &Pace {
         let is_wide = self.others == 1 && self.full | self.minor > 0b11;
         &self.paces[usize::from(if is_wide { 2 } else { self.others })]
     }
 
-    /// Returns the most ticks for a stretch of `travel`. Ticks are fine if they are to be and no more than every
-    /// fourth one is a step: a tick with a step takes the interrupt longer, and would leave too little time to exec.
+    /// Returns the most ticks for a stretch of `travel`. Ticks are fine only if requested, and if at most every fourth
+    /// one is a step: a tick with a step takes the interrupt longer, and would leave too little time to exec.
     #[inline(never)]
     fn most_ticks(&self, cycles: u32, travel: u32) -> u16 {
         if self.fine {
@@ -478,8 +476,8 @@ impl Prep {
         u32::from(period.max(self.paces().shortest))
     }
 
-    /// Prepares a pause, because the next step is too far off: a single tick, as long as the time there is or as the
-    /// longest period. Returns false, and keeps the time, if that is short.
+    /// Prepares a pause, because the next step is too far off: a single tick that takes the whole time, or the longest
+    /// period. Returns false, and carries the time over, if it is short.
     fn idle(&mut self, cycles: u32, out: &mut Segment) -> bool {
         if cycles < PERIOD_MAX / 2 {
             self.time = cycles as i32;
@@ -520,9 +518,9 @@ impl Prep {
         self.complete(cycles, step, out, |prep, m| prep.minors[m].advance(ticks, prep.most));
     }
 
-    /// Gives directions time to settle after motors have turned round. If the first steps of `segment` come too soon,
-    /// it becomes a tick in which directions settle, and the steps come in the next segment. The time of that tick is
-    /// not made up for.
+    /// Gives directions time to settle after motors have reversed. If the first steps of `segment` come too soon, it
+    /// becomes a tick in which directions settle, and the steps come in the next segment. The motion is delayed by that
+    /// tick.
     #[inline(never)]
     fn behind_turn(&mut self, segment: &mut Segment) {
         self.turned = false;
@@ -561,7 +559,7 @@ mod tests {
     use super::super::block::{Extent, Line};
     use super::*;
 
-    /// Three and a half steps of 50 us: the half that is left takes half as long as a step, not sixteen of the shortest ticks.
+    /// Three and a half steps of 50 us: the last half takes half as long as a step, not sixteen of the shortest ticks.
     #[test]
     fn a_little_rest_in_lockstep_takes_its_time() {
         let (mut prep, mut out) = (Prep::new(), Segment::default());

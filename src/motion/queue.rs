@@ -30,7 +30,7 @@ pub(super) const SEQ: Index = Index::MAX >> 1;
 /// Marks a key that stays even if a lower key follows.
 pub(super) const FIRM: Index = !SEQ;
 
-/// Potentials beyond this many times the square of the velocity are counted anew.
+/// Potentials above this many times the square of the velocity are counted from zero again.
 const COARSE: f32 = 1024.0;
 
 /// The logarithm of half of [`COARSE`].
@@ -79,8 +79,8 @@ impl BlockStore {
         Some(BlockSource::new(self.ring.consumer()?, InterruptEnd::of(&self.constraints, level)?))
     }
 
-    /// Sets the overrides that are wanted. They are in force at once, except for what exceeds the overrides that the
-    /// keys are made for.
+    /// Requests these overrides. They apply at once, as far as they do not exceed the overrides that the keys are made
+    /// for.
     pub fn want(&self, factors: Factors, ceiling: &Ceiling) {
         self.constraints.with(ceiling, |constraints| constraints.want(factors));
     }
@@ -121,8 +121,8 @@ fn end(thread: Thread, constraints: &Shared<SpeedConstraints>) -> f32 {
     exec::lock(thread, |ceiling| constraints.with(ceiling, |constraints| constraints.end))
 }
 
-/// Returns the potential at the end of the queue, which is counted anew if it has become large for this line. `used`
-/// blocks are queued, and `newest` is the last of them.
+/// Returns the potential at the end of the queue. Potentials are counted from zero again if they have become large for
+/// this line. `used` blocks are queued, and `newest` is the last of them.
 #[inline(never)]
 #[small]
 fn refined(
@@ -152,7 +152,7 @@ pub struct BlockQueue {
     pub(super) constraints: &'static Shared<SpeedConstraints>,
     /// Sequence number of the block pushed last.
     pub(super) newest: Index,
-    /// What the next line follows.
+    /// The state at the end of the queue, which the next line follows.
     pub(super) tail: Tail,
 }
 
@@ -179,8 +179,8 @@ impl BlockQueue {
         self.put(|slot| *slot = block, None, |_| {})
     }
 
-    /// Returns the place where the next move is to be put together for [`BlockQueue::push_line`], because copying a
-    /// block takes time. `None` if there is no room.
+    /// Returns the slot in which to build the next move for [`BlockQueue::push_line`], because copying a block takes
+    /// time. `None` if there is no room.
     #[inline(always)]
     pub fn next_line(&mut self) -> Option<&mut Line> {
         let body = &mut self.ring.vacant_mut()?.body;
@@ -206,7 +206,7 @@ impl BlockQueue {
             return false;
         };
         line.start = end(thread, constraints);
-        // Usually the queue is empty, or floats are plainly fine: then there is no need to compare.
+        // Mostly the queue is empty, or floats are certainly fine enough.
         if some(line.start) && log(line.start) >= 2 * log(line.cruise) + FINE {
             line.start = refined(thread, constraints, line, (newest, used));
         }
@@ -215,8 +215,8 @@ impl BlockQueue {
         self.put(|slot| slot.set_line(number), key, |constraints| constraints.end = behind)
     }
 
-    /// Puts a block, which `complete` completes, into the ring, and what follows from it into the speed constraints.
-    /// Exec sees both at once. Returns false, with nothing done, when there is no room.
+    /// Puts a block, completed by `complete`, into the ring, and updates the speed constraints. Exec sees both changes
+    /// at once. Returns false, with nothing done, when there is no room.
     fn put(
         &mut self,
         complete: impl FnOnce(&mut Block),
@@ -245,8 +245,8 @@ impl BlockQueue {
         true
     }
 
-    /// Returns how many of the last keys a lower `key` makes needless. Meanwhile exec goes on, and passes only the
-    /// first keys: it must not wait for the mathematics of a whole queue.
+    /// Returns how many of the last keys a lower `key` makes needless. Takes the lock again for each key, so that exec
+    /// does not wait for the mathematics of a whole queue. Meanwhile exec removes only the first keys.
     #[inline(never)]
     fn needless(&self, key: f32) -> Index {
         let newest = self.newest;
@@ -271,7 +271,7 @@ impl BlockQueue {
         let back = usize::from(self.newest.wrapping_sub(seq) & SEQ);
         match self.ring.pushed(back) {
             Some(Block { body: Body::Line(line), .. }) => line.key(&self.tail.factors),
-            // The block is gone already: no limit.
+            // The block has been released already: no limit.
             _ => f32::MAX,
         }
     }

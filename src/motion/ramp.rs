@@ -1,9 +1,9 @@
-//! A ramp that is laid out to its end: from the present state to a steady velocity at a place.
+//! A ramp, laid out to its end: from the present state to a steady velocity at a given place.
 //!
 //! Owned by the [`Governor`], exec level. A ramp has five phases of constant jerk: an acceleration ends, the velocity
-//! is kept, the deceleration builds up, is kept, and ends. Velocity and distance are polynomials of the time that is
-//! left, so that a slice is the difference of two values. Errors do not add up, the ramp ends where it was meant to,
-//! and a slice in which phases change costs no more than any other.
+//! is kept, the deceleration builds up, is kept, and ends. Velocity and distance are polynomials of the remaining time,
+//! so that a slice is the difference of two values. Errors do not add up, the ramp ends exactly at its place, and a
+//! slice in which the phase changes costs no more than any other.
 //!
 //! Units: mm, s. Cost on AVR: 3,500 cycles to lay out, 1,000 to 1,700 a slice.
 
@@ -12,7 +12,7 @@ use super::governor::{Governor, same};
 use super::rise::MARGIN_FIRST;
 use crate::math::sqrt;
 
-/// What is left of a ramp.
+/// The remainder of a ramp.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Ramp {
     /// Time and distance to the end of the ramp.
@@ -21,7 +21,7 @@ pub(super) struct Ramp {
     /// Velocity at the end of the ramp; `top` is the velocity before the deceleration, where the acceleration is 0.
     velocity: f32,
     top: f32,
-    /// How long before the end the deceleration begins to end (`rise`), and reaches its most (`hold`).
+    /// How long before the end the deceleration begins to end (`rise`), and reaches its maximum (`hold`).
     rise: f32,
     hold: f32,
     /// How long before the end the top is reached.
@@ -31,7 +31,7 @@ pub(super) struct Ramp {
     pace: f32,
     /// Distance to the end where the deceleration begins.
     begin: f32,
-    /// Whether it is known what comes after the ramp; otherwise the ramp ends in a standstill.
+    /// Whether the end velocity is known to be safe for what follows; otherwise the ramp ends in a standstill.
     pub closed: bool,
 }
 
@@ -62,7 +62,7 @@ impl Ramp {
             return (w + gain, time * (w + gain * THIRD));
         }
         if !below(self.hold, time) {
-            // As if the deceleration had been constant from half of the rise on.
+            // The constant deceleration counts as if it had begun in the middle of the rise.
             let accel = scaled(self.half * self.rise, 1);
             let since = time - scaled(self.rise, -1);
             let gain = accel * since;
@@ -78,14 +78,14 @@ impl Ramp {
             return (self.top, self.begin + self.top * (time - fall));
         }
         if !some(self.coast) {
-            // The ramp does nothing but end an acceleration.
+            // The ramp only ends an acceleration.
             return self.off_top(time);
         }
         let (velocity, far) = self.off_top(time - self.coast);
         (velocity, self.begin + self.top * (self.coast - fall) + far)
     }
 
-    /// Returns the velocity `time` before or after the top, and the distance between.
+    /// Returns the velocity `time` before or after the top, and the distance to the top.
     #[inline(never)]
     fn off_top(&self, time: f32) -> (f32, f32) {
         let loss = self.half * time * time;
@@ -108,7 +108,7 @@ impl Ramp {
         }
     }
 
-    /// Whether the ramp does nothing but end an acceleration, at this velocity.
+    /// Whether the ramp only ends an acceleration, at this velocity.
     pub fn ends_at(&self, velocity: f32) -> bool {
         same(self.velocity, velocity) && same(self.top, velocity)
     }
@@ -138,7 +138,7 @@ fn share_of(drop: f32, kappa: f32) -> f32 {
 }
 
 impl Governor {
-    /// Gives up the ramp, and takes over its present acceleration.
+    /// Drops the ramp, and takes over its present acceleration.
     #[inline(never)]
     pub(super) fn leave_ramp(&mut self) {
         self.take_alpha();
@@ -155,8 +155,8 @@ impl Governor {
         }
     }
 
-    /// Lays out a ramp from the present state down to `w`, as hard as the limits allow, with `slack` mm at the top
-    /// before. A deceleration that is stronger than necessary ends at once, below `w`.
+    /// Lays out a ramp from the present state down to `w`, as hard as the limits allow, after `slack` mm at the top. If
+    /// the present deceleration already leads below `w`, it ends at once, below `w`.
     #[inline(never)]
     pub(super) fn lay(&mut self, w: f32, slack: f32, closed: bool) {
         let (alpha, limits) = (self.alpha, &self.limits);
@@ -250,7 +250,7 @@ impl Governor {
         (_, ramp.distance) = ramp.at(rise);
     }
 
-    /// Works out a slice of the ramp: to its end, if little more is left.
+    /// Computes a slice of the ramp, up to its end if little more is left.
     #[inline(never)]
     pub(super) fn follow(&mut self, seconds: f32) {
         let Some(ramp) = &mut self.ramp else { return };

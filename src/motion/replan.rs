@@ -1,13 +1,13 @@
-//! Makes the keys of what is queued anew, for other overrides.
+//! Computes the keys of all queued lines again, after an override has changed.
 //!
-//! Called by the planner when the factors that are wanted are not those of the keys. Blocks and their potentials stay
-//! as they are, because corners are stored whatever the feeds. The lines are looked at from the newest to the oldest.
-//! A key is kept if it is lower than all behind it, and limits the line before it by more than a thousandth. Exec
-//! goes on by the old keys until the new ones are put in their place, all at once. The new keys are made on the
-//! stack, so that exec waits only for a copy.
+//! Called by the planner when the requested factors differ from those of the keys. Blocks and their potentials do not
+//! change, because corners are stored independently of feeds. A backward pass goes from the newest line to the oldest.
+//! A key is kept if it is lower than all keys after it, and limits the line before it by more than a thousandth. Exec
+//! uses the old keys until all new ones replace them at once. The new keys are made on the stack, so that exec waits
+//! only for a copy.
 //!
-//! Cost on AVR: 800 cycles a line where the feed is steady, 2,000 at a corner that limits. For all that is queued
-//! 52,000, or 127,000 if each line is a corner. Exec waits for 2,000 of these cycles.
+//! Cost on AVR: 800 cycles a line where the feed is steady, 2,000 at a corner that limits. For a full queue 52,000, or
+//! 127,000 if each line is a corner. Exec waits for 2,000 of these cycles.
 
 use super::block::{Block, Body, Line};
 use super::factors::{Factors, Reserve};
@@ -19,18 +19,18 @@ use super::tail::WORTH;
 use crate::hal::exec;
 use crate::hal::ring::Index;
 
-/// What the lines behind a line require of it.
+/// The requirements of the lines that follow a line.
 struct Behind {
     /// The least key.
     key: f32,
-    /// The lowest velocity of the lines up to the next place that is worth a key.
+    /// The lowest velocity of the lines up to the next place that may need a key.
     low: f32,
-    /// By how much `key` has been raised, because potentials of older lines are higher.
+    /// By how much `key` has been raised because potentials of older lines are higher.
     left_out: f32,
     known: Known,
 }
 
-/// The line that was asked about last: its velocity, and how it brakes. The next line mostly has the same.
+/// A cache: velocity and braking limits of the last line. The next line mostly has equal ones.
 #[derive(Default)]
 struct Known {
     cruise: f32,
@@ -41,8 +41,7 @@ struct Known {
 }
 
 impl Behind {
-    /// Takes into account that potentials of the next line to be asked about are `left_out` higher than at the end of
-    /// the queue.
+    /// Takes into account that potentials of the next line are `left_out` higher than at the end of the queue.
     fn count_from(&mut self, left_out: f32) {
         if left_out.to_bits() != self.left_out.to_bits() {
             self.key += left_out - self.left_out;
@@ -50,8 +49,8 @@ impl Behind {
         }
     }
 
-    /// Returns the velocity of the key of `this` line, and [`FIRM`] or 0; `None` if the line needs no key. It follows
-    /// `before` without a stop, or begins at rest if that is `None`.
+    /// Returns the velocity of the key of `this` line, and [`FIRM`] or 0; `None` if the line needs no key. The line
+    /// follows `before` without a stop; if `before` is `None`, it begins at a standstill.
     #[inline(never)]
     fn key(
         &mut self,
@@ -110,14 +109,14 @@ impl Known {
 
 #[small]
 impl BlockQueue {
-    /// Returns the overrides that are wanted, if the keys are for others; else `None`. Cost: 60.
+    /// Returns the requested overrides if the keys are for other ones; else `None`. Cost: 60.
     pub fn wanted(&self) -> Option<Factors> {
         let wanted =
             exec::lock(self.thread, |ceiling| self.constraints.with(ceiling, |h| h.wanted));
         (!wanted.same(&self.tail.factors)).then_some(wanted)
     }
 
-    /// Makes the keys anew, for these overrides.
+    /// Computes all keys again, for these overrides.
     #[inline(never)]
     pub fn replan(&mut self, factors: Factors) {
         self.tail.factors = factors;
@@ -156,14 +155,14 @@ impl BlockQueue {
         }
     }
 
-    /// Puts the keys in the place of the present ones.
+    /// Replaces the present keys.
     #[inline(never)]
     fn install(&self, keys: &Keys) {
         exec::lock(self.thread, |ceiling| {
             let (used, factors) = (self.ring.used() as Index, self.tail.factors);
             let oldest = self.newest.wrapping_sub(used).wrapping_add(1) & SEQ;
             self.constraints.with(ceiling, |constraints| {
-                // A line that has begun has no key any more, nor has one that has been run meanwhile.
+                // Keys of lines that have begun, or have been run meanwhile, are dropped.
                 let begun = constraints.nth(0).is_none_or(|first| first & SEQ != oldest);
                 constraints.replace(keys);
                 while let Some(first) = constraints.nth(0) {
@@ -181,7 +180,7 @@ impl BlockQueue {
     }
 }
 
-/// Whether a block is not a line, but the machine goes on over it.
+/// Whether a block is an action that does not stop the machine.
 #[small]
 fn is_aside(block: Option<&Block>) -> bool {
     block.is_some_and(Block::is_aside)

@@ -1,15 +1,15 @@
-//! The way out of the cut: X moves away at once while the axes of a thread come to rest.
+//! Retract from the cut: X moves away at once while the axes of a thread decelerate to a standstill.
 //!
-//! Owned by exec, at the exec level. Exec begins it when a pass in step with the spindle ends before its time: the
-//! spindle is lost, the error is above its limit, a feedhold or an alarm has come ([`Exec`](super::exec::Exec)). Exec
-//! asks [`Retreat::add`] for each segment while the axes slow down, and for segments of its own when they stand. It
-//! begins in segments that are queued already ([`Exec::lead`](super::exec::Exec::lead)): they last 9 ms, for which X
-//! need not wait. The motors of X stand still in the pass, so that the two motions do not meet in a motor. X has a
-//! ramp up, a cruise and a ramp down of its own.
+//! Owned by exec, at the exec level. Exec begins it when a pass in step with the spindle ends early: the spindle is
+//! lost, the error is above its limit, or a feedhold or an alarm has come ([`Exec`](super::exec::Exec)). Exec calls
+//! [`Retreat::add`] for each segment while the axes slow down, and for segments of its own when they stand. The retreat
+//! begins in segments that are already queued ([`Exec::lead`](super::exec::Exec::lead)), which would otherwise delay X
+//! by 9 ms. The motors of X stand still in the pass, so that no motor has both motions. X has a ramp up, a cruise and a
+//! ramp down of its own.
 //!
-//! Units: steps of X, s. What is handed out is counted in whole phase units, so that nothing is lost. X ends within
-//! half a step, and a ten-thousandth, of the way that was asked for. Cost on AVR: 6,000 cycles a segment. RAM: it
-//! takes the place of the pass, which is over.
+//! Units: steps of X, s. Distances handed out are counted in whole phase units, without rounding errors. X ends within
+//! half a step, and a ten-thousandth, of the requested distance. Cost on AVR: 6,000 cycles a segment. RAM: shared with
+//! the pass, which has ended.
 
 use kerf_macros::small;
 
@@ -22,7 +22,7 @@ use crate::hal::arithmetic::product;
 use crate::math::sqrt;
 use crate::status::Status;
 
-/// What is left at the end and not handed out, phase units. The last step has been made well before it, and a slower
+/// The remainder at the end that is not handed out, phase units. The last step is made well before it, and a slower
 /// motion would be less than a unit in a tick.
 const END: u32 = STEP as u32 / 16;
 
@@ -31,7 +31,7 @@ const END: u32 = STEP as u32 / 16;
 pub struct Retract {
     /// The motors of X, as bits; none if the tool stays in the cut.
     pub motors: u8,
-    /// How far the motors go, steps.
+    /// Distance of the motors, steps.
     pub way: i16,
     /// The acceleration limit of the motors, steps/s^2.
     pub accel: Short,
@@ -55,18 +55,18 @@ pub struct Retreat {
     how: Retract,
     /// Why the pass was left.
     pub why: Status,
-    /// What is left of the way, phase units.
+    /// The remaining distance, phase units.
     left: u32,
     /// steps/s.
     velocity: f32,
-    /// What has been handed out beyond whole steps, and a half to round by, phase units.
+    /// The distance handed out beyond whole steps, plus half a step for rounding, phase units.
     part: u16,
 }
 
 #[small]
 impl Retreat {
-    /// Returns a retreat at rest, in the cut, for this reason. `debt` is that of the motors in `Prep`, which is paid
-    /// on the way.
+    /// Returns a retreat at a standstill, in the cut, for this reason. `debt` is that of the motors in `Prep`, which
+    /// the retreat makes good.
     pub fn new(how: Retract, why: Status, debt: i16) -> Self {
         let ahead = if how.way < 0 { debt.wrapping_neg() } else { debt };
         let left = u32::from(how.way.unsigned_abs()) << STEP_LOG2;
@@ -75,7 +75,7 @@ impl Retreat {
         Self { how, why, left, velocity: 0.0, part }
     }
 
-    /// Whether X is out of the cut, at rest.
+    /// Whether X is out of the cut, at a standstill.
     pub fn is_done(&self) -> bool {
         self.left == 0
     }
@@ -90,7 +90,7 @@ impl Retreat {
         self.how.way < 0
     }
 
-    /// Moves X in a segment in which it would stand.
+    /// Adds the motion of X to a segment in which X would stand.
     #[inline(never)]
     pub fn add(
         &mut self,
@@ -115,7 +115,7 @@ impl Retreat {
         const HZ: f32 = TIMER_HZ as f32;
         let accel = self.how.accel.get();
         let gain = accel * (product(ticks, period) as f32 * (1.0 / HZ));
-        // From this velocity X has to lose at most `gain` in each segment behind this one.
+        // The velocity from which X can stop by losing at most `gain` in each later segment.
         let twice_left = self.left as f32 * (2.0 / f32::from(STEP));
         let stops = sqrt(gain * gain + accel * twice_left) - gain;
         let period = f32::from(period);
@@ -123,11 +123,11 @@ impl Retreat {
         // A step in each tick at most.
         self.velocity = least(wanted, HZ / period);
         let increment = (self.velocity * period * (f32::from(STEP) / HZ) + 0.5) as u16;
-        // A motion too slow for a unit in a tick would never come to its end.
+        // A motion of less than a unit in a tick would never end.
         increment.max((!self.is_done()).into())
     }
 
-    /// Counts that X goes `increment` in each of `ticks`. Adds whole steps to `target`; what is handed out besides is
+    /// Counts a segment in which X moves `increment` in each of `ticks`. Adds whole steps to `target`; the remainder is
     /// a `debt` of half a step at most, as in `Prep`.
     #[inline(never)]
     pub fn note(
@@ -143,7 +143,7 @@ impl Retreat {
         let sum = travel + u32::from(self.part);
         self.part = sum as u16 & (STEP - 1);
         let steps = (sum >> STEP_LOG2) as i32;
-        // What X has been told to go, less what it goes, modulo 2^16.
+        // The distance required of X, less the distance in segments, modulo 2^16.
         let owed = ((steps as u16) << STEP_LOG2).wrapping_sub(travel as u16);
         let (steps, owed) =
             if self.is_backwards() { (-steps, owed.wrapping_neg()) } else { (steps, owed) };
@@ -157,7 +157,7 @@ impl Retreat {
         }
     }
 
-    /// Notes that a segment has run without X: it begins again from rest.
+    /// Notes that a segment has run without X, which then starts again from a standstill.
     pub fn pause(&mut self) {
         self.velocity = 0.0;
     }

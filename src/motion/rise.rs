@@ -1,29 +1,28 @@
-//! A slice under a jerk limit: as fast as the limits allow, with work that has a bound.
+//! Computes one slice under a jerk limit: as fast as the limits allow, in bounded time.
 //!
-//! Called for each slice (`slice`), exec level. The state is a velocity and an acceleration, alpha times its limit A.
+//! Called for each slice (`slice`), exec level. The state is a velocity v and an acceleration, alpha times its limit A.
 //!
 //! **Safe.** An acceleration takes time to end. So what counts is the *top*: the velocity `v + k alpha^2` that is
-//! reached if the acceleration begins to end now, and the place where it is reached. A state is safe if its top may
-//! be steady there ([`Clear`]). It stays safe while the acceleration ends, and at the top for as long as `Clear`
-//! says; a ramp that is laid out then, as hard as the limits allow, is in time for all that is ahead. So there is
-//! always an answer without a search: no scan is needed to go on.
+//! reached if the acceleration begins to end now, and the place where it is reached. A state is safe if the top may be
+//! held as a steady velocity from that place on ([`Clear`]). It stays safe while the acceleration ends, and at the top
+//! for as long as `Clear` says. A ramp that is laid out then, as hard as the limits allow, is in time for every
+//! constraint ahead. So the machine can always go on without another scan.
 //!
-//! **Faster.** In each slice alpha is raised, or kept, or ended at the feed, if the top that follows is safe. A scan
-//! asks for a top that is some slices further, before it is needed, so that the next slices need not ask. If that top
-//! is not safe, the answer for a lower top stays valid; the next slice asks for half as much more, and the
-//! acceleration ends when nothing more is safe. A scan is for one top, and there is one scan in a stretch (a second
-//! one at rest, and where limits or feeds have changed).
+//! **Faster.** In each slice alpha is raised, or kept, or ended at the feed, if the resulting top is safe. A scan tries
+//! a top some slices ahead, so that the next slices need no scan. If that top is not safe, the answer for a lower top
+//! stays valid. The next scan then tries half the gain, and the acceleration ends when no gain is safe. A scan is for
+//! one top, and there is one scan in a stretch (a second one at standstill, and where limits or feeds have changed).
 //!
 //! **In a hurry**, while the CPU has no time left, velocities are kept, ramps followed, and accelerations ended,
 //! without a scan as long as the last answer allows it.
 //!
-//! **Slower.** A ramp is followed to its end. In every fourth slice of it, if something ahead has changed, a scan
-//! asks for something better: to end the deceleration now and go on at the velocity that is left, or, if the
-//! deceleration has not begun, to go faster. If that is not safe, the ramp goes on.
+//! **Slower.** A ramp is followed to its end. If something ahead has changed, a scan in every fourth slice tries to end
+//! the deceleration now and keep the velocity that is left, or, before the deceleration has begun, to go faster. If
+//! that is not safe, the ramp goes on.
 //!
-//! The length of slices has consequences. Alpha changes in steps of a slice while it rises. A velocity that is less
-//! than `J t^2` away (t is the time of a slice) is reached at once, and so is the end of a move that is shorter than
-//! `2 J t^3`.
+//! Two consequences of the duration of slices: Alpha changes in steps of a slice while it rises. A velocity that is
+//! less than `J t^2` away (t is the time of a slice) is reached at once, and so is the end of a move that is shorter
+//! than `2 J t^3`.
 //!
 //! Units: mm, s; distances to what is ahead are brake potential (`constraint`). Cost on AVR: 800 cycles at a steady velocity, 2,400
 //! in a ramp, 3,000 while alpha rises; a scan 3,500 to 7,500 more, a ramp that is laid out 2,000 to 4,000.
@@ -38,7 +37,7 @@ use super::slice::Span;
 /// Slices before another attempt to go faster, after one that has failed.
 const WAIT: u8 = 8;
 
-/// Slices at a steady velocity before the machine goes faster by little.
+/// Slices at a steady velocity before a small gain in velocity is tried.
 const CALM: u8 = 32;
 
 /// Slices by which the first scan of an acceleration looks further than it has to.
@@ -47,12 +46,13 @@ pub(super) const MARGIN_FIRST: u8 = 4;
 /// Most slices by which a scan looks further than it has to.
 const MARGIN: u8 = 15;
 
-/// How much longer than a usual slice a crept slice may be, as a power of two: see [`Governor::crawled`].
+/// How much longer than a usual slice the slice of [`Governor::creep`] may be, as a power of two: see
+/// [`Governor::crawled`].
 const CRAWL_LOG2: i8 = 3;
 /// A stretch that is shorter than this is not worth a segment, s.
 const LITTLE_S: f32 = SEGMENT_S / 4.0;
 
-/// A state that could be next.
+/// A candidate for the state after the slice.
 #[derive(Clone, Copy, Default)]
 struct Next {
     velocity: f32,
@@ -71,7 +71,7 @@ enum Arrives {
     Safely,
     /// It is not safe to end at the feed.
     Unsafe,
-    /// Only a second scan in this stretch could tell.
+    /// Unknown without a second scan in this stretch.
     Unknown,
 }
 
@@ -81,13 +81,13 @@ struct Steady {
     distance: f32,
     /// The distance, brake potential.
     at: f32,
-    /// Whether the velocity is known to be safe for the slice and as long again. If it is not, that is the first
-    /// thing to find out: whatever is faster is safe for a shorter time.
+    /// Whether the velocity is known to be safe for twice the slice. If it is not, this is scanned for first, because a
+    /// higher velocity is safe for a shorter time.
     known: bool,
 }
 
 impl Governor {
-    /// Works a slice out. Returns false, with nothing done, if that takes a second scan in this stretch.
+    /// Computes a slice. Returns false, with nothing done, if that takes a second scan in this stretch.
     #[inline(never)]
     pub(super) fn slice(&mut self, span: &Span, ahead: &impl Ahead) -> bool {
         if let Some(ramp) = &self.ramp {
@@ -107,7 +107,7 @@ impl Governor {
         self.free(span, ahead)
     }
 
-    /// Works out a slice without a ramp, or of something better than the ramp.
+    /// Computes a slice where there is no ramp, or tries one that is faster than the ramp.
     #[inline(never)]
     fn free(&mut self, span: &Span, ahead: &impl Ahead) -> bool {
         let velocity = self.velocity;
@@ -127,9 +127,8 @@ impl Governor {
         self.climb(span, ahead)
     }
 
-    /// Whether the machine has the feed, or lacks less than a part in 64 and has been steady for a short time only.
-    /// Where each block has another feed, as on a spiral, following each of these feeds would cost more than it is
-    /// worth.
+    /// Whether the machine is at the feed, or less than 1/64 below it and steady only for a short time. Where each
+    /// block has another feed, as on a spiral, following each small change would cost more than it gains.
     fn is_calm(&mut self, cruise: f32) -> bool {
         let velocity = self.velocity;
         if same(velocity, cruise) {
@@ -156,15 +155,15 @@ impl Governor {
         Steady { distance, at, known: self.is_clear(velocity, scaled(at, 1)) }
     }
 
-    /// Works out a slice at a steady velocity. Returns false, with nothing done, if that takes a second scan in this
+    /// Computes a slice at a steady velocity. Returns false, with nothing done, if that takes a second scan in this
     /// stretch.
     #[inline(never)]
     fn keep(&mut self, steady: &Steady, span: &Span, ahead: &impl Ahead) -> bool {
         let velocity = self.velocity;
         let may_wait =
             steady.known || (self.hurry || self.scanned) && self.is_clear(velocity, steady.at);
-        // The last scan is still good enough to lay a ramp out: a scan and a ramp are too much for one slice. A ramp to a velocity
-        // that is no lower would end at once, and another one would have to be laid out behind it.
+        // A recent scan is good enough to lay out a ramp, because a scan and a ramp take too long for one slice. But a
+        // ramp to a velocity that is no lower would end at once, and require another ramp after it.
         let lower = below(self.clear.target, velocity);
         if !may_wait && (self.clear.age > 1 || below(self.clear.top, velocity) || !lower) {
             if self.scanned {
@@ -192,7 +191,8 @@ impl Governor {
         self.scanned |= lays && !below(self.rest.seconds, LITTLE_S);
     }
 
-    /// Lays out the ramp for what the last scan has found; the top is reached `at`.
+    /// Lays out the ramp down to the target of the last scan; `at` is the distance to the place where the top is
+    /// reached.
     fn slow_for_clear(&mut self, at: f32) {
         let slack = ratio(self.clear.slack(at, self.limits.kappa), scaled(self.limits.accel, 1));
         let Clear { target, closed, .. } = self.clear;
@@ -216,7 +216,7 @@ impl Governor {
         out.top = velocity + self.limits.kappa * alpha * alpha;
     }
 
-    /// Fills in how far the slice goes, and how far on the top is.
+    /// Fills in the distance of the slice, and the distance to the top.
     #[inline(never)]
     fn place_top(&self, next: &mut Next, seconds: f32) {
         next.distance = scaled(seconds, -1) * (self.velocity + next.velocity);
@@ -226,11 +226,11 @@ impl Governor {
 
     /// Returns the distance in which an acceleration ends, brake potential; negative for a deceleration.
     fn rising(&self, alpha: f32, velocity: f32, top: f32) -> f32 {
-        // The mean velocity: two thirds of what is still gained, and the velocity.
+        // The mean velocity is the velocity plus two thirds of the gain that is still to come.
         scaled(self.limits.kappa, 2) * alpha * (top - (top - velocity) * (1.0 / 3.0))
     }
 
-    /// Works out a slice of acceleration, if that is safe, else one without. Returns false, with nothing done, if
+    /// Computes a slice that accelerates if that is safe, else one that does not. Returns false, with nothing done, if
     /// that takes a second scan in this stretch.
     #[inline(never)]
     fn climb(&mut self, span: &Span, ahead: &impl Ahead) -> bool {
@@ -276,14 +276,14 @@ impl Governor {
         true
     }
 
-    /// Whether an acceleration that is about to end is ended now, without another scan. Each scan allows half the
-    /// gain of the one before; at 80,000 steps/s a slice with a scan takes longer to work out than it lasts.
+    /// Whether an acceleration that is about to end is ended now, without another scan. Each scan allows half the gain
+    /// of the one before; at 80,000 steps/s computing a slice with a scan takes longer than the slice lasts.
     #[inline(always)]
     fn ends_early(&self) -> bool {
         self.tight && self.closing
     }
 
-    /// Looks further ahead while the next state is known to be safe, if the states after it are not. Whatever the
+    /// Scans for a higher top while the next state is known to be safe but the states after it are not. Whatever the
     /// answer, the next state stays safe.
     #[inline(always)]
     fn look_early(&mut self, next: &Next, span: &Span, ahead: &impl Ahead) {
@@ -301,7 +301,7 @@ impl Governor {
         }
     }
 
-    /// Asks for a top that is some slices further. Returns whether this top is safe.
+    /// Scans for a top that is some slices further. Returns whether this top is safe.
     #[inline(never)]
     fn look_further(&mut self, next: &Next, span: &Span, ahead: &impl Ahead) -> bool {
         let gain = self.limits.accel * span.seconds * f32::from(self.margin);
@@ -311,22 +311,22 @@ impl Governor {
         found
     }
 
-    /// Finds out how long the velocity `top` may be kept. It is reached `at` in any case, after others up to
-    /// `fastest`.
+    /// Scans for how long the velocity `top` may be kept. It is reached at the distance `at` in any case; the highest
+    /// velocity until then is `fastest`.
     fn look_about(&mut self, top: f32, at: f32, fastest: f32, span: &Span, ahead: &impl Ahead) {
         let ask = Ask { top, at, fastest, level: 0.0, here: self.here(span), taken: true };
         self.scan(&ask, ahead);
     }
 
-    /// Whether `top`, which is reached `at`, is safe.
+    /// Whether `top`, which is reached at the distance `at`, is safe.
     fn ask(&mut self, top: f32, at: f32, span: &Span, ahead: &impl Ahead) -> bool {
         self.changed = false;
         let ask = Ask { top, at, fastest: top, level: 0.0, here: self.here(span), taken: false };
         self.scan(&ask, ahead)
     }
 
-    /// Whether the next state is safe, of which nothing is known. From a steady velocity it asks for more than the
-    /// next slice takes, as long as there are smaller gains to be tried.
+    /// Scans for whether the next state is safe. From a steady velocity it first tries more than the next slice needs,
+    /// as long as smaller gains remain to be tried.
     #[inline(never)]
     fn look_ahead(&mut self, next: &Next, span: &Span, ahead: &impl Ahead) -> bool {
         if !some(self.alpha) && self.margin > 0 {
@@ -341,8 +341,8 @@ impl Governor {
         found
     }
 
-    /// Sets how far the next scan looks: further and further, until a scan refuses what it is asked for; then half as
-    /// far each time.
+    /// Sets how far ahead the next scan tries: twice as far each time, until a scan finds its top unsafe; from then on
+    /// half as far each time.
     fn adjust_margin(&mut self, found: bool) {
         if found && !self.closing {
             self.margin = (2 * self.margin + 1).min(MARGIN);
@@ -352,7 +352,7 @@ impl Governor {
         }
     }
 
-    /// Goes no faster: works out a slice of the present ramp, or of one that begins now.
+    /// Goes no faster: computes a slice of the present ramp, or of one that begins now.
     fn go_on(&mut self, span: &Span, ahead: &impl Ahead) {
         if self.ramp.is_some() {
             self.follow(span.seconds);
@@ -361,7 +361,7 @@ impl Governor {
         }
     }
 
-    /// Ends the acceleration without a ramp, and lays out a ramp down if it is time. `clear` is for the present
+    /// Ends an acceleration that has no ramp yet, and lays out a ramp down if that is due. `clear` is for the present
     /// state, or for a faster one.
     #[inline(never)]
     fn end_climb(&mut self, span: &Span, ahead: &impl Ahead) {
@@ -386,7 +386,7 @@ impl Governor {
             return self.creep(span);
         }
         if some(self.alpha) {
-            // The last answer is enough to get to the top. What comes then is decided there.
+            // The last answer covers the way to the top. What follows is decided there.
             if below(self.clear.distance, at) {
                 self.slow_for_clear(at);
             } else {
@@ -402,7 +402,7 @@ impl Governor {
     }
 
     /// Whether a steady velocity is so low that another scan for a smaller gain is worthwhile. Where the queue is
-    /// short, a velocity that is kept is better than one that goes up and down by little.
+    /// short, a constant velocity is better than one that rises and falls by little.
     fn tries_less(&self) -> bool {
         let gain = self.limits.accel * SEGMENT_S * f32::from(self.margin + 1);
         !some(self.alpha) && self.closing && below(self.velocity, scaled(gain, 3))
@@ -497,7 +497,7 @@ impl Governor {
         self.lay(if fits { target } else { 0.0 }, 0.0, closed && fits);
     }
 
-    /// Something ahead has changed: works out a slice of the ramp, or of something better.
+    /// Something ahead has changed: computes a slice of the ramp, or a faster one.
     #[inline(never)]
     fn reconsider(&mut self, span: &Span, ahead: &impl Ahead) -> bool {
         self.changed = false;
@@ -518,7 +518,7 @@ impl Governor {
         true
     }
 
-    /// Returns the velocity that is left if the deceleration begins to end now; 0 if it is hardly any.
+    /// Returns the velocity that is left if the deceleration begins to end now; 0 if that is too low to matter.
     #[inline(never)]
     fn bottom(&self) -> f32 {
         let bottom = self.velocity - self.limits.kappa * self.alpha * self.alpha;
@@ -540,7 +540,7 @@ impl Governor {
         safe
     }
 
-    /// Moves from rest to rest over what is too short to get going: a fraction of a step, most likely.
+    /// Moves from standstill to standstill over a distance too short for a ramp: mostly a fraction of a step.
     #[inline(never)]
     fn creep(&mut self, span: &Span) {
         (self.velocity, self.alpha, self.wait) = (0.0, 0.0, 0);
@@ -550,9 +550,9 @@ impl Governor {
         self.add(greater(seconds, left / span.cruise), left, self.potential(left));
     }
 
-    /// Returns the longest distance that may be crept over from rest to rest in one slice, without a ramp, mm. Such a
+    /// Returns the longest distance, mm, that one slice may cover from standstill to standstill without a ramp. Such a
     /// slice takes up to `2^CRAWL_LOG2` times as long as `span` says. Its mean velocity is at most what two usual
-    /// slices of acceleration build up: a jump by so little is allowed.
+    /// slices of acceleration build up, a velocity jump that is small enough.
     #[inline(never)]
     fn crawled(&self, span: &Span) -> f32 {
         let Limits { accel, jerk, .. } = self.limits;

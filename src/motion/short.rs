@@ -2,7 +2,7 @@
 
 use crate::hal::arithmetic::high_product;
 
-/// Eight bits of exponent and eight of mantissa. Exact to 0.4 %, and rounded down, so that a limit is kept.
+/// Eight bits of exponent and eight of mantissa. Exact to 0.4 %, and rounded down, so that no limit is exceeded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Short(u16);
 
@@ -48,7 +48,7 @@ impl Short {
         Self(u16::from_le_bytes([mantissa, power]))
     }
 
-    /// Returns an integer that compares as the number does.
+    /// Returns an integer that sorts as the numbers do.
     #[inline(always)]
     pub const fn bits(self) -> u16 {
         self.0
@@ -129,8 +129,7 @@ impl Log {
     }
 }
 
-/// Returns by how much the logarithm of 1 + m is above m, which is nearly by how much 1 + m is above 2 to the power
-/// of m. All in 1/256.
+/// Returns `log2(1 + m) - m`, which is nearly `1 + m - 2^m`. All in 1/256.
 #[inline(always)]
 fn bulge(m: u8) -> u8 {
     high_product(high_product(m, !m), 88)

@@ -1,10 +1,11 @@
-//! Under a jerk limit the governor works in slices of a few milliseconds, wherever blocks begin and end.
+//! Slices: under a jerk limit the governor computes velocities for a few milliseconds at a time, independently of the
+//! ends of blocks.
 //!
 //! Called by [`Governor::stretch`](super::governor::Governor::stretch), exec level. A stretch is a slice, or the part
-//! of it that lies in the block; the rest of the slice belongs to the blocks that follow. So the mathematics of a
-//! ramp is done once for a slice, however short blocks are, and a block that ends within the slice costs one
-//! multiplication. Near the end of a block slices are made longer or shorter, so that no stretch is much shorter than
-//! a slice unless its block is.
+//! of a slice that lies in the running block; the remainder of the slice belongs to the blocks that follow. So the
+//! mathematics of a ramp is done once for each slice, however short blocks are. A block that ends within the slice
+//! costs one multiplication. Near the end of a block slices are made longer or shorter, so that a stretch is much
+//! shorter than a slice only if its block is.
 //!
 //! Units: mm, s.
 
@@ -13,12 +14,12 @@ use super::exec::SEGMENT_S;
 use super::float::{below, greater, less, ratio, scaled, some};
 use super::governor::{Governor, Stretch, same};
 
-/// The part of a slice that has been worked out but not handed out.
+/// The remainder of a slice: computed, but not handed out yet.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Rest {
     pub seconds: f32,
     pub distance: f32,
-    /// Seconds for a millimetre, once a part has been handed out.
+    /// Seconds per millimetre, once a part has been handed out.
     inverse: f32,
 }
 
@@ -26,28 +27,28 @@ impl Rest {
     pub const NONE: Self = Self { seconds: 0.0, distance: 0.0, inverse: 0.0 };
 }
 
-/// What a slice is to be like.
+/// The parameters of the next slice.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Span {
     /// Distance from the present state to the end of the block, mm.
     pub left: f32,
     /// Velocity limit, mm/s.
     pub cruise: f32,
-    /// How long the slice is to be, s.
+    /// Duration of the slice, s.
     pub seconds: f32,
 }
 
-/// Segments for a steady velocity end 2 to this power stretches before a ramp begins.
+/// The fine ticks of a steady velocity end 2 to this power stretches before a ramp begins.
 const FAR_LOG2: i8 = 3;
 
-/// Returns the longest stretch, s, where most stretches are `nominal` seconds long. A feedhold begins after the
-/// stretches that have been handed out.
+/// Returns the longest stretch, s, where most stretches are `nominal` seconds long. The limit keeps a feedhold prompt:
+/// it begins after the stretches that have been handed out.
 #[inline(always)]
 pub(super) fn longest(nominal: f32) -> f32 {
     if same(nominal, SEGMENT_S) { 1.5 * SEGMENT_S } else { 2.0 * SEGMENT_S }
 }
 
-/// A distance that rounding leaves at rest, mm: it takes no ramp of its own.
+/// The distance that rounding may leave at a standstill, mm. It needs no ramp of its own.
 const ROUNDING: f32 = 5e-4;
 
 impl Governor {
@@ -84,8 +85,7 @@ impl Governor {
     }
 
     /// Returns a stretch at the feed, if the machine is at the feed and is known to be able to keep it; else `None`.
-    /// The stretch is not cut from a slice: it takes all of the block if that is short. Cost: 700, 1,200 at the end
-    /// of a block.
+    /// The stretch is not cut from a slice; it covers all of a short block. Cost: 700, 1,200 at the end of a block.
     #[inline(always)]
     fn steady(&mut self, left: f32, cruise: f32, nominal: f32) -> Option<Stretch> {
         let velocity = self.velocity;
@@ -103,8 +103,8 @@ impl Governor {
             slice
         };
         let at = self.potential(distance);
-        // Twice the distance must be known to be clear: so the next scan comes while nothing has to be done about its
-        // answer.
+        // Twice the distance must be known to be clear, so that the next scan comes before its answer can require a
+        // ramp.
         if !self.is_clear(velocity, scaled(at, 1)) {
             return None;
         }
@@ -143,16 +143,16 @@ impl Governor {
         below(left, self.rest.distance)
     }
 
-    /// Whether there is to be another slice: otherwise a stretch would be too short, or leave too little of the
-    /// block. Sets in `span`, where it says `nominal`, how long the slice is to be, and how far it is to the end of
-    /// the block. Cost: 200, 1,000 near the end of a block.
+    /// Whether another slice is needed, because otherwise the stretch would be too short, or leave too little of the
+    /// block. Sets in `span` the distance to the end of the block, and the duration of the slice if it is not
+    /// `nominal`. Cost: 200, 1,000 near the end of a block.
     #[inline(never)]
     fn wanted(&self, left: f32, nominal: f32, span: &mut Span) -> bool {
         let Rest { seconds, distance, .. } = self.rest;
         let velocity = self.velocity;
         let slice = velocity * nominal;
         if !some(seconds) && some(velocity) && below(scaled(slice, 1), left) {
-            // The block is long: there is no need to look closer.
+            // The block is long, so the slice has its nominal duration.
             return true;
         }
         let more = left - distance;
@@ -160,7 +160,8 @@ impl Governor {
         if !below(self.little(), more) {
             return !below(0.0, distance);
         }
-        // Slices that are longer, for want of time, go on over blocks of up to two thirds of their length.
+        // Slices are longer while the CPU is short of time. Such a slice is continued over a remainder of the block of
+        // up to two thirds of a slice; a usual one over up to half a slice.
         let usual = same(nominal, SEGMENT_S);
         let enough = if usual { scaled(more, 1) } else { more + scaled(more, -1) };
         let much = !below(enough, slice);
@@ -176,14 +177,14 @@ impl Governor {
         true
     }
 
-    /// Returns a distance that counts as none.
+    /// Returns the distance that counts as zero, mm.
     #[inline(always)]
     fn little(&self) -> f32 {
         if some(self.velocity) { scaled(self.velocity, -13) } else { ROUNDING }
     }
 
-    /// Whether a block without a jerk limit begins with the rest of a slice. Drops a rest that is shorter than
-    /// rounding.
+    /// Whether a block without a jerk limit begins with the remainder of a slice. Drops a remainder below the rounding
+    /// error.
     pub(super) fn has_rest(&mut self) -> bool {
         if some(self.rest.seconds) && !below(self.little(), self.rest.distance) {
             self.rest = Rest::NONE;
@@ -191,7 +192,7 @@ impl Governor {
         some(self.rest.seconds)
     }
 
-    /// Adds a slice that has been worked out: `distance` long, which is `at` as brake potential.
+    /// Adds a computed slice of `distance` mm; `at` is this distance as brake potential.
     #[inline(always)]
     pub(super) fn add(&mut self, seconds: f32, distance: f32, at: f32) {
         self.clear.distance -= at;
@@ -204,14 +205,15 @@ impl Governor {
         }
     }
 
-    /// Returns the part of the slices that is in the block.
+    /// Returns the part of the computed slices that lies in the block.
     #[inline(never)]
     pub(super) fn cut(&mut self, left: f32) -> Stretch {
         let Rest { seconds, distance, .. } = self.rest;
         let more = left - distance;
         if below(self.little(), more) {
             self.rest = Rest::NONE;
-            // The rest may be below 0, borrowed before a stop. It is not given back.
+            // A stretch that ended a block may have taken slightly more than was computed. If a stop left no slice to
+            // make up for it, the remainder is negative, and counts as zero.
             let (seconds, distance) = (greater(seconds, 1e-6), greater(distance, 0.0));
             return Stretch { seconds, distance, ends: false };
         }
@@ -219,7 +221,7 @@ impl Governor {
             self.rest = Rest::NONE;
             return Stretch { seconds: greater(seconds, 1e-6), distance: left, ends: true };
         }
-        // Because of rounding, slightly less than nothing may be left.
+        // Rounding may make the remainder slightly negative.
         self.rest.inverse = ratio(seconds, distance);
         self.part(left)
     }

@@ -1,8 +1,8 @@
-//! The state of motion, for whoever wants to know it.
+//! The state of motion, as exec publishes it.
 //!
-//! Exec keeps one [`Snapshot`] up to date, and thread mode copies it (`tasks::common`). What senders are told is a
-//! [`Moment`] of it, which costs 1,000 cycles while something moves. All values of a report come from the same
-//! moment, because exec may run between any two readings.
+//! Exec keeps one [`Snapshot`] up to date, and thread mode copies it (`tasks::common`). Reports show a [`Moment`] of
+//! it, which costs 1,000 cycles while something moves. All values of a report come from one [`Moment`], because exec
+//! may run between any two readings.
 
 use kerf_macros::small;
 
@@ -21,7 +21,7 @@ pub struct Snapshot {
     pub target: [i32; MOTORS],
     /// Signed steps of the block being run.
     pub steps: [i16; MOTORS],
-    /// What is still to be run of the block, mm.
+    /// The remaining distance of the block, mm.
     pub left: f32,
     /// The length of the block, mm.
     pub length: f32,
@@ -33,15 +33,16 @@ pub struct Snapshot {
     pub finished: u32,
     /// Whether something moves, or dwells.
     pub running: bool,
-    /// Whether a feedhold has brought the machine to rest.
+    /// Whether a feedhold has brought the machine to a standstill.
     pub held: bool,
-    /// The state that the program has come to last.
+    /// The last state of the program.
     pub program: Program,
-    /// The outputs that are wanted, bits of [`outputs`](crate::boards::outputs).
+    /// The commanded outputs, bits of [`outputs`](crate::boards::outputs).
     pub outputs: u8,
-    /// The speed of the spindle that is wanted, turns per minute.
+    /// The commanded speed of the spindle, turns per minute.
     pub speed: f32,
-    /// The surface speed by which the speed of the spindle follows X, in an image with [`Capability::Lathe`].
+    /// The commanded surface speed (G96), by which the speed of the spindle follows X, in an image with
+    /// [`Capability::Lathe`].
     pub surface: [Surface; LATHES],
 }
 
@@ -84,8 +85,8 @@ impl Snapshot {
         positions
     }
 
-    /// Takes over the outputs, S, or the surface speed that the program has switched. With a surface speed S follows
-    /// X, whatever else is switched.
+    /// Sets the outputs, S, or the surface speed of a program's action. With a surface speed S follows X, whatever else
+    /// the action sets.
     #[inline(always)]
     pub fn switch(&mut self, outputs: &Outputs, action: &QueuedAction) {
         self.outputs = outputs.on;
@@ -97,7 +98,7 @@ impl Snapshot {
         self.speed = outputs.speed;
     }
 
-    /// Returns what senders are told of it.
+    /// Returns the part of the state that reports show.
     #[small]
     pub fn moment(&self) -> Moment {
         Moment {
@@ -112,7 +113,7 @@ impl Snapshot {
     }
 }
 
-/// What reports tell of motion; see [`Snapshot`].
+/// The part of [`Snapshot`] that reports show.
 #[derive(Clone, Copy, Debug)]
 pub struct Moment {
     /// Motor positions, in steps.
@@ -125,9 +126,9 @@ pub struct Moment {
     pub finished: u32,
     /// Whether something moves, or dwells.
     pub running: bool,
-    /// Whether a feedhold has brought the machine to rest.
+    /// Whether a feedhold has brought the machine to a standstill.
     pub held: bool,
-    /// The state that the program has come to last.
+    /// The last state of the program.
     pub program: Program,
 }
 

@@ -1,7 +1,7 @@
-//! The block queue, seen from exec's side: the oldest block, and how fast it may be left.
+//! The block queue, seen from exec's side: the oldest block, and the velocity limit at its end.
 //!
-//! Owned by exec, which takes block after block, and asks for the limits ahead whenever the speed constraints have
-//! changed. Never waits: the end of the queue counts as a standstill. Units: mm, s; brake potentials as in
+//! Owned by exec, which takes block after block, and reads the constraints ahead whenever the speed constraints have
+//! changed. Never waits: the machine must be able to stop at the end of the queue. Units: mm, s; brake potentials as in
 //! `speed_constraints`.
 
 use core::cell::Cell;
@@ -24,7 +24,7 @@ pub struct Constraint {
     pub velocity: Short,
     /// Brake potential from the end of the oldest block to the constraint.
     pub ahead: f32,
-    /// Whether limits change there: what comes after is for the line that begins there.
+    /// Whether jerk limits change there. Later constraints then apply only to the line that begins there.
     pub firm: bool,
 }
 
@@ -34,12 +34,12 @@ pub struct BlockSource {
     constraints: InterruptEnd<&'static Shared<SpeedConstraints>>,
     /// Sequence number of the oldest block.
     oldest: Index,
-    /// The version of the speed constraints, and the potential at the end of the oldest block that was found with it.
+    /// A cache: a version of the speed constraints, and the potential at the end of the oldest block in that version.
     end: Cell<Option<(u8, f32)>>,
 }
 
 impl BlockSource {
-    /// Takes the ends of a store that are exec's.
+    /// Takes exec's ends of a store.
     pub(super) fn new(
         ring: Consumer<Block, BLOCKS>,
         constraints: InterruptEnd<&'static Shared<SpeedConstraints>>,
@@ -92,7 +92,7 @@ impl BlockSource {
         }
     }
 
-    /// Begins the oldest block: a key at its start no longer counts.
+    /// Begins the oldest block: the key at its start no longer applies.
     pub fn enter(&mut self) {
         let oldest = self.oldest;
         self.constraints.with(|constraints| {
@@ -102,7 +102,7 @@ impl BlockSource {
         });
     }
 
-    /// A number that changes when what is ahead changes.
+    /// A number that changes when the constraints ahead change.
     pub fn version(&self) -> u8 {
         self.constraints.look(|constraints| constraints.version)
     }
@@ -124,25 +124,25 @@ impl BlockSource {
         self.line(self.oldest, |line| line.reserve == Reserve::TRAVERSE).unwrap_or_default()
     }
 
-    /// Returns the velocity at which the oldest block, a line, may be run whatever overrides say, mm/s.
+    /// Returns the velocity limit of the oldest block, a line, without overrides, mm/s.
     #[small]
     pub fn feed(&self) -> f32 {
         self.line(self.oldest, |line| line.cruise).unwrap_or_default()
     }
 
-    /// Whether overrides have changed since this was asked last. Cost: 15.
+    /// Whether overrides have changed since the last call. Cost: 15.
     #[inline(always)]
     pub fn take_changed(&mut self) -> bool {
         self.constraints.with(|constraints| core::mem::take(&mut constraints.changed))
     }
 
-    /// Sets the overrides that are wanted. The planner hears of them if the keys are made for others.
+    /// Requests these overrides. The planner computes the keys again if they are for other overrides.
     pub fn want(&mut self, factors: Factors) {
         self.constraints.with(|constraints| constraints.want(factors));
     }
 
-    /// Returns the square of the velocity, (mm/s)^2, at which the oldest block, a line, may be left so that all that
-    /// follow keep to their limits, if there is no jerk limit. Cost: 900.
+    /// Returns the square of the velocity, (mm/s)^2, that is allowed at the end of the oldest block, a line, so that
+    /// all later constraints are met; for motion without a jerk limit. Cost: 900.
     pub fn headroom(&self) -> f32 {
         let end = self.queue_end();
         let first = self.constraints.look(|constraints| {

@@ -1,51 +1,51 @@
-//! Look-ahead: how fast the machine may be so that it can always slow down in time.
+//! Look-ahead: limits the velocity so that the machine can always slow down in time.
 //!
 //! Owned by the block queue: the planner adds a constraint as it pushes a block, and exec reads the constraints.
 //!
-//! **Brake potential.** Braking at the acceleration limit A changes v^2 by 2 A for each mm. So let P be the sum of
-//! 2 A l over all of the path so far. From P with velocity v the machine can slow down to velocity w at a later point
-//! with potential Q if
+//! **Brake potential.** Braking at the acceleration limit A changes v^2 by 2 A for each mm. So let the potential P of a
+//! point be the sum of 2 A l over all lines of the path before it. From P with velocity v the machine can slow down to
+//! velocity w at a later point with potential Q if
 //!
 //! ```text
 //! v^2 + P <= w^2 + Q  =: key
 //! ```
 //!
-//! whatever blocks lie between, each with its own A. A corner is a point with a key. Of all keys ahead only the
-//! lowest counts, and it counts for all blocks before it alike: when a block is added, nothing has to be planned
-//! again block by block. The end of the queue is a key too, with w = 0.
+//! whatever blocks lie between, each with its own A. A corner is a point with a key. Of all keys ahead only the lowest
+//! applies, and it applies to all blocks before it: adding a block needs no backward pass over the queue. The end of
+//! the queue has a key too, with w = 0.
 //!
-//! **With a jerk limit** J the acceleration takes A/J to build up and as long to go, which costs distance
-//! (`constraint` says how much). With k = A^2 / 2J the distance is enough if
+//! **With a jerk limit** J the deceleration takes A/J to build up and A/J to end, which takes additional distance
+//! (`constraint` says how much). With k = A^2 / 2J the distance is sufficient if
 //!
 //! ```text
 //! (v + k)^2 + P <= (w - k)^2 + Q  =: key        k^2 + Q if w < 2 k
 //! ```
 //!
-//! A machine that can slow down for the lower of two such keys is below the velocity of the other key at its place.
-//! So the lower key makes a higher one needless with a jerk limit too. But exec has to find out which of the
-//! remaining keys counts: it looks from the nearest one on to the first before which it could stop. Without a jerk
-//! limit k is 0, and the first key counts.
+//! A machine that can slow down for the lower of two such keys is below the velocity of the other key at its place. So
+//! a lower key makes a higher one before it needless with a jerk limit too. But exec has to find out which of the
+//! remaining keys is binding: it scans from the nearest one to the first before which it could stop. Without a jerk
+//! limit k is 0, and the first key is binding.
 //!
-//! **Lowest keys.** Keys that come after a lower one matter once the lower one has been passed; keys that come before
-//! a lower one never matter. So [`SpeedConstraints`] keeps a list of rising keys ([`SpeedConstraints::seqs`]). Adding
-//! a key drops the keys at the list's end that are not below it; passing a block drops its key at the front. Each key
-//! is added once and dropped once. A block that limits nothing further (same feed, no corner) needs no entry at all.
+//! **Lowest keys.** Keys that come after a lower one matter once the lower one has been passed; keys that come before a
+//! lower one never matter. So [`SpeedConstraints`] keeps a list of rising keys ([`SpeedConstraints::seqs`]). Adding a
+//! key drops the keys at the list's end that are not below it; passing a block drops its key at the front. Each key is
+//! added once and dropped once. A block that adds no limit (equal feed, no corner) needs no entry.
 //!
-//! Where jerk limits change, k changes, and keys before and after do not compare. Such a place keeps its key whatever
-//! comes (it is *firm*), with the k of what comes before. The line that begins there must be able to stop on its own,
-//! and no lower key drops this one: nobody looks beyond it.
+//! Where jerk limits change, k changes, and keys before and after cannot be compared. The key of such a place is
+//! *firm*: no lower key drops it, and no scan goes beyond it. It is computed with the k of the line before. The line
+//! that begins there must be able to stop within its own length.
 //!
-//! **Overrides.** The velocity at a corner is the lesser of what the corner allows and of what the feeds allow times
-//! a factor ([`Line::entry`]). Which keys are needless depends on the factor, so all keys are made anew when it
-//! changes (`replan`). As far as corners go, a key that is needless at one factor is needless at every lesser factor.
-//! So a lesser factor is in force at once; until the keys have been made, only a slow line behind a fast one may be
-//! entered at more than its part of the feed. A greater factor waits for the keys.
+//! **Overrides.** The velocity at a corner is the lesser of what the corner allows and of what the feeds allow times a
+//! factor ([`Line::entry`]). Which keys are needless depends on the factor, so all keys are computed again when it
+//! changes (`replan`). For corners, a key that is needless at one factor is needless at every lesser factor. So a
+//! lesser factor applies at once; until the keys have been computed, only a slow line after a fast one may be entered
+//! at more than its part of the feed. A greater factor waits for the keys.
 //!
-//! Potentials grow for ever. When they have become so large that floats would be coarse for a line, they are counted
-//! from zero again from that line on ([`SpeedConstraints::count_anew`]). Until exec has come there, what was left out
-//! is added ([`SpeedConstraints::lifted`]) where potentials of both sides meet. Only one such place is in the queue
-//! at a time. So floats may be coarse for a slow line behind fast lines that follow that place: the velocity at its
-//! end may be off by some 0.1 % of theirs.
+//! Potentials grow without limit. When they are so large that floats would be too coarse for a line, they are counted
+//! from zero again from that line on ([`SpeedConstraints::count_anew`]). Until exec has reached that place, the
+//! difference is added ([`SpeedConstraints::lifted`]) where potentials of both sides are compared. Only one such place
+//! is in the queue at a time. So floats may be coarse for a slow line after fast lines that follow that place: the
+//! velocity at its end may be wrong by some 0.1 % of theirs.
 //!
 //! Cost: a push 1,000 cycles, and 700 for each key dropped.
 
@@ -82,8 +82,8 @@ impl Line {
         Short::new(least(self.entry.get(), self.velocity(factors))).get()
     }
 
-    /// Returns the key of the line: before its start, potential and square of velocity together must not exceed it.
-    /// Cost: 500, 1,300 with a jerk limit.
+    /// Returns the key of the line: the highest sum of potential and square of velocity before its start. Cost: 500,
+    /// 1,300 with a jerk limit.
     pub fn key(&self, factors: &Factors) -> f32 {
         self.start + key(self.entry(factors), kappa(self.accel.get(), self.jerk.get()))
     }
@@ -94,12 +94,12 @@ impl Line {
         self.start + entry * entry
     }
 
-    /// Returns how much potential the line has, (mm/s)^2. What exceeds several times the square of the highest
-    /// velocity that an override gives the line never matters, and is left out if it is much. Cost: 160.
+    /// Returns how much potential the line has, (mm/s)^2. The value is capped at several times the square of the
+    /// highest velocity that an override gives the line; more makes no difference. Cost: 160.
     #[inline(never)]
     pub fn gain(&self) -> f32 {
         let full = brief_product(scaled(self.accel.get(), 1), self.extent.length());
-        // Plainly below the square of its velocity, as in short blocks.
+        // Certainly below the square of its velocity, as in short blocks.
         if log(full) + OCTAVE < 2 * log(self.cruise) { full } else { self.capped(full) }
     }
 
@@ -119,15 +119,15 @@ pub struct SpeedConstraints {
     len: Index,
     /// Potential at the end of the newest block.
     pub end: f32,
-    /// Potentials are counted anew from this block on. `left_out` is 0 if no block before it is left.
+    /// Potentials are counted from zero again from this block on. `left_out` is 0 if no block before it is left.
     anew: Index,
     /// The potential that is left out from `anew` on.
     left_out: f32,
     /// A number that changes with every push, and with the factors.
     pub version: u8,
-    /// The overrides that are wanted.
+    /// The requested overrides.
     pub wanted: Factors,
-    /// Whether the wanted or the planned overrides have changed since exec looked last.
+    /// Whether the requested or the planned overrides have changed since exec's last check.
     pub changed: bool,
     /// The overrides that the keys are made for, or greater ones: nothing may run faster than by these factors.
     pub planned: Factors,
@@ -141,7 +141,7 @@ pub struct SpeedConstraints {
 impl SpeedConstraints {
     /// The speed constraints of an empty queue.
     pub const fn new() -> Self {
-        // All zero, so that the initial value takes no room in flash. `begin` comes before anything else.
+        // All zero, so that the initial value takes no room in flash. `begin` is called first.
         let none = Factors { feed: 0.0, traverse: 0.0 };
         let (wanted, planned) = (none, none);
         Self {
@@ -222,8 +222,8 @@ impl SpeedConstraints {
         }
     }
 
-    /// Counts potentials anew from block `seq` on, the next one. Does nothing if there is such a place in the queue
-    /// already.
+    /// Counts potentials from zero again from the next block on, `seq`. Does nothing if there is such a place in the
+    /// queue already.
     pub fn count_anew(&mut self, seq: Index) {
         if !some(self.left_out) {
             (self.anew, self.left_out, self.end) = (seq, self.end, 0.0);
@@ -237,7 +237,7 @@ impl SpeedConstraints {
         }
     }
 
-    /// Whether there are blocks before the one from which potentials are counted anew. Cost: 10.
+    /// Whether there are blocks before the one from which potentials are counted again. Cost: 10.
     #[inline(always)]
     pub fn is_mixed(&self) -> bool {
         some(self.left_out)
@@ -249,13 +249,13 @@ impl SpeedConstraints {
         if place(seq) >= place(self.anew) { potential + self.left_out } else { potential }
     }
 
-    /// Returns by how much potentials are higher at blocks before the one from which they are counted anew. `next` is
+    /// Returns by how much potentials are higher at blocks before the one from which they are counted again. `next` is
     /// the block to be queued next.
     pub fn older(&self, next: Index) -> Older {
         Older { behind: next.wrapping_sub(self.anew) & SEQ, more: self.left_out }
     }
 
-    /// Sets the overrides that are wanted.
+    /// Requests these overrides.
     pub fn want(&mut self, factors: Factors) {
         self.wanted = factors;
         self.changed = true;
@@ -273,7 +273,7 @@ impl SpeedConstraints {
         (self.front, self.len) = (keys.front, BLOCKS as Index - keys.front);
     }
 
-    /// Returns the overrides in force: the wanted ones, as far as the keys allow.
+    /// Returns the overrides in force: the requested ones, as far as the keys allow.
     #[inline(always)]
     pub fn factors(&self) -> Factors {
         self.wanted.least(&self.planned)
@@ -282,7 +282,7 @@ impl SpeedConstraints {
     /// Returns the factor in force for a line with this reserve.
     #[inline(always)]
     pub fn factor(&self, reserve: Reserve) -> f32 {
-        // Only one of the two factors, because comparisons take time.
+        // Computes only one of the two factors, because comparisons take time.
         if reserve == Reserve::TRAVERSE {
             least(self.wanted.traverse, self.planned.traverse)
         } else {
@@ -323,7 +323,7 @@ impl Keys {
 /// By how much potentials of older blocks are higher: see [`SpeedConstraints::older`].
 #[derive(Clone, Copy)]
 pub struct Older {
-    /// How many of the newest blocks are counted anew.
+    /// How many of the newest blocks are counted from zero again.
     behind: Index,
     more: f32,
 }

@@ -1,9 +1,9 @@
-//! Where the motors are when the axes have arrived: exact integers, from absolute positions.
+//! Motor positions at the end of a block: exact integers, from absolute positions of the axes.
 //!
 //! Owned by the line builder. A motor's position is the position of its axis times the ratio of two integers. It is
-//! known to 1/16 step, and by the exact remainder below that. Rounded to the nearest step, half away from zero, it is
-//! what [`StepRatio::steps`] returns. A short move starts from the position before and its remainder. That gives the
-//! exact position too, with small numbers and a single division.
+//! stored to 1/16 step, with the exact remainder below that. Rounded to the nearest step, half away from zero, it is
+//! equal to [`StepRatio::steps`]. A short move starts from the last position and its remainder. The result is exact
+//! too, and takes only small numbers and a single division.
 
 use kerf_macros::small;
 
@@ -22,10 +22,10 @@ const HALF: i8 = PARTS as i8 / 2;
 /// The remainder is not known.
 const NONE: u16 = u16::MAX;
 
-/// The most parts of a short way: with what rounding adds at both ends, the way fits 16 bits.
+/// The most parts of a short distance: with the rounding at both ends, the distance fits 16 bits.
 const PARTS_MAX: u16 = 0x7EFF;
 
-/// A number of steps that is more than [`PARTS_MAX`], wherever the way begins.
+/// A number of steps that is more than [`PARTS_MAX`], whatever the fraction at the start.
 const STEPS_MAX: u16 = (PARTS_MAX >> PARTS_LOG2) + 3;
 
 /// A motor at the end of the last block.
@@ -33,11 +33,11 @@ const STEPS_MAX: u16 = (PARTS_MAX >> PARTS_LOG2) + 3;
 pub struct Motor {
     /// Position plus half a step, in steps, rounded down.
     steps: i32,
-    /// What `steps` and `part` leave, in units of 1 / (parts * den); [`NONE`] if it does not fit.
+    /// The remainder below `part`, in units of 1 / (parts * den); [`NONE`] if it does not fit.
     rest: u16,
-    /// What `steps` leaves, in parts, rounded down.
+    /// The remainder below `steps`, in parts, rounded down.
     part: u8,
-    /// Where blocks have taken the motor to, in parts, measured from half a step before `steps`.
+    /// The position to which blocks have moved the motor, in parts, measured from half a step before `steps`.
     told: i8,
 }
 
@@ -53,7 +53,7 @@ impl Motor {
     #[small]
     pub fn at(ratio: StepRatio, position: Length) -> Self {
         let steps = ratio.steps(position);
-        // Beyond the range of steps no remainder is known, and no short way starts there.
+        // Beyond the range of steps no remainder is known, and no short distance starts there.
         if steps.unsigned_abs() >= i32::MAX as u32 {
             return Self::counted(steps);
         }
@@ -61,7 +61,7 @@ impl Motor {
         let rest = (position.0 as u32)
             .wrapping_mul(ratio.num)
             .wrapping_sub((steps as u32).wrapping_mul(ratio.den)) as i32;
-        // In 32 bits. What the shift takes off a large denominator does not matter: no remainder is known then.
+        // In 32 bits. The bits lost from a large denominator do not matter, because no remainder is known then.
         let octaves = if ratio.den < 1 << 26 { 0 } else { 6 };
         let (rest, den) = (rest >> octaves, ratio.den >> octaves);
         // At least 0: the remainder is at most half of the denominator.
@@ -83,7 +83,7 @@ impl Motor {
         motor
     }
 
-    /// Returns a motor that is at this step, wherever between two steps its axis may be.
+    /// Returns a motor at this step; its axis may be between two steps.
     pub fn counted(steps: i32) -> Self {
         Self { steps, rest: NONE, part: HALF as u8, told: HALF }
     }
@@ -93,7 +93,7 @@ impl Motor {
         self.steps.wrapping_add((self.told >> PARTS_LOG2).into())
     }
 
-    /// Calls the axis' position `position` from now on. The motor does not move.
+    /// Redefines the axis' position as `position`. The motor does not move.
     #[small]
     pub fn rename(&mut self, ratio: StepRatio, position: Length) {
         let fraction = self.told & (PARTS as i8 - 1);
@@ -101,8 +101,8 @@ impl Motor {
         self.told = (self.told & !(PARTS as i8 - 1)) + fraction;
     }
 
-    /// Moves the axis by `travel` to `position`. Returns the way of the motor in parts of a step, or `None`, with
-    /// nothing done, if that does not fit. Cost: 400 for short moves.
+    /// Moves the axis by `travel` to `position`. Returns the distance of the motor in parts of a step, or `None`, with
+    /// nothing done, if it does not fit. Cost: 400 for short moves.
     #[inline(never)]
     pub fn go(&mut self, ratio: StepRatio, travel: i32, position: Length) -> Option<i16> {
         if let Some(way) = self.go_near(ratio, travel, position) {
@@ -125,7 +125,7 @@ impl Motor {
         if (way >> 24) as u8 >= 4 {
             return None;
         }
-        // Positions are rounded down, so a way back is rounded up.
+        // Positions are rounded down, so a negative distance is rounded up.
         let back = travel < 0;
         let more = if back { den - 1 - rest } else { rest };
         let sum = (way << PARTS_LOG2) + u32::from(more);
@@ -146,8 +146,8 @@ impl Motor {
         Some((to & !(i16::from(PARTS) - 1)) + i16::from(told) - i16::from(before))
     }
 
-    /// Moves the axis as [`Motor::go`] does, for ways of any size. Cost: 2,000; 300 if the way is too long by more
-    /// than rounding.
+    /// Moves the axis as [`Motor::go`] does, for distances of any size. Cost: 2,000; 300 if the distance is too long by
+    /// more than rounding.
     #[inline(never)]
     #[small]
     fn go_far(&mut self, ratio: StepRatio, travel: i32, position: Length) -> Option<i16> {
@@ -177,7 +177,7 @@ impl Motor {
         i64::from(to) - i64::from(from)
     }
 
-    /// Takes back the last way, which was `way` parts, so that the axis is at `position` again.
+    /// Undoes the last move of `way` parts, so that the axis is at `position` again.
     #[inline(never)]
     #[small]
     pub fn put_back(&mut self, ratio: StepRatio, position: Length, way: i16) {
@@ -187,14 +187,14 @@ impl Motor {
         self.told = parts.wrapping_add(i32::from(told) - i32::from(way)) as i8;
     }
 
-    /// Returns where blocks are to take the motor: where it is, but so far from half a step that rounding errors
-    /// cannot lead to another step.
+    /// Returns the position, in parts, to which blocks move the motor: the exact one, kept so far from half a step that
+    /// rounding errors cannot lead to another step.
     #[inline(always)]
     fn tell(&self, position: Length) -> i8 {
         const LEAST: u8 = (FRACTIONS.0 + HALF) as u8;
         const MOST: u8 = (FRACTIONS.1 + HALF) as u8;
         match self.part {
-            // Half a step goes away from zero.
+            // Half a step is rounded away from zero.
             0 if self.rest == 0 && position.0 < 0 => MOST as i8 - PARTS as i8,
             part => part.clamp(LEAST, MOST) as i8,
         }

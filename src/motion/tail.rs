@@ -16,9 +16,9 @@ use crate::math::sqrt;
 /// A corner is worth a key if it is slower than this share of the velocities on both sides.
 pub(super) const WORTH: f32 = 0.999;
 
-/// What the next line follows.
+/// The state at the end of the queue.
 pub(super) struct Tail {
-    /// The line that the next one may follow without a stop.
+    /// The last line, if the next one may follow it without a stop.
     pub(super) last: Option<Last>,
     /// The overrides that keys are made for.
     pub(super) factors: Factors,
@@ -28,7 +28,7 @@ pub(super) struct Tail {
 #[derive(Clone, Copy)]
 pub(super) struct Last {
     pub(super) cruise: f32,
-    /// The highest velocity since the last key: many lines that are each a little slower do need a key.
+    /// The highest velocity since the last key, because many lines that are each slightly slower need a key together.
     pub(super) high: f32,
     kappa: f32,
     limits: (Short, Short),
@@ -45,12 +45,12 @@ pub(super) struct Key {
 }
 
 impl Last {
-    /// Whether `line` has other jerk limits, so that keys before and after it do not compare.
+    /// Whether `line` has other jerk limits, so that keys before and after it cannot be compared.
     fn jerk_limits_change(&self, line: &Line, kappa: f32) -> bool {
         self.limits != (line.accel, line.jerk) && (some(self.kappa) || some(kappa))
     }
 
-    /// Whether a line has this velocity too, also at its start.
+    /// Whether a line with this `cruise` and `entry` velocity is as fast as the last line.
     fn as_fast(&self, cruise: f32, entry: f32) -> bool {
         let cruise = cruise.to_bits();
         entry.to_bits() >= cruise
@@ -60,8 +60,8 @@ impl Last {
 }
 
 impl Tail {
-    /// Takes up a line that starts at potential `line.start`, and whose corner may be taken at `entry`. Returns its
-    /// key, or `None` if it needs none. Cost: 150 if it needs none.
+    /// Appends a line that starts at potential `line.start`, and whose corner may be taken at `entry`. Returns its key,
+    /// or `None` if it needs none. Cost: 150 if it needs none.
     #[inline(always)]
     pub(super) fn follow(&mut self, line: &mut Line, entry: f32) -> Option<Key> {
         line.entry = Short::new(entry);
@@ -76,7 +76,7 @@ impl Tail {
         })
     }
 
-    /// Returns the key of a line that does not simply go on, or `None` if it needs none.
+    /// Returns the key of a line with another velocity or a corner, or `None` if it needs none.
     #[inline(never)]
     fn corner(&mut self, line: &mut Line, cruise: f32, entry: f32) -> Option<Key> {
         let limits = (line.accel, line.jerk);
@@ -86,8 +86,8 @@ impl Tail {
         let mut is_worth = true;
         match &mut self.last {
             None => entry = 0.0,
-            // What comes before brakes with its own limits, which do not go on: the new line must be able to stop on
-            // its own.
+            // The lines before brake with their own limits, which end here, so the new line must be able to stop within
+            // its own length.
             Some(last) if last.jerk_limits_change(line, own) => {
                 entry = able_to_stop(line, entry, greater(own, last.kappa));
                 (brakes, firm) = (last.kappa, FIRM);
@@ -116,8 +116,8 @@ impl Tail {
     }
 }
 
-/// Returns the velocity, at most `entry`, from which a line can come to rest within its own length, for limits with
-/// this [`kappa`].
+/// Returns the velocity, at most `entry`, from which a line can stop within its own length, for limits with this
+/// [`kappa`].
 #[inline(never)]
 #[small]
 fn able_to_stop(line: &Line, entry: f32, kappa: f32) -> f32 {

@@ -1,29 +1,28 @@
-//! A move in step with the spindle: how fast the axes must go to be where its angle says.
+//! Threading: computes the velocity of axes that follow the angle of the spindle.
 //!
-//! Owned by exec, at the exec level. Exec asks [`Thread::velocity`] for each stretch of a pass, and tells what it has
-//! handed out. A line of a pass is no faster than this velocity. Where a line ends, and that it ends at rest, is up
-//! to the governor as for any line: the proof that every motion ends on its step does not involve threads. Units: mm
-//! along the path, s. Time is in counts of the encoder and CPU cycles.
+//! Owned by exec, at the exec level. Exec calls [`Thread::velocity`] for each stretch of a pass, and reports the
+//! distance and time that it has handed out. This velocity is an upper limit for the lines of a pass. The governor ends
+//! each line at its place as for any line: the proof that every motion ends on its step does not involve threads.
+//! Units: mm along the path, s. Time is in counts of the encoder and CPU cycles.
 //!
-//! **The phase line** is where the axes are to be: 0 at the first pulse of sync behind an index, and `lead` further
-//! on with each turn. Its place at the last pulse is known exactly. From there it is extrapolated, at the speed of
-//! the last pulses, to the moment at which all that has been queued ends. Segments are queued 4 to 9 ms ahead of the
-//! pins. Ticks are exact to the cycle, so that this moment, and where the axes are then, are known. The dead time
-//! that remains is one stretch: 2 ms.
+//! **The phase line** is the set position of the axes: 0 at the first pulse of sync after an index, and `lead` more
+//! with each turn. It is known exactly at the last pulse. From there it is extrapolated, at the speed of the last
+//! pulses, to the end of the queued segments, 4 to 9 ms ahead of the pins. Ticks are exact to the cycle, so that this
+//! time, and the position of the axes then, are known. The remaining dead time is one stretch: 2 ms.
 //!
-//! **The law.** `e` is the distance from the axes to the line, and `u` the speed of the line. The axes are to go at
-//! `u + c`, where `c` has the sign of `e` and is the lesser of [`GAIN`]` * e` and `sqrt(2 b e)`, with `b` seven
-//! tenths of the acceleration limit. The root is the ramp that meets the line at its speed. So the axes start before
+//! **The law.** `e` is the distance from the axes to the line, and `u` the speed of the line. The set velocity of the
+//! axes is `u + c`, where `c` has the sign of `e` and is the lesser of [`GAIN`]` * e` and `sqrt(2 b e)`, with `b` seven
+//! tenths of the acceleration limit. The root gives a ramp that meets the line at its speed. So the axes start before
 //! the line reaches them, by half the time of the ramp, and the phase at which they meet it does not depend on the
-//! speed. Three tenths of the limit remain to correct what is left over.
+//! speed. Three tenths of the limit remain to correct the error.
 //!
-//! **The start.** If the line has passed the axes while they rest, it is set back by `lead`: it comes again a turn
-//! later.
+//! **The start.** If the line has passed the axes while they stand still, it is set back by `lead`, so that it reaches
+//! them one turn later.
 //!
-//! **Pulses that do not fit.** A pulse that comes after twice the usual time counts for two. A pulse that comes too
-//! soon counts for none. The next index shows whether that was right. The [spindle is lost](Thread::fault) when two
-//! pulses in a row are overdue; until then the line goes on at its speed. With a single pulse a turn, a missing pulse
-//! looks like a spindle at half its speed: it is taken for a missing pulse.
+//! **Pulses that do not fit.** A pulse after twice the expected time counts as two. A pulse that comes too soon is
+//! ignored. The next index shows whether that was right. The [spindle is lost](Thread::fault) when two pulses in a row
+//! are overdue; until then the line goes on at its speed. With a single pulse a turn, a missing pulse looks like a
+//! spindle at half its speed; it is treated as a missing pulse.
 //!
 //! Cost on AVR: 2,500 cycles a stretch, 1,500 more with a pulse. RAM: 41 bytes.
 
@@ -38,7 +37,7 @@ use crate::hal::TIMER_HZ;
 use crate::math::sqrt;
 use crate::status::Status;
 
-/// Correction velocity per distance to the line, 1/s: half of the distance is made up in a stretch.
+/// Correction velocity per distance to the line, 1/s: half of the distance is corrected in a stretch.
 const GAIN: f32 = 250.0;
 
 /// The share of the acceleration limit that the ramp takes.
@@ -50,15 +49,15 @@ const WINDOW: u32 = COUNTS_PER_S / 1_000 * 16;
 /// The spindle is lost when no pulse has come for this many intervals between pulses, and [`SLACK`].
 const OVERDUE: f32 = 2.01;
 
-/// What is added to the time after which the spindle is lost, counts: 0.5 ms, since pulses do not come quite evenly.
+/// Margin of the time after which the spindle is lost, counts: 0.5 ms, because pulses are not quite even.
 const SLACK: f32 = COUNTS_PER_S as f32 * 0.0005;
 
-/// A spindle slows down to turn round. A pulse counts as forward up to this share of the time to the standstill; a
-/// later pulse belongs to the way back. A forward pulse that is taken for one of the way back is off by a pulse.
-/// After the opposite mistake the spindle would never be seen to turn round.
+/// A spindle slows down before it reverses. A pulse counts as forward up to this share of the time to the standstill; a
+/// later pulse counts as one in reverse. Taking a forward pulse for one in reverse is an error of one pulse. After the
+/// opposite error the reversal would never be detected.
 const FORWARD: f32 = 0.85;
 
-/// The longest time between two pulses of a spindle that turns round, counts: 6 s.
+/// The longest time between two pulses of a spindle that reverses, counts: 6 s.
 const PATIENCE: f32 = COUNTS_PER_S as f32 * 6.0;
 
 /// The longest time that the queued segments last, counts: 16 ms.
@@ -83,23 +82,23 @@ enum Stage {
     Armed,
     /// Waits for the first pulse of sync behind the index.
     Indexed,
-    /// The phase line is known; the axes stand still.
+    /// The phase line is known, but the axes stand still.
     Known,
     /// The axes follow the phase line.
     Follows,
     /// The axes have been within the limit of the error.
     Met,
-    /// G33.1: the spindle has been told to turn round.
+    /// G33.1: the spindle has been commanded to reverse.
     Turning,
-    /// The spindle is about to turn round, or has: the axes come to rest.
+    /// The spindle is about to reverse, or has: the axes decelerate to a standstill.
     Top,
-    /// The spindle has turned round.
+    /// The spindle has reversed.
     Turned,
-    /// What was left of the line has been dropped: the way back is to come.
+    /// The remainder of the line has been dropped; the way back is still to come.
     Waits,
-    /// The spindle was lost, and the axes come to rest.
+    /// The spindle was lost, and the axes decelerate to a standstill.
     Lost,
-    /// The error was above its limit, and the axes come to rest.
+    /// The error was above its limit, and the axes decelerate to a standstill.
     Astray,
 }
 
@@ -109,7 +108,8 @@ pub struct Thread {
     stage: Stage,
     per_turn: u16,
     lead: f32,
-    /// Distance from where the axes are at the end of what is queued to where the line was at the last pulse, mm.
+    /// Distance from the position of the axes at the end of the queued segments to that of the line at the last pulse,
+    /// mm.
     ahead: f32,
     /// Time from pulse to pulse, counts.
     interval: f32,
@@ -117,16 +117,16 @@ pub struct Thread {
     at: u32,
     since: u32,
     measured: u16,
-    /// The pulses, the indices, and the pulses of sync at the last index: all as of the last look and modulo 256,
-    /// since they are looked at every few ms.
+    /// The pulses, the indices, and the pulses of sync at the last index, as last read. Modulo 256, because they are
+    /// read every few ms.
     pulses: u8,
     index: u8,
     expected: u8,
-    /// Pulses that were put in since the last index, less the pulses that were left out.
+    /// Pulses added since the last index, less pulses ignored.
     mended: i8,
-    /// When what is queued ends, CPU cycles.
+    /// The time at which the queued segments end, CPU cycles.
     end: u32,
-    /// Whether an index has come since [`Thread::error`] was asked last.
+    /// Whether an index has come since the last call of [`Thread::error`].
     indexed: bool,
     kind: Kind,
 }
@@ -138,16 +138,16 @@ enum Kind {
     Pass {
         /// How far the axes may be off, mm; 0 for no limit.
         limit: Short,
-        /// How it is left before its end.
+        /// How the pass is left before its end.
         retract: Retract,
     },
-    /// G33.1: the axes go back when the spindle has turned round.
+    /// G33.1: the axes move back when the spindle has reversed.
     Tap {
-        /// Distance to the end of the line at which the spindle is to turn round, mm.
+        /// Distance to the end of the line at which the spindle is to reverse, mm.
         turn_at: f32,
-        /// By how much the spindle slows down: pulses a count, per count.
+        /// Deceleration of the spindle: pulses a count, per count.
         decel: f32,
-        /// Over how long the speed was measured last, counts.
+        /// Duration of the last measurement of the speed, counts.
         window: u16,
     },
 }
@@ -204,13 +204,13 @@ impl Thread {
         Self { stage: Stage::Armed, lead, kind, ..Self::new() }
     }
 
-    /// Whether this is G33.1 and the axes have begun to follow. From then on they may rest only where the spindle
-    /// does.
+    /// Whether this is G33.1 and the axes have begun to follow. From then on they may stand still only while the
+    /// spindle does.
     pub fn is_tapping(&self) -> bool {
         matches!(self.kind, Kind::Tap { .. }) && self.stage >= Stage::Follows
     }
 
-    /// Whether the spindle is to be told now to turn round, with `left` mm of the line left. True only once.
+    /// Whether to command the spindle to reverse now, with `left` mm of the line left. True only once.
     pub fn is_to_turn(&mut self, left: f32) -> bool {
         let turns = match self.kind {
             Kind::Tap { turn_at, .. } => self.stage == Stage::Follows && left <= turn_at,
@@ -222,22 +222,22 @@ impl Thread {
         turns
     }
 
-    /// Whether the spindle has been told to turn round, and the way back has not begun.
+    /// Whether the spindle has been commanded to reverse, and the way back has not begun.
     pub fn turns_round(&self) -> bool {
         self.stage >= Stage::Turning && self.stage < Stage::Lost
     }
 
-    /// Whether the axes are to rest, because the spindle turns round.
+    /// Whether the axes are to stand still, because the spindle reverses.
     pub fn rests(&self) -> bool {
         matches!(self.stage, Stage::Top | Stage::Turned | Stage::Waits)
     }
 
-    /// Whether the spindle has turned round, and the way back may begin.
+    /// Whether the spindle has reversed, and the way back may begin.
     pub fn has_turned(&self) -> bool {
         self.stage == Stage::Turned
     }
 
-    /// Notes that the rest of the line has been dropped. Returns whether the way back is to come.
+    /// Notes that the remainder of the line has been dropped. Returns whether the way back is still to come.
     pub fn drop_rest(&mut self) -> bool {
         let waits = self.stage == Stage::Turned;
         if waits {
@@ -246,7 +246,7 @@ impl Thread {
         waits
     }
 
-    /// Whether the way back is to come.
+    /// Whether the way back is still to come.
     pub fn waits(&self) -> bool {
         self.stage == Stage::Waits
     }
@@ -270,14 +270,15 @@ impl Thread {
         }
     }
 
-    /// Sets how far the path goes in a turn from here on, mm: a taper begins or ends.
+    /// Sets the lead along the path from here on, mm a turn: a taper begins or ends.
     pub fn set_lead(&mut self, lead: f32) {
         self.ahead *= lead / self.lead;
         self.lead = lead;
     }
 
-    /// Anchors the end of what is queued in time. The steppers have been started, and make their first tick `cycles`
-    /// after `time`, which is in counts. All that is queued since they stood still has been [told](Thread::queued).
+    /// Fixes the time at which the queued segments end. The steppers have been started, and make their first tick
+    /// `cycles` after `time`, which is in counts. All segments queued since they stood still have been
+    /// [reported](Thread::queued).
     pub fn anchor(&mut self, time: u32, cycles: u32) {
         self.end = self.end.wrapping_add(time.wrapping_mul(CYCLES)).wrapping_add(cycles);
     }
@@ -288,13 +289,13 @@ impl Thread {
         self.end = before.wrapping_add(cycles);
     }
 
-    /// Adds `distance`, mm, to where the axes are at the end of what is queued.
+    /// Adds `distance`, mm, to the position of the axes at the end of the queued segments.
     pub fn handed(&mut self, distance: f32) {
         self.ahead -= distance;
     }
 
-    /// Takes up what the sensors have seen by the time of `encoder`. Returns whether the spindle has turned round
-    /// just now.
+    /// Takes in the pulses that the sensors have counted by the time of `encoder`. Returns whether the spindle has just
+    /// reversed.
     #[inline(never)]
     pub fn note(&mut self, pulses: &Pulses, encoder: &Encoder) -> bool {
         let (time, per_turn, turn) = (encoder.time(), encoder.per_turn(), encoder.turn());
@@ -350,8 +351,8 @@ impl Thread {
         self.has_turned() && !had_turned
     }
 
-    /// Returns how far the axes were ahead of the line at the last pulse, mm, for axes that go at `velocity` at the
-    /// end of what is queued. `None` unless the axes follow and an index has come since the last call.
+    /// Returns how far the axes were ahead of the line at the last pulse, mm; `velocity` is theirs at the end of the
+    /// queued segments. `None` unless the axes follow and an index has come since the last call.
     pub fn error(&mut self, velocity: f32) -> Option<f32> {
         let indexed = core::mem::take(&mut self.indexed) && self.follows();
         let late = self.end.wrapping_sub(self.at.wrapping_mul(CYCLES)) as i32;
@@ -362,8 +363,8 @@ impl Thread {
         matches!(self.stage, Stage::Follows | Stage::Met)
     }
 
-    /// Whether the time between two pulses tells nothing of the next interval: the spindle turns round, or has
-    /// turned, and its speed changes too much from one pulse to the next.
+    /// Whether the time between two pulses does not predict the next interval, because the spindle reverses, or has
+    /// reversed, and its speed changes too much between pulses.
     #[inline(never)]
     fn turns_unevenly(&self) -> bool {
         match self.kind {
@@ -380,7 +381,7 @@ impl Thread {
         self.lead / f32::from(self.per_turn)
     }
 
-    /// Corrects the phase at an index that comes `turns` after the last one, when sync has given `at_index` pulses.
+    /// Corrects the phase at an index `turns` after the last one, when sync had counted `at_index` pulses.
     fn check_turns(&mut self, turns: u8, at_index: u8) {
         let expected = self.expected.wrapping_add(turns.wrapping_mul(self.per_turn as u8));
         // How many pulses are missing; negative if there are too many.
@@ -392,7 +393,7 @@ impl Thread {
         (self.expected, self.mended) = (at_index, 0);
     }
 
-    /// Takes up `new` pulses, the last of them at time `at`. Mends the count if they do not fit.
+    /// Takes in `new` pulses, the last of them at time `at`. Corrects the count if they do not fit.
     #[inline(never)]
     fn take(&mut self, new: u8, at: u32) {
         let after = at.wrapping_sub(self.at) as f32;
@@ -412,7 +413,7 @@ impl Thread {
         self.keep_pace(true_count, at);
     }
 
-    /// Counts `count` more pulses, the last of them at time `at`, and measures how fast they come.
+    /// Counts `count` more pulses, the last of them at time `at`, and measures their rate.
     #[inline(never)]
     fn keep_pace(&mut self, count: f32, at: u32) {
         self.at = at;
@@ -433,9 +434,9 @@ impl Thread {
         (self.since, self.measured) = (at, 0);
     }
 
-    /// Takes up pulses of a spindle that is about to turn round. If pulses tell the direction, the spindle has turned
-    /// when they count down. Otherwise a pulse that comes at about the standstill, or later, belongs to the way back,
-    /// over the mark of the last pulse. Where the spindle is then follows from how it has slowed down.
+    /// Takes in pulses of a spindle that is about to reverse. If pulses tell the direction, the spindle has reversed
+    /// when they count down. Otherwise a pulse at about the time of the standstill, or later, counts as one in reverse,
+    /// at the mark of the last pulse. The position of the spindle then follows from its deceleration.
     #[inline(never)]
     fn take_turning(&mut self, new: u8, tells: bool, at: u32) {
         let after = at.wrapping_sub(self.at) as f32;
@@ -454,7 +455,7 @@ impl Thread {
         let way =
             if tells { f32::from(new as i8) + 1.0 } else { (rate - 0.5 * decel * after) * after };
         self.ahead += self.pitch() * way;
-        // If the deceleration is not known, the spindle is taken to go a pulse in that time.
+        // If the deceleration is not known, the spindle is assumed to move one pulse in that time.
         self.interval = if back > 0.0 { 1.0 / back } else { after };
         (self.at, self.since, self.measured) = (at, at, 0);
         if let Kind::Tap { decel, window, .. } = &mut self.kind {
@@ -475,8 +476,8 @@ impl Thread {
     }
 
     /// Returns the velocity to be reached in the next stretch, mm/s, from `velocity`; 0 for a standstill. `kept` is
-    /// time in cycles that has not been queued, but belongs to what is queued. The error is held against its limit
-    /// unless the axes slow down for the end (`brakes`).
+    /// time in cycles of the queued distance that no segment has yet. The error is compared with its limit unless the
+    /// axes slow down for the end (`brakes`).
     #[inline(never)]
     pub fn velocity(&mut self, kept: i32, velocity: f32, accel: f32, brakes: bool) -> f32 {
         if self.stage < Stage::Known {
@@ -494,15 +495,15 @@ impl Thread {
         if self.rests() {
             return 0.0;
         }
-        // A spindle that turns round may stop dead. Until its next pulse comes, it is not far beyond the place of
-        // that pulse.
+        // A spindle that reverses may stop at once. Until its next pulse comes, it is assumed to be not far beyond the
+        // place of that pulse.
         let most = rate * QUEUED + 1.7;
         if gone > most && self.turns_unevenly() {
             (gone, speed) = (most, 0.0);
         }
         let mut way = self.ahead + self.pitch() * gone;
         if self.stage == Stage::Known {
-            // The axes make up for a line that is up to 4 ms past them.
+            // The axes catch up with a line that is up to 4 ms past them.
             while way > 0.004 * speed {
                 way -= self.lead;
                 self.ahead -= self.lead;
@@ -521,7 +522,7 @@ impl Thread {
         wanted
     }
 
-    /// Ends the pass if the axes are off by `size` mm and that is above the limit.
+    /// Ends the pass if the error of `size` mm is above the limit.
     fn hold_against_limit(&mut self, size: f32, brakes: bool) {
         let Kind::Pass { limit, .. } = self.kind else { return };
         let limit = limit.get();

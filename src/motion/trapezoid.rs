@@ -1,8 +1,8 @@
-//! The governor without a jerk limit: trapezoids of velocity.
+//! The velocity generator without a jerk limit: trapezoidal velocity profiles.
 //!
-//! Called by [`Governor::stretch`], exec level. At the end of a stretch the velocity keeps to `v^2 <= headroom + 2 A
-//! left`, an equation in which `left` depends on the length of the stretch itself. Units: mm, s. Cost on AVR: 1,500
-//! cycles a stretch, 2,500 for one that ends a block or brakes.
+//! Called by [`Governor::stretch`], exec level. At the end of a stretch the velocity satisfies
+//! `v^2 <= headroom + 2 A left`, where `left` depends on the length of the stretch itself. Units: mm, s. Cost on AVR:
+//! 1,500 cycles a stretch, 2,500 for one that ends a block or brakes.
 
 use super::exec::SEGMENT_S;
 use super::float::{OCTAVE, below, greater, least, lesser, log, ratio, scaled, some};
@@ -10,10 +10,10 @@ use super::governor::{Governor, Stretch, same};
 use super::slice::longest;
 use crate::math::sqrt;
 
-/// If two logarithms are further apart than this, there is no doubt about the comparison.
+/// If two logarithms differ by more than this, their comparison is certain.
 const PLAIN: i32 = OCTAVE / 5;
 
-/// A gain of less than a third of the velocity's square is not worthwhile: as a logarithm.
+/// The least worthwhile gain of the velocity's square, about a third of it, as a logarithm.
 const SCARCE: i32 = 3 * (OCTAVE / 8);
 
 impl Governor {
@@ -33,7 +33,7 @@ impl Governor {
     fn steadily(&self, left: f32) -> Stretch {
         let v = self.velocity;
         let (seconds, longest) = self.nominal();
-        // Logarithms mostly tell whether the stretch reaches the end of the block.
+        // Logarithms mostly decide whether the stretch reaches the end of the block.
         let beyond = log(v) + log(longest) - log(left);
         if beyond > PLAIN || beyond > -PLAIN && below(left, v * longest) {
             return Stretch { seconds: ratio(left, v), distance: left, ends: true };
@@ -48,7 +48,7 @@ impl Governor {
         let headroom = if headroom.is_sign_negative() { 0.0 } else { headroom };
         let v = self.velocity;
         let (seconds, longest) = self.nominal();
-        // Logarithms mostly tell that the block is run through in a single stretch.
+        // Logarithms mostly decide that a single stretch covers the block.
         if log(v) + log(longest) < log(left) + PLAIN && below(v * longest, left) {
             let gain = self.limits.accel * seconds;
             let half = 0.5 * seconds;
@@ -72,7 +72,7 @@ impl Governor {
         self.finish(left, cruise, headroom)
     }
 
-    /// Returns how long a stretch is to be, and the longest, s.
+    /// Returns the nominal and the longest duration of a stretch, s.
     #[inline(always)]
     fn nominal(&self) -> (f32, f32) {
         if self.spares {
@@ -83,8 +83,8 @@ impl Governor {
         }
     }
 
-    /// Whether the velocity is kept. Either it is the limit; or stretches are longer for want of time, and the
-    /// velocity is so near to what has to be reached at the end of the block that a gain would soon be lost again.
+    /// Whether the velocity is kept. Either it is the limit; or stretches are longer because CPU time is short, and the
+    /// velocity is so near to the limit at the end of the block that a gain would soon be lost again.
     #[inline(always)]
     fn stays(&mut self, cruise: f32, headroom: f32) -> bool {
         let v = self.velocity;
@@ -107,7 +107,7 @@ impl Governor {
         if least > next + self.limits.accel * SEGMENT_S { least } else { next }
     }
 
-    /// Returns all the rest of a block in one stretch.
+    /// Returns the whole remainder of a block in one stretch.
     #[inline(never)]
     fn finish(&mut self, left: f32, cruise: f32, headroom: f32) -> Stretch {
         let v = self.velocity;
@@ -126,7 +126,7 @@ impl Governor {
         {
             seconds = ratio(scaled(left, 1), sum);
         } else if square > 0.0 {
-            // From rest to rest, or nearly so: there is a peak between.
+            // From standstill to standstill, or nearly so, with a peak between.
             let peak = sqrt(0.5 * (square + next * next));
             if peak < cruise {
                 seconds = (peak + peak - sum) / self.limits.accel;

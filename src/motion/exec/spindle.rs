@@ -35,8 +35,8 @@ pub(super) enum Follows {
 }
 
 impl Exec {
-    /// Ends a G33.1 pass whose way back was still to come, because what was queued has been dropped for good. No line
-    /// follows the spindle then.
+    /// Ends a G33.1 pass whose way back was still to come, because its blocks have been dropped. No line follows the
+    /// spindle then.
     pub fn end_pass(&mut self) {
         if let Follows::Angle(thread) = &self.follows
             && thread.waits()
@@ -54,8 +54,8 @@ impl Exec {
         }
     }
 
-    /// Whether the spindle has turned round in a G33.1 pass and the axes rest there. The rest of the line is to be
-    /// dropped then.
+    /// Whether the spindle has reversed in a G33.1 pass and the axes stand still there. The remainder of the line is
+    /// then to be dropped.
     pub fn has_turned(&self) -> bool {
         match &self.follows {
             Follows::Angle(thread) => thread.has_turned() && self.governor.is_at_rest(),
@@ -63,8 +63,8 @@ impl Exec {
         }
     }
 
-    /// Returns why a pass has been left before its end, or `None` if none has. While the rest of the pass waits to be
-    /// dropped, this is a hold of its own.
+    /// Returns why a pass has been left before its end, or `None` if none has. Until the remainder of the pass has been
+    /// dropped, exec stays in a hold.
     #[inline(always)]
     pub fn has_left(&self) -> Option<Status> {
         match &self.follows {
@@ -84,8 +84,8 @@ impl Exec {
         self.follows = if on { Follows::Speed(1.0) } else { Follows::Nothing };
     }
 
-    /// Sets the share of the planned speed at which the spindle turns; shares above 1 count as 1. A change of less
-    /// than 0.5 % is ignored, because each change has ramps laid out anew.
+    /// Sets the share of the planned speed at which the spindle turns; shares above 1 count as 1. A change of less than
+    /// 0.5 % is ignored, because each change makes new ramps necessary.
     #[inline(never)]
     #[small]
     pub fn set_share(&mut self, share: f32) {
@@ -100,7 +100,7 @@ impl Exec {
         }
     }
 
-    /// Whether a feed has waited too long for the spindle. When this returns true, the wait is counted from 0 again.
+    /// Whether a feed has waited too long for the spindle. Returning true resets the time of the wait to 0.
     #[small]
     pub fn takes_too_long(&mut self) -> bool {
         match &mut self.follows {
@@ -112,8 +112,8 @@ impl Exec {
         }
     }
 
-    /// Sets whether a pass in step with the spindle is to end at once, in the midst of the cut: after an alarm, or
-    /// when the program is killed.
+    /// Sets whether a pass in step with the spindle is to end at once, within the cut: after an alarm, or when the
+    /// program is killed.
     #[inline(always)]
     pub fn break_off(&mut self, at_once: bool) {
         self.breaks_off = at_once;
@@ -145,7 +145,7 @@ impl Exec {
             return self.await_spindle(out, segment);
         }
         let retract = thread.retract();
-        // Whether the axes come to rest within this line, in which X stands still.
+        // Whether the axes stop within this line, in which X stands still.
         let fits = velocity * velocity < 2.0 * accel * self.running.left;
         let leaves = (breaks_off || self.hold) && retract.is_some() && fits;
         if leaves && self.prep.rest_of(retract.motors) {
@@ -175,7 +175,7 @@ impl Exec {
         Step::Segment
     }
 
-    /// Takes up the feed and the headroom of a line that follows the spindle, if they have changed.
+    /// Updates the feed and the headroom of a line that follows the spindle, if they have changed.
     fn take_limits(&mut self, blocks: &mut BlockSource) {
         let version = blocks.version();
         let running = &mut self.running;

@@ -1,4 +1,4 @@
-//! The begin of a block: how far each motor goes in it, and which motor goes farthest.
+//! The start of a block: the distance of each motor, and the dominant motor.
 
 use super::super::block::{Line, PARTS_LOG2};
 use super::ticks::{is_little, parts_of, times};
@@ -34,7 +34,7 @@ impl Prep {
             }
             steps[M] = whole;
             if !is_little(debt) {
-                // Adds the 1/16 steps that the motor is short of.
+                // Adds the debt of the motor, in 1/16 steps.
                 way += parts_of(debt) >> PART_LOG2;
             }
             if way != 0 {
@@ -76,7 +76,7 @@ impl Prep {
         }
     }
 
-    /// Takes up a motor that goes `way` in the block; `own` is its distance in the line, without its debt.
+    /// Takes in a motor that moves by `way` in the block; `own` is its distance in the line, without its debt.
     #[inline(always)]
     fn take_up(&mut self, m: usize, bit: u8, way: i16, own: i16) {
         self.others = self.others.wrapping_add(1);
@@ -104,8 +104,8 @@ impl Prep {
         }
     }
 
-    /// In a block of whole steps, adds what the dominant motor is short of to its distance, and to that of the motors
-    /// that go as far.
+    /// In a block of whole steps, adds the debt of the dominant motor to its distance, and to that of the motors that
+    /// go as far.
     #[inline(never)]
     #[small]
     fn lengthen(&mut self) {
@@ -116,12 +116,12 @@ impl Prep {
                 let debt = if self.backwards & bit != 0 { -self.debt[m] } else { self.debt[m] };
                 let due = *due.get_or_insert(parts_of(debt));
                 if (debt - due).unsigned_abs() > PART {
-                    // The motor goes as far, but its debt is different.
+                    // The motor's distance is equal, but its debt is different.
                     self.full &= !bit;
                     self.minor |= bit;
                 }
             } else if self.minor & bit == 0 && !is_little(self.debt[m]) {
-                // The line does not move it, but it has not arrived where the line begins.
+                // The line does not move this motor, but the motor still has a debt.
                 self.minor |= bit;
                 self.minors[m].way = 0;
                 self.others += 1;
@@ -134,8 +134,8 @@ impl Prep {
         }
         let due = due.unwrap_or(0);
         self.left = self.left.wrapping_add_signed(due.into());
-        // Lengthening the dominant motor's distance lengthens that of the other motors in proportion. They owe their
-        // own debts instead.
+        // A longer distance of the dominant motor lengthens those of the other motors in proportion. Their own debts
+        // replace that part.
         let mut bit = 1;
         for m in 0..MOTORS {
             let debt = if self.backwards & bit != 0 { -self.debt[m] } else { self.debt[m] };

@@ -1,4 +1,4 @@
-//! Motors that move beside a block, in its segments: those of a [retreat](super::super::retract).
+//! Motors that move independently of the running block, in its segments: those of a [retreat](super::super::retract).
 
 use super::super::retract::Retreat;
 use super::minor::Minor;
@@ -20,8 +20,8 @@ impl Prep {
         self.debt.get(first).copied().unwrap_or_default()
     }
 
-    /// Prepares `motors`, which the block lets stand, to move beside it in this direction. Segments have ticks for
-    /// them from here on.
+    /// Prepares `motors`, which the block does not move, to move in this direction. Segments have ticks for them from
+    /// here on.
     #[inline(never)]
     #[small]
     pub fn join(&mut self, motors: u8, backwards: bool) {
@@ -58,7 +58,7 @@ impl Prep {
     #[inline(never)]
     #[small]
     pub fn add(&mut self, retreat: &mut Retreat, out: &mut Segment, target: &mut [i32; MOTORS]) {
-        // Not in the tick in which directions settle: the segment behind it is in `held`.
+        // Not in the tick in which directions settle: the segment after it is in `held`.
         if self.held.is_none() && !retreat.is_done() {
             retreat.add(out, target, &mut self.debt);
             out.settle = 0;
@@ -74,7 +74,7 @@ impl Prep {
         if stands && period >= self.paces().settles { retreat.plan(ticks, period) } else { 0 }
     }
 
-    /// Counts what the motors of a retreat have been told to go in a segment that was queued already.
+    /// Counts the distance that has been added to a queued segment for the motors of a retreat.
     #[small]
     pub fn note_lead(
         &mut self,

@@ -6,15 +6,15 @@ use crate::dda::{PHASE_START, STEP, STEP_LOG2, Segment};
 use crate::hal::arithmetic::product;
 
 impl Prep {
-    /// Ends the block here and now: takes off `target` the steps of the block that no segment has. From now on every
-    /// motor counts as being at its last step ([`Dda::settle`](crate::dda::Dda::settle)). Returns the segment that
-    /// was to come next, if it has been prepared. Cost: 4,000 a motor.
+    /// Ends the block at once: subtracts from `target` the steps of the block that no segment has. From now on every
+    /// motor counts as being at its last step ([`Dda::settle`](crate::dda::Dda::settle)). Returns the segment that was
+    /// held back, if any. Cost: 4,000 a motor.
     #[inline(never)]
     #[small]
     pub fn cut(&mut self, target: &mut [i32; MOTORS]) -> Option<Segment> {
         let mut bit = 1;
         for (m, target) in target.iter_mut().enumerate() {
-            // How far the end of the block is beyond the whole step to which it is rounded.
+            // The distance from the whole step to which the end of the block is rounded to that end.
             let beyond = (i32::from(self.fraction[m]) - i32::from(HALF)) * i32::from(PART);
             let left = self.left_of(m, bit);
             let left = if self.backwards & bit != 0 { -left } else { left };

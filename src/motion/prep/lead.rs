@@ -13,7 +13,7 @@ impl Prep {
         self.extruder.first().is_some_and(|extruder| extruder.on)
     }
 
-    /// Whether the extruder has a lead in the block, or takes one back. If so, exec tells how fast the machine is
+    /// Whether the extruder has a lead in the block, or takes one back. If so, exec passes the velocity
     /// ([`Prep::aim`]).
     #[inline(always)]
     pub fn leads(&self) -> bool {
@@ -28,8 +28,7 @@ impl Prep {
         }
     }
 
-    /// Takes up how fast the machine is at the end of a slice, mm/s: see
-    /// [`Advance::aim`](super::super::advance::Advance::aim).
+    /// Takes in the velocity at the end of a slice, mm/s: see [`Advance::aim`](super::super::advance::Advance::aim).
     #[inline(never)]
     pub fn aim(&mut self, velocity: f32, seconds: f32, pending: f32) {
         if let Some(extruder) = self.extruder.first_mut() {
@@ -37,8 +36,8 @@ impl Prep {
         }
     }
 
-    /// Begins the lead of a block. The extruder has one if the block pushes filament while other motors travel. Its
-    /// increments are its own then: it no longer counts as a motor that goes as far as others.
+    /// Begins the lead of a block. The extruder has one if the block pushes filament while other motors travel. It then
+    /// has its own increments, and no longer counts as a motor that goes as far as others.
     #[inline(never)]
     #[small]
     pub(super) fn begin_lead(&mut self, line: &Line) {
@@ -64,7 +63,7 @@ impl Prep {
                 *minor = Minor::default();
             }
         } else if self.others == 0 {
-            // The extruder is alone: its ticks are those of motors whose increments are not a step.
+            // Only the extruder moves: its ticks are those of motors whose increments are not a step.
             self.others = 1;
         }
     }
@@ -83,7 +82,7 @@ impl Prep {
         if goes != 0 && (goes < 0) != extruder.backwards {
             extruder.backwards = goes < 0;
             if out.period.saturating_sub(TURNED) < self.setup {
-                // The direction stands from this segment on, and the motor goes in the next one.
+                // The direction is set from this segment on, and the motor moves in the next one.
                 goes = 0;
             }
         }
@@ -95,14 +94,14 @@ impl Prep {
         }
     }
 
-    /// Ends the lead of the block: the extruder is where its line is, but for little.
+    /// Ends the lead of the block: the remaining lead is small.
     #[inline(never)]
     #[small]
     fn end_lead(&mut self) {
         let Some(extruder) = self.extruder.first_mut() else { return };
         let bit = 1 << extruder.motor;
         if core::mem::take(&mut extruder.leads) {
-            // The next segment turns it round.
+            // The next segment reverses the motor.
             self.turned |= extruder.backwards != (self.backwards & bit != 0);
         }
         if self.full == bit && self.minor == 0 {
@@ -115,8 +114,8 @@ impl Prep {
         }
     }
 
-    /// Makes a segment in which the extruder takes back what is left of its lead: the machine rests at the end of its
-    /// lines, or in a hold. Returns false, and no segment, if no lead is left.
+    /// Makes a segment in which the extruder takes back the remainder of its lead: the machine stands still at the end
+    /// of its lines, or in a hold. Returns false, and no segment, if no lead is left.
     #[inline(always)]
     pub fn relax(&mut self, out: &mut Segment) -> bool {
         self.has_advance() && self.takes_back(out)

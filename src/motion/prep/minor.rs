@@ -1,4 +1,4 @@
-//! Motors that go less far than the dominant one: their increments, and what rounding takes off them.
+//! Motors that move less far than the dominant one: their increments and rounding errors.
 
 use super::super::divide::{quotient, quotient_remainder};
 use crate::dda::STEP;
@@ -7,12 +7,12 @@ use crate::hal::arithmetic::product;
 /// A motor that moves but does not step on every tick of the dominant one.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Minor {
-    /// The way of the motor in the block, in parts of a step or in whole steps.
+    /// The distance of the motor in the block, in parts of a step or in whole steps.
     pub way: u16,
-    /// Travel in a tick, rounded down; `remainder` is what rounding leaves, in 1 / most.
+    /// Travel in a tick, rounded down; `remainder` is the rounding error, in 1 / most.
     pub increment: u16,
     pub remainder: u16,
-    /// What the increments so far owe the line, in phase units / most.
+    /// The distance in the line less that in segments so far, in phase units / most.
     pub owed: i32,
 }
 
@@ -22,7 +22,7 @@ impl Minor {
         self.way == 0 && self.owed == 0
     }
 
-    /// Returns the increment for the next `ticks`, and updates what it owes.
+    /// Returns the increment for the next `ticks`, and updates `owed`.
     pub(super) fn advance(&mut self, ticks: u16, most: u16) -> u16 {
         let unit = product(ticks, most);
         let half = (unit / 2) as i32;
@@ -57,7 +57,7 @@ pub(super) fn even(way: u16, step: u16, most: u16) -> u16 {
     quotient(product(way, step) + u32::from(most / 2), most)
 }
 
-/// Returns `owed / unit`, rounded. Rarely needed: when a debt meets a short segment.
+/// Returns `owed / unit`, rounded. Needed only when a debt coincides with a short segment.
 #[inline(never)]
 fn rounded(owed: u32, unit: u32) -> u16 {
     ((owed + unit / 2) / unit) as u16

@@ -1,10 +1,10 @@
-//! Ticks of a stretch: how many, and how many phase units each, in integers.
+//! Ticks of a stretch: their number, and the phase units of each, in integers.
 
 use super::{LIMIT_MAX, PART};
 use crate::dda::STEP_LOG2;
 use crate::hal::arithmetic::product;
 
-/// Whether a debt is mere rounding: half of 1/16 step at most.
+/// Whether a debt is only rounding: at most half of 1/16 step.
 #[inline(always)]
 pub(super) fn is_little(debt: i16) -> bool {
     (debt as u16).wrapping_add(PART / 2) < PART
@@ -32,10 +32,10 @@ pub(super) fn bit(n: u8) -> u16 {
     if n & 8 != 0 { u16::from(byte) << 8 } else { byte.into() }
 }
 
-/// Periods are computed from 1/32 tick, if a tick has as many phase units. This is the exponent of 32.
+/// Periods are computed in 1/32 tick, if a tick has at least 32 phase units. This is the exponent of 32.
 pub(super) const FINE: u8 = 5;
 
-/// Returns a limit of ticks in parts of a tick, the parts of a last incomplete tick included.
+/// Converts a limit of ticks to parts of a tick, including those of a last incomplete tick.
 const fn limit_in_parts(limit: u16) -> u16 {
     limit << FINE | ((1 << FINE) - 1)
 }
@@ -69,7 +69,7 @@ pub(super) fn coarsen(travel: u32, limit: u16) -> (u32, u8) {
     (few.into(), shift)
 }
 
-/// Divides a travel for which ticks of less than [`FINE`] bits do: its phase units are the parts.
+/// Divides a travel that needs ticks of less than [`FINE`] bits only: its phase units are the parts.
 #[inline(never)]
 #[small]
 fn coarsen_little(travel: u32, limit: u16) -> (u32, u8) {
