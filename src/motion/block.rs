@@ -1,9 +1,9 @@
 //! A block: one straight move, dwell or synchronised command, as the planner leaves it for exec.
 //!
-//! Units: mm (degrees for a rotary-only move), seconds, motor steps. The size of a block bounds the look-ahead: there
-//! are 62 blocks in RAM. So limits take two bytes each, and the line number three. The sign of a length tells in which
-//! unit distances are counted ([`Extent`]). A line needs no tag, because no line has a [`Reserve`] of 0. A block has 30
-//! bytes on AVR.
+//! Units: mm (degrees for a rotary-only move), seconds, motor steps. The size of a block bounds the look-ahead: RAM
+//! holds 62 of them on AVR. So limits take two bytes each, and the line number three. The sign of a length tells in
+//! which unit distances are counted ([`Extent`]). A line needs no tag, because no line has a [`Reserve`] of 0. A block
+//! has 30 bytes on AVR.
 
 use super::advance::Lead;
 use super::factors::{Factors, Reserve};

@@ -210,7 +210,8 @@ impl Path {
     /// Gives every block at least the time that exec needs ([`BLOCK_S_MIN`]).
     ///
     /// Cost: 300 where logarithms decide; 1,000 for a feed beyond the limit, or just below it. Velocities between the
-    /// feed and the top, which only an override asks for, may be limited to up to a seventh less than the motors can do.
+    /// feed and the top, which matter under an override only, may be limited to up to a seventh less than the motors
+    /// can do.
     #[inline(never)]
     pub(super) fn limit_steps(&mut self, rates: &[f32; MOTORS], chord: bool) {
         if self.most < HALF_STEP {

@@ -24,8 +24,9 @@
 //! less than `J t^2` away (t is the time of a slice) is reached at once, and so is the end of a move that is shorter
 //! than `2 J t^3`.
 //!
-//! Units: mm, s; distances to what is ahead are brake potential (`constraint`). Cost on AVR: 800 cycles at a steady velocity, 2,400
-//! in a ramp, 3,000 while alpha rises; a scan 3,500 to 7,500 more, a ramp that is laid out 2,000 to 4,000.
+//! Units: mm, s; distances to constraints ahead are brake potential (`constraint`). Cost on AVR: 800 cycles at a steady
+//! velocity, 2,400 in a ramp, 3,000 while alpha rises; a scan 3,500 to 7,500 more, a ramp that is laid out 2,000 to
+//! 4,000.
 
 use super::constraint::{Ahead, Ask, Clear, needed};
 use super::exec::SEGMENT_S;

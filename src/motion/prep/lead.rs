@@ -1,4 +1,5 @@
-//! Pressure advance: the lead of the extruder in the segments of a block ([`Advance`](super::super::advance::Advance) says how long it is).
+//! Pressure advance: the lead of the extruder in the segments of a block. [`Advance`](super::super::advance::Advance)
+//! computes the lead.
 
 use super::super::advance::{Lead, pushed};
 use super::super::block::Line;
