@@ -1,4 +1,4 @@
-//! The moment at which a switch that ends a move is reached, and where the motors were then.
+//! Contact: the motor positions at the moment at which a switch that ends a move changes.
 //!
 //! ```text
 //! sampling interrupt   mark     records the generator's state: there may be a contact
@@ -7,10 +7,9 @@
 //! planner              take     when exec has dropped its blocks; or clear
 //! ```
 //!
-//! So a probe's result is where the contact was, not where the machine stopped, and it is exact to the step. In each
-//! stage the record belongs to one of the three ([`Baton`]), and only its owner leads to the next stage. A second contact
-//! is ignored until the planner has taken the first.
-//! RAM: 27 bytes.
+//! So a probe's result is the position of the contact, not of the standstill, and it is exact to the step. In each
+//! stage one of the three owns the record ([`Baton`]), and only the owner passes it on to the next stage. A second
+//! contact is ignored until the planner has taken the first. RAM: 27 bytes.
 
 use avr_embassy::Baton;
 
@@ -36,8 +35,8 @@ machine_static! {
     fn contact() -> Baton<Contact> = Baton::new(Contact { tail: 0, replay: StepReplay::new() });
 }
 
-/// Records the state of the generator, `dda`, in the segment of slot `tail`: if there is a contact, it is now.
-/// Sampling interrupt only, which holds exec off until it calls [`note`] or ends.
+/// Records the state of the generator, `dda`, in the segment of slot `tail`, in case there is a contact now. Sampling
+/// interrupt only, which holds exec off until it calls [`note`] or ends.
 #[small]
 pub fn mark(dda: &Dda, tail: u8) {
     contact().pass(NONE, NONE, |contact| {
@@ -88,8 +87,8 @@ pub fn pushed(segment: &Segment) {
     contact().pass(FOLLOWED, FOLLOWED, |contact| contact.replay.run(segment));
 }
 
-/// Returns where the motors were at the contact, given that they have come to rest at `at`, and forgets the contact.
-/// `None` if exec has not caught up. Thread mode, when exec has dropped its blocks because of the contact.
+/// Returns where the motors were at the contact, given that they have stopped at `at`, and forgets the contact. `None`
+/// if exec has not caught up. Thread mode, when exec has dropped its blocks because of the contact.
 #[small]
 pub fn take(at: &[i32; MOTORS]) -> Option<[i32; MOTORS]> {
     contact().pass(FOLLOWED, NONE, |contact| contact.replay.before(at))

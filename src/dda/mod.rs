@@ -1,9 +1,9 @@
-//! The step generator: what happens at one tick of the step timer, without any register.
+//! The step generator: the work of one tick of the step timer, without any register.
 //!
 //! Owned by the step interrupt (level 0). Each motor has a phase below [`STEP`], which is one step. A tick adds the
-//! segment's increment to the phase. When the sum fills bit 15, the bit is taken off and a step is due. So a motor
-//! steps at most once a tick, `increment = STEP` is a step on every tick, and a motor whose increment is `STEP / 2^k`
-//! steps on every `2^k`th tick exactly.
+//! segment's increment to the phase. When the sum sets bit 15, the bit is cleared and a step is due. So a motor steps
+//! at most once a tick: on every tick if its increment is `STEP`, and exactly on every `2^k`th tick if its increment is
+//! `STEP / 2^k`.
 //!
 //! On AVR the whole of [`Dda::tick`] has a twin in assembly (`hal/avr/step_isr.rs`), which works on the same [`Dda`]
 //! and [`Segment`], field by field. The host runs the Rust version.
@@ -22,16 +22,16 @@
 //! is as wide as the computation takes. Directions change after the last pulse of the old segment and a whole tick
 //! before the first pulse of the new one.
 //!
-//! The interrupt may start late, behind another one. A segment with enough time for it names the cycle of the tick at
-//! which its pulses rise (`settle`). That cycle is so late that no other interrupt can delay the pulses: they are
-//! exact to the cycle.
+//! The interrupt may start late, behind another one. If the tick period leaves time for it, a segment gives the cycle
+//! of the tick at which its pulses rise (`settle`). This cycle is so late that no other interrupt can delay the pulses,
+//! which makes them exact to the cycle.
 //!
-//! In *lockstep* all motors that move step on every tick: phases stay as they are, and the interrupt
-//! has nothing to add. That is how the highest rates are reached.
+//! In *lockstep* all motors that move step on every tick: phases do not change, and the interrupt has nothing to add.
+//! This gives the highest step rates.
 //!
-//! A phase is the motor's true position between steps. When the direction of a motor reverses, its
-//! phase is complemented: counting a complement up is counting the phase down, so the fraction
-//! of a step survives any reversal.
+//! A phase is the motor's true position between steps. When the direction of a motor reverses, its phase is
+//! complemented: counting the complement up equals counting the phase down, so the fraction of a step is kept at a
+//! reversal.
 
 use kerf_macros::small;
 
@@ -47,8 +47,8 @@ pub const STEP: u16 = 1 << STEP_LOG2;
 /// The exponent of [`STEP`].
 pub const STEP_LOG2: u8 = 15;
 
-/// Where phases start: a little past half a step, so that a position is rounded to the nearest step. A remainder of
-/// up to [`PHASE_MARGIN`], left by earlier segments, never moves a step of a motor that runs on exact ticks.
+/// Where phases start: a little past half a step, so that a position is rounded to the nearest step. A rounding
+/// remainder of up to [`PHASE_MARGIN`] from earlier segments never shifts a step of a motor that runs on exact ticks.
 pub const PHASE_START: u16 = STEP / 2 + PHASE_MARGIN;
 
 /// How far [`PHASE_START`] is past half a step, in phase units.
@@ -79,8 +79,8 @@ pub struct Segment {
     pub backwards: u8,
     /// CPU cycles from a tick to its pulses; 0 for pulses as soon as possible.
     pub settle: u8,
-    /// What the interrupt may leave out: [`NARROW`], [`WIDE`], or [`LOCKSTEP`] with the bits of the motors that step
-    /// on every tick. Set by [`Segment::seal`].
+    /// Selects the fast path of the interrupt: [`NARROW`], [`WIDE`], or [`LOCKSTEP`] with the bits of the motors that
+    /// step on every tick. Set by [`Segment::seal`].
     pub mode: u8,
     /// Motors that move in the segment's block, as bits; none in a pause. Used to power the drivers; the interrupt
     /// does not read it. It makes the segment 16 bytes long.
@@ -120,21 +120,21 @@ impl Segment {
     }
 }
 
-/// How close ticks may come on a chip with usual pulses ([`Drivers::USUAL`]), for a given number of motors that move.
-/// All fields are periods, as in [`Segment::period`].
+/// Tick period limits of a chip with usual pulses ([`Drivers::USUAL`]), for a given number of motors that move. All
+/// fields are periods, as in [`Segment::period`].
 #[derive(Clone, Copy, Debug)]
 pub struct Ticks {
     /// Period at the highest step rate, which is that of lockstep.
     pub step: u16,
     /// Shortest period: the step interrupt, a short interrupt before it, and some time for everything else.
     pub shortest: u16,
-    /// Period in steady motion: as fine as leaves exec and the planner a third of the CPU.
+    /// Period in steady motion, as short as leaves exec and the planner a third of the CPU.
     pub fine: u16,
     /// Period in short blocks, which leave exec and the planner more of the CPU.
     pub coarse: u16,
-    /// Period in blocks so short that they are a single segment.
+    /// Period in blocks so short that they are one segment.
     pub coarsest: u16,
-    /// From this period on, pulses wait for the interrupt's worst latency ([`Segment::settle`]).
+    /// From this period on, pulses are delayed by the interrupt's worst latency ([`Segment::settle`]).
     pub settles: u16,
 }
 
@@ -147,7 +147,7 @@ pub struct Drivers {
     pub setup_us: u8,
 }
 
-/// What the step generator does to the outside.
+/// The outputs of the step generator.
 pub trait Pins {
     /// Raises the step pins in `motors` (bit m: motor m).
     fn rise(&mut self, motors: u8);
@@ -155,11 +155,11 @@ pub trait Pins {
     fn fall(&mut self, motors: u8);
     /// Sets all direction pins (bit m set: motor m runs backwards).
     fn direction(&mut self, backwards: u8);
-    /// Sets the distance between ticks from now on, in CPU cycles.
+    /// Sets the tick period from now on, in CPU cycles.
     fn period(&mut self, cycles: u16);
     /// Tells exec that a segment slot is free.
     fn slot_free(&mut self);
-    /// Ends ticks: there is no segment.
+    /// Stops the ticks, because there is no segment.
     fn stop(&mut self);
 }
 
@@ -182,7 +182,7 @@ pub struct Dda {
 }
 
 impl Dda {
-    /// A generator at rest.
+    /// A generator at a standstill.
     pub const fn new() -> Self {
         Self {
             phase: [PHASE_START; MOTORS],
@@ -195,8 +195,8 @@ impl Dda {
         }
     }
 
-    /// Puts every motor where its last pulse has put it, with no fraction of a step on the way. Takes off `position`
-    /// the steps that the rest of the running segment, and the segments that `queued` returns, would have made. Exec
+    /// Sets every motor to the position of its last pulse, without a fraction of a step. Subtracts from `position` the
+    /// steps that the remainder of the running segment, and the segments that `queued` returns, would have made. Exec
     /// calls this while no ticks come; the result is exact wherever the ticks were stopped. Cost: 1,200, and 600 a
     /// segment.
     #[inline(never)]
@@ -206,7 +206,7 @@ impl Dda {
         mut queued: impl FnMut() -> Option<Segment>,
         position: &mut [i32; MOTORS],
     ) {
-        // Phases as they count forwards; then the distance to where the last segment ends is added.
+        // Phases as they count forwards; then the distance to the end of the last segment is added.
         let mut ends = [0i32; MOTORS];
         for (m, end) in ends.iter_mut().enumerate() {
             let (phase, backwards) = (self.phase[m], self.backwards & 1 << m != 0);
@@ -228,7 +228,7 @@ impl Dda {
         (self.ticks, self.due, self.mode) = (0, 0, NARROW);
     }
 
-    /// Returns what is left of the running segment.
+    /// Returns the remainder of the running segment.
     fn rest(&self) -> Segment {
         let Self { mut increment, ticks, backwards, mode, .. } = *self;
         if mode & LOCKSTEP != 0 {
@@ -276,7 +276,7 @@ impl Dda {
         let Some(segment) = segments.pop() else {
             return false;
         };
-        // First of all: the counter is already running towards the old top.
+        // Set first, because the counter is already running towards the old top.
         pins.period(segment.period);
         let turned = segment.backwards ^ self.backwards;
         if turned != 0 {

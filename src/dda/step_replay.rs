@@ -1,16 +1,16 @@
-//! How many steps the generator makes from a given moment on.
+//! Counts the steps that the generator makes from a given moment on.
 //!
-//! Owned by exec, for a move that ends at a switch. The switch's interrupt records the state of the generator
-//! ([`Dda`]) between two ticks. From that state on, [`StepReplay`] makes the steps that the generator makes, a whole
-//! segment at a time, in the integers of the generator. When the steppers have come to rest, their position less these steps is
-//! the position at the recorded moment. It is exact, whatever the path to the standstill.
+//! Owned by exec, for a move that ends at a switch. The switch's interrupt records the state of the generator ([`Dda`])
+//! between two ticks. From that state on, [`StepReplay`] counts the steps of the generator, a whole segment at a time,
+//! with the integers of the generator. When the steppers have stopped, their position less these steps is the position
+//! at the recorded moment. It is exact, whatever the path to the standstill.
 //!
 //! Cost on AVR: 500 cycles a segment, nothing while no moment is recorded.
 
 use super::{Dda, STEP, STEP_LOG2, Segment};
 use crate::boards::MOTORS;
 
-/// A replay of the steps that the generator makes.
+/// A replay of the generator's steps.
 #[derive(Clone, Debug, Default)]
 pub struct StepReplay {
     phase: [u16; MOTORS],
