@@ -57,7 +57,7 @@ pub fn divide(a: u32, b: u16) -> (u16, u16) {
             "com  {low:l}",
             "com  {low:h}",
             "rjmp 9f",
-            // A divisor of seven bits, usual for steps a millimetre: the remainder has seven bits, too.
+            // A divisor of seven bits, usual for steps per millimetre: the remainder has seven bits, too.
             "30:",
             ".rept 4",
             "rol  {low:l}",
@@ -77,7 +77,7 @@ pub fn divide(a: u32, b: u16) -> (u16, u16) {
             "brne 5f",
             "clr  {low:l}",
             "5:",
-            // Two bits in each turn: such great divisors are rare.
+            // Two bits in each turn: such large divisors are rare.
             "lsl  {n}",
             "6:",
             ".rept 2",

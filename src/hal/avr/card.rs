@@ -20,7 +20,7 @@ pub fn select() {
     }
 }
 
-/// Deselects the card, then sends one more byte, during which the card lets go of the line.
+/// Deselects the card, then sends one more byte, during which the card releases its data line.
 #[small]
 pub fn release() {
     if let Some(pin) = ACTIVE.card {
@@ -30,7 +30,8 @@ pub fn release() {
     TAKEN.set(0);
 }
 
-/// Whether the lines are free for another device. If they are not, notes that it waits for them: see [`is_wanted`].
+/// Whether the lines are free for another device. If they are not, records that a device waits for them: see
+/// [`is_wanted`].
 pub(super) fn is_free() -> bool {
     WANTED.set(TAKEN.get());
     TAKEN.get() == 0

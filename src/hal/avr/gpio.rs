@@ -60,8 +60,7 @@ pub(super) const fn item<T: Copy>(list: &[T], i: usize) -> Option<T> {
 }
 
 /// Makes the board's output pins outputs: steps low, drivers off, hazards off, senders not held back, no bus driven.
-/// The level that switches the spindle off is not known yet, so the pin of its enable is not driven before
-/// [`set_low`].
+/// The level that switches the spindle off is not known yet, so its enable pin is not driven before [`set_low`].
 pub fn start() {
     each_motor!(M => {
         low(ACTIVE.motors[M].step);
@@ -86,7 +85,7 @@ pub fn start() {
         if let Some(Handshake { rts, cts }) = serial.handshake {
             low(rts);
             output(rts);
-            // Pulled up: without a cable nothing is sent.
+            // Pulled up, so that nothing is sent without a cable.
             high(cts);
         }
         if let Some(driver) = serial.driver_enable {
@@ -102,7 +101,7 @@ pub fn start() {
     }
 }
 
-/// The motors whose drivers have been asked for, as bits.
+/// The motors whose drivers have been requested, as bits.
 static WANTED: SharedByte = SharedByte::new(0);
 
 /// Returns the motors whose drivers are on, as bits.

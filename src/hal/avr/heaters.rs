@@ -2,7 +2,7 @@
 //!
 //! A reading is the sum of [`SAMPLES`] conversions of one channel, 104 us each, which the converter's interrupt adds
 //! up. A conversion is started only after the one before has been added, so the interrupt cannot come again soon, and
-//! it lets all other interrupts in. It is not time-critical: exec may come in between.
+//! it lets all other interrupts in. It is not time-critical, so exec may interrupt it.
 //!
 //! | interrupt | does | cycles |
 //! |---|---|---|
@@ -102,8 +102,7 @@ extern "C" fn __vector_29() -> ! {
     }
 }
 
-/// Begins a reading of a heater's sensor. If a reading is already under way, that one goes on and none begins. Thread
-/// mode.
+/// Begins a reading of a heater's sensor, unless a reading is already under way. Thread mode.
 #[small]
 pub fn begin(heater: u8) {
     let Some(Heaters { heaters: [hot_end, bed], .. }) = ACTIVE.heaters else { return };

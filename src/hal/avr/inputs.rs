@@ -8,12 +8,12 @@
 //! The timer is timer 2; in an image that can print it is timer 3, because timer 2 then makes the pulses of heaters
 //! ([`heaters`](super::heaters)).
 //!
-//! While no switch moves none of these interrupts comes. The sampling interrupt lets in all interrupts except itself
-//! and exec, which would run far too long inside it. When a limit is hit, this interrupt itself stops the steps: 20
-//! us after the edge and its own 300 cycles, for which it competes with the step interrupt. In all that is 50 us at
-//! 50,000 steps a second, and 120 us at 85,000, where the step interrupt leaves it a sixth of the CPU. The place of a
-//! probe's contact is the place at the first of two samples, 20 us after the edge at 10,000 steps a second: a fifth
-//! of a step.
+//! While no switch changes, none of these interrupts comes. The sampling interrupt lets in all interrupts except itself
+//! and exec, which would run far too long inside it. When a limit is hit, this interrupt itself stops the steps: 20 us
+//! after the edge, plus its own 300 cycles, for which it competes with the step interrupt. The total is 50 us at 50,000
+//! steps a second, and 120 us at 85,000, where the step interrupt leaves it a sixth of the CPU. The position of a
+//! probe's contact is that at the first of two samples, 20 us after the edge: a fifth of a step at 10,000 steps a
+//! second.
 
 use core::arch::asm;
 use core::cell::UnsafeCell;
@@ -67,7 +67,7 @@ mod timer {
 }
 use timer::{COMPARE, CONTROL_A, CONTROL_B, COUNT, CTC, MASK, RUN};
 
-/// What starts the timer: the address of a register, and the value to write.
+/// Starts the timer: the address of a register, and the value to write.
 pub(super) const START: usize = if cfg!(feature = "printer") { 0x91 } else { 0xB1 };
 pub(super) const STARTED: u8 = RUN;
 /// Enables the interrupt at the compare value.
@@ -115,7 +115,7 @@ macro_rules! each_input {
     )+};
 }
 
-/// The state of the sampling interrupt, and what thread mode tells it.
+/// The state of the sampling interrupt, and its parameters from thread mode.
 struct State {
     switches: Switches,
     /// Inputs that are read, as bits. The pins of the others belong to an encoder.
@@ -207,7 +207,7 @@ pub fn set_up(low: u16, stops: u16) {
     });
 }
 
-/// Leaves the pins of these inputs to an encoder from now on. Thread mode.
+/// Gives the pins of these inputs to an encoder from now on. Thread mode.
 pub(super) fn leave_out(inputs: u16) {
     with(|state| {
         (state.used, state.fresh) = (!inputs, true);
@@ -221,7 +221,7 @@ pub fn left_out() -> u16 {
     with(|state| !state.used)
 }
 
-/// Sets the ends of axes that are not limits for now. Thread mode.
+/// Sets the ends of axes that are ignored as limits for now. Thread mode.
 pub fn spare(ends: u8) {
     with(|state| {
         state.spared = ends;
@@ -260,8 +260,8 @@ fn levels() -> u16 {
     u16::from_le_bytes(bytes)
 }
 
-/// Waits until [`SOON_US`] after the interrupt was due. The second sample comes so soon that another interrupt is not
-/// worth it.
+/// Waits until [`SOON_US`] after the interrupt was due. The second sample comes so soon that another interrupt would
+/// cost more than the wait.
 fn wait() {
     // SAFETY: the timer belongs to this interrupt; it has counted from 0 since the interrupt was due.
     unsafe {
@@ -290,13 +290,13 @@ extern "C" fn sample() {
     }
     if state.switches.is_news(now) {
         state.switches.note(now);
-        // As near to the edge as possible: the rest takes long while the step interrupt is busy.
+        // Recorded first, close to the edge, because the remaining work takes long while the step interrupt is busy.
         if state.armed != 0 {
             mark();
         }
         wait();
         now = state.found();
-        // Before anything else: each cycle counts, and the step interrupt leaves only two cycles in five.
+        // Done before anything else, because the step interrupt leaves only two cycles in five.
         if state.switches.changed(now) & now & state.live != 0 {
             stepper::stop();
         }
@@ -329,7 +329,7 @@ fn plan(next: Next) {
         if next == Next::Edge {
             CONTROL_B.write_volatile(0);
         }
-        // In this order, compare value before count: a count that is past its top already would go all the way round.
+        // The compare value is written before the count, because a count past its top would first run to its maximum.
         let top = match next {
             Next::Edge => top(FIRST_US),
             Next::Soon => top(SOON_US),

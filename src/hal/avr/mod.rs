@@ -1,4 +1,4 @@
-//! The ATmega2560: all the registers, and the interrupts.
+//! The ATmega2560: its registers and interrupts.
 //!
 //! | interrupt | file | level | does |
 //! |---|---|---|---|
@@ -8,11 +8,11 @@
 //! | INT, PCINT, TIMER2_COMPA or TIMER3_COMPA | `edges`, `inputs` | 1 | samples the switches when one moves |
 //! | INT, PCINT of the encoder's pins | `edges`, `encoder` | 1 | takes the time of a pulse |
 //! | ADC | `heaters` | 1 | adds up a reading of a temperature |
-//! | WDT | `watchdog` | 0 | resets a machine that has got stuck |
+//! | WDT | `watchdog` | 0 | resets a firmware that hangs |
 //! | USART2_UDRE | [`avr_embassy::interrupt`] | 2 | software interrupt: polls the exec executor, interrupts on |
 //!
-//! Each register has one owner, named here; the others are set up before interrupts are on.
-//! Everything else runs in thread mode, from [`avr_embassy::Executor::run_with`].
+//! The registers of an interrupt are owned by the file in this table. Registers that no interrupt owns are set up
+//! before interrupts are enabled. All other code runs in thread mode, from [`avr_embassy::Executor::run_with`].
 
 pub mod arithmetic;
 pub mod card;
@@ -65,10 +65,10 @@ pub fn reset() -> ! {
 
 /// Starts the boot loader, if the board has one; else restarts the firmware.
 ///
-/// This is a jump, not a reset: after a reset by the watchdog the loaders of common boards start the firmware at
-/// once. In all that a loader looks at, it finds the chip as after a reset by the button: no cause of reset noted,
-/// interrupts off, timers stopped. Outputs are off as after a panic. The loader lies where the fuses of these boards
-/// put it, in the last 8 KiB.
+/// This is a jump, not a reset: after a reset by the watchdog the loaders of common boards start the firmware at once.
+/// The state that a loader reads is that after a reset by the button: no reset cause is set, interrupts are off, timers
+/// are stopped. Outputs are off as after a panic. The loader is in the last 8 KiB of flash, as the fuses of these
+/// boards select.
 pub fn boot() -> ! {
     avr_device::interrupt::disable();
     if !has_boot_loader() {

@@ -1,5 +1,5 @@
-//! The last resort. No panic is meant to be reachable after start-up. If one happens all the same, motion and outputs
-//! stop and the machine stays still until it is reset.
+//! The panic handler. No panic is meant to be reachable after start-up. If one happens, motion and outputs stop and the
+//! machine stays still until it is reset.
 
 use super::gpio::{self, each};
 use crate::boards::ACTIVE;

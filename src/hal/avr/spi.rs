@@ -12,8 +12,7 @@ const SPDR: *mut u8 = 0x4E as *mut u8;
 /// Switched on, as master, with mode 0.
 const MASTER: u8 = 1 << 6 | 1 << 4;
 const DONE: u8 = 1 << 7;
-/// How often an exchange looks whether its byte has been sent. Then it goes on in any case; the slowest clock takes
-/// half as many looks.
+/// Timeout of an exchange, in polls of its end. The slowest clock takes half as many.
 const PATIENCE: u16 = 400;
 
 /// The clock of SPI.

@@ -106,7 +106,7 @@ pub(super) extern "C" fn __vector_17() -> ! {
             ".macro KERF_SETTLE",
             "    KERF_TO_SETTLE",
             "    brcs 77f",
-            // Takes as long as the decision between waiting and working below.
+            // Takes as many cycles as the decision between waiting and working below.
             "    nop",
             "    rjmp 78f",
             "78:",

@@ -1,4 +1,4 @@
-//! How fast the ATmega2560 is. The host stands in for this chip and uses this file, too.
+//! Timing constants of the ATmega2560. The host stands in for this chip and uses this file, too.
 
 use super::Chip;
 use crate::boards::{ACTIVE, MOTORS};

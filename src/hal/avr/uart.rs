@@ -6,9 +6,9 @@
 //! Where bytes are lost, because a ring was full or the hardware overran, a mark tells the reader: see
 //! [`serial`](crate::hal::serial).
 //!
-//! On a bus (RS-485) [`kick`] enables the driver of the bus, and the interrupt at the end of the last byte disables
-//! it. While the other side may stop us by pin (CTS), the transmit interrupt reads that pin before each byte. When
-//! CTS has stopped it, [`look`] starts it again, within a millisecond.
+//! On a bus (RS-485) [`kick`] enables the driver of the bus, and the interrupt at the end of the last byte disables it.
+//! With flow control by pins, the transmit interrupt reads CTS before each byte. When CTS has stopped transmission,
+//! [`look`] starts it again within a millisecond of its release.
 
 mod interrupts;
 
@@ -63,7 +63,7 @@ const PLAIN: u8 = 1 << 3;
 const AHEAD: u8 = 1 << 4;
 
 impl Flags {
-    /// Has `byte` sent before all others. Thread mode, and exec.
+    /// Orders `byte` to be sent before all others. Thread mode, and exec.
     fn send_ahead(&self, byte: u8) {
         self.ahead.set(byte);
         avr_device::interrupt::free(|_| self.held.set(self.held.get() | AHEAD));
@@ -93,7 +93,7 @@ impl<const N: usize> Shared<N> {
         }
     }
 
-    /// Hands out the ends that tasks have. The other ends belong to the interrupts, which push and pop in assembly.
+    /// Returns the ends that tasks own. The other ends belong to the interrupts, which push and pop in assembly.
     fn split(&'static self) -> Option<Ends> {
         let (_, rx) = self.rx.split()?;
         let (tx, _) = self.tx.split()?;
@@ -174,7 +174,7 @@ pub fn set_rate(port: u8, rate: u32) {
     }
 }
 
-/// Ends the lines of which a part has been sent. The rest of what the rings hold is never sent.
+/// Completes lines that have been sent in part. The remaining contents of the rings are never sent.
 ///
 /// # Safety
 /// Thread mode; interrupts are off, and stay so.
@@ -296,7 +296,7 @@ fn set_rts(port: u8, stop: bool) {
 
 /// Sets whether `!`, `~`, `%` and bytes above 0x7F are plain text from now on. Thread mode.
 pub fn set_plain(port: u8, plain: bool) {
-    // XOFF does not count on such a port, so the receive interrupt does not write `held`.
+    // XOFF is not obeyed on such a port, so the receive interrupt does not write `held`.
     if plain {
         flags(port).hold(PLAIN);
         kick(port);
@@ -313,14 +313,14 @@ pub fn set_flow(port: u8, flow: Flow) {
     let held = flags(port).held.get();
     let heeds = if cfg!(feature = "dialect-reprap") { heeds | held & PLAIN } else { heeds };
     if held & !(STOPPED | AHEAD) != heeds {
-        // An XOFF that came before does not count any more.
+        // An earlier XOFF is ignored from now on.
         flags(port).hold(heeds);
         set_rts(port, false);
         kick(port);
     }
 }
 
-/// Sends what CTS has held back, and XOFF or XON that has waited long enough. Thread mode, each millisecond.
+/// Sends bytes that CTS has held back, and XOFF or XON that has waited long enough. Thread mode, each millisecond.
 #[inline(always)]
 pub fn look() {
     for port in 0..PORTS as u8 {
@@ -384,8 +384,8 @@ pub fn room(port: u8) -> u8 {
     serial::capacity(port).saturating_sub(used as u8)
 }
 
-/// Whether half of the second port's receive ring is full. The other half lasts 3 ms, so a task with much to do then
-/// gives way to the reader. Thread mode.
+/// Whether half of the second port's receive ring is full. The other half fills in 3 ms, so a task with much to do then
+/// yields to the reader. Thread mode.
 pub fn presses() -> bool {
     PORTS > 1 && AUX_SHARED.rx.used() >= AUX_RING / 2
 }
@@ -424,7 +424,7 @@ pub unsafe fn stop() {
     }
 }
 
-/// Whether a `!` has come, on any port, that nobody has taken yet. Any level.
+/// Whether a `!` has come, on any port, that has not been taken yet. Any level.
 #[inline(always)]
 pub fn asks_hold() -> bool {
     (0..PORTS as u8).any(|port| flags(port).realtime.get() & realtime::HOLD != 0)

@@ -1,4 +1,4 @@
-//! The watchdog, and why the machine has started.
+//! The watchdog, and the cause of the last reset.
 //!
 //! After [`start`] the firmware has [`TIME`] between two calls of [`feed`]. If it is late, the watchdog's interrupt
 //! makes the machine safe and resets it. If interrupts are off for good, the chip resets by itself after the same
@@ -19,8 +19,8 @@ const TIME: u8 = 1 << 6 | 1 << 3 | 0b101;
 const SHORTEST: u8 = 1 << 3;
 
 unsafe extern "C" {
-    /// Marks the end of all statics. Start-up does not clear what lies behind it, and even the deepest stack ends
-    /// above it.
+    /// Marks the end of all statics. Start-up does not clear the memory after it, and even the deepest stack ends above
+    /// it.
     static mut _end: u16;
 }
 
@@ -38,12 +38,12 @@ fn set(value: u8) {
         asm!("wdr", options(nostack));
         WDTCSR.write_volatile(CHANGE);
         WDTCSR.write_volatile(value);
-        // The new time counts from now on.
+        // The new time starts now.
         asm!("wdr", options(nostack));
     }
 }
 
-/// Switches the watchdog off, and notes why the machine has started. First thing at start-up.
+/// Switches the watchdog off, and stores the cause of the reset. First thing at start-up.
 #[small]
 pub fn begin() {
     // SAFETY: start-up, with interrupts off. The flag in MCUSR is cleared first: while it says that the watchdog has
@@ -57,7 +57,7 @@ pub fn begin() {
     leave(Mark::running(resets::cause(chip, mark)));
 }
 
-/// Returns why the machine has started.
+/// Returns the cause of the last reset.
 #[small]
 pub fn cause() -> Cause {
     // SAFETY: written at start-up, and before a reset.
@@ -71,9 +71,8 @@ pub fn start() {
     set(TIME);
 }
 
-/// Restarts the time of the watchdog: all is well. Not if the step interrupt is off, because then ticks would come
-/// only from the interrupts of serial ports, and motors would crawl from byte to byte. Thread mode, and exec. Cost: 4
-/// cycles.
+/// Restarts the time of the watchdog. Does nothing if the step interrupt is off, because then ticks would come only
+/// from the interrupts of serial ports, one for each byte. Thread mode, and exec. Cost: 4 cycles.
 #[inline(never)]
 #[small]
 pub fn feed() {
@@ -102,7 +101,7 @@ pub fn reset(why: Mark) -> ! {
     }
 }
 
-/// WDT: something has got stuck. It never returns, so it saves no registers.
+/// WDT: the firmware hangs. It never returns, so it saves no registers.
 #[unsafe(no_mangle)]
 extern "C" fn __vector_12() -> ! {
     // SAFETY: interrupts are off; r1 is 0, as the called function expects.
@@ -111,7 +110,7 @@ extern "C" fn __vector_12() -> ! {
 
 extern "C" fn starved() -> ! {
     panic::make_safe();
-    // If this code gets stuck as well, the watchdog, which is on, resets the chip.
+    // If this code hangs too, the watchdog, which is on, resets the chip.
     set(TIME & !(1 << 6));
     reset(Mark::STARVED)
 }

@@ -95,7 +95,7 @@ macro_rules! interrupts {
                     // The status belongs to the byte that is read after it, so it is read first.
                     "lds  r31, {status}",
                     "lds  r24, {data}",
-                    // Letters, digits and dots, most of what comes, are no real-time characters.
+                    // Letters, digits and dots, most of the input, are not real-time characters.
                     "cpi  r24, 0x26",
                     "brlo 61f",
                     "cpi  r24, 0x7E",
@@ -222,7 +222,7 @@ macro_rules! interrupts {
                     "rjmp 16f",
                     "15:",
                     "ldi  r30, {kill}",
-                    // A real-time character. If a loss came with it, that is still to be marked.
+                    // A real-time character. A loss that came with it is still to be marked.
                     "16:",
                     "sbic {step_flags}, {due}",
                     "rcall 68b",
@@ -233,7 +233,7 @@ macro_rules! interrupts {
                     "or   r24, r30",
                     "sts  {shared} + {realtime}, r24",
                     "sbi  {flags}, {special}",
-                    // For some of them the place in the stream counts: queue a mark.
+                    // For some of them the position in the stream matters: queue a mark.
                     "ldi  r24, {cut}",
                     "sbrc r30, {resume_bit}",
                     "ldi  r24, {go}",
@@ -289,7 +289,7 @@ macro_rules! interrupts {
                     "8:",
                     "sbic {step_flags}, {due}",
                     "rcall 68b",
-                    // A resume does without its place, so that no byte is lost for it.
+                    // A resume is not marked then, so that no byte is lost for it.
                     "cpi  r24, {go}",
                     "brne 81f",
                     "lds  r24, {shared} + {realtime}",
@@ -653,7 +653,7 @@ macro_rules! interrupts {
             }
         }
 
-        /// USARTn_TX: the last byte has left, so it lets go of the bus. Interrupts are off for 15 cycles.
+        /// USARTn_TX: the last byte has been sent, so it releases the bus. Interrupts are off for 15 cycles.
         #[unsafe(no_mangle)]
         extern "C" fn $complete() -> ! {
             // SAFETY: it changes no register, and returns by `reti`. The bit of the pin is changed in one
