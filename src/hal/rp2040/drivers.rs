@@ -1,9 +1,9 @@
 //! TMC2209 drivers on one line of UART1. Their settings are sent again and again, because a driver forgets them when
 //! the motors' supply fails.
 //!
-//! Thread mode calls it each millisecond. It writes a datagram of 8 bytes to the UART's FIFO each [`EVERY_MS`], or
-//! each millisecond while a register has a new value. Nothing waits, and nothing is read: a driver that receives
-//! nothing keeps what its pins say. Cost: 300 cycles a datagram.
+//! Thread mode calls it each millisecond. It writes a datagram of 8 bytes to the UART's FIFO each [`EVERY_MS`], or each
+//! millisecond while a register has a new value. Nothing waits, and nothing is read: a driver that receives nothing
+//! works as its pins select. Cost: 300 cycles a datagram.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 

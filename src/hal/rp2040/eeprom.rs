@@ -1,12 +1,12 @@
-//! Memory that keeps its bytes: a copy in RAM, and the same bytes in pieces in the last 64 KiB of the flash, by
+//! Non-volatile memory: a copy in RAM, and its pieces of 32 bytes in the last 64 KiB of the flash, by
 //! `sequential-storage`.
 //!
 //! A byte that is written goes to the copy at once. Its piece of 32 bytes becomes an item of the map in the flash,
 //! whole or not at all. Items of the map are written one after the other over all sectors, so the sectors wear alike.
 //!
-//! **While the flash is written nothing else runs from it**: for 1 ms, and every 80 items for 45 ms, in which a
-//! sector is erased. So a piece waits until the motors rest and no byte has come for [`QUIET_MS`]; until then
-//! [`Memory::is_busy`] is true. The waiting piece takes more bytes meanwhile, so a record of the log is two or three
+//! **While the flash is written nothing else runs from it**: for 1 ms, and every 80 items for 45 ms, in which a sector
+//! is erased. So a piece waits until the motors stand still and no byte has come for [`QUIET_MS`]; until then
+//! [`Memory::is_busy`] is true. The waiting piece takes more bytes meanwhile, so a record of the log makes two or three
 //! items, not one for each byte. At most one piece waits: a write to another piece makes the waiting one be stored at
 //! once.
 //!
@@ -33,7 +33,7 @@ const PIECE: usize = 32;
 /// The size of the flash, and the place of the pieces in it: `memory.x` leaves that part free.
 const FLASH_BYTES: usize = 2 << 20;
 const PLACE: Range<u32> = (FLASH_BYTES - (64 << 10)) as u32..FLASH_BYTES as u32;
-/// If no byte has come for this long, the sender waits for an answer, or has nothing to say.
+/// If no byte has come for this time, ms, the sender waits for an answer, or is idle.
 const QUIET_MS: u32 = 5;
 /// Room for an item, with what the map adds to it.
 const ITEM: usize = 64;
@@ -63,7 +63,7 @@ fn with<R>(act: impl FnOnce(&mut State) -> R) -> R {
     act(unsafe { &mut *STATE.0.get() })
 }
 
-/// Reads the bytes that the flash has kept. Start-up.
+/// Reads the bytes from the flash. Start-up.
 pub(super) fn start(flash: embassy_rp::Peri<'static, FLASH>) {
     let chip = BlockingAsync::new(Flash::new_blocking(flash));
     let mut map = Map::new(chip, const { MapConfig::new(PLACE) }, Cache::new_uncached());
@@ -73,7 +73,7 @@ pub(super) fn start(flash: embassy_rp::Peri<'static, FLASH>) {
     });
 }
 
-/// Copies all pieces to their places. If a piece is there several times, the last one counts. What cannot be read
+/// Copies all pieces to their places. Of several versions of a piece the last one is valid. A piece that cannot be read
 /// stays as if erased.
 fn read(map: &mut Map, bytes: &mut [u8; BYTES]) {
     let mut room = [0; ITEM];
@@ -99,7 +99,7 @@ impl State {
         watchdog::off();
         let mut room = [0; ITEM];
         let mut store = || block_on(map.store_item(&mut room, &number, &piece)).is_ok();
-        // If the map in the flash makes no sense, all of it is erased, and all pieces are written again.
+        // If the map in the flash is corrupt, all of it is erased, and all pieces are written again.
         if !store() {
             let _ = block_on(map.erase_all());
             for (number, piece) in (0..).zip(self.bytes.chunks_exact(PIECE)) {

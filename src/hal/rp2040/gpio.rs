@@ -49,7 +49,7 @@ pub(super) fn connect_pulled(pin: Pin, unit: Unit) {
     PADS_BANK0.gpio(pin.bit.into()).modify(|w| w.set_pue(true));
 }
 
-/// Leaves the pin of an analog channel to the converter. Start-up.
+/// Connects the pin of an analog channel to the converter. Start-up.
 pub(super) fn sense(channel: u8) {
     let pin = usize::from(FIRST_SENSED + channel);
     IO_BANK0.gpio(pin).ctrl().write(|w| w.set_funcsel(NOBODY));
@@ -86,7 +86,7 @@ fn drive(pin: Pin) {
 }
 
 /// Makes the board's output pins outputs: drivers off, hazards off. The level that switches the spindle off is not
-/// known yet, so the pin of its enable is not driven before [`set_low`].
+/// known yet, so its enable pin is not driven before [`set_low`].
 pub(super) fn start() {
     let enables = ACTIVE.motors.iter().filter_map(|motor| motor.enable);
     enables.chain(ACTIVE.enable_all).for_each(|enable| {
@@ -103,7 +103,7 @@ pub(super) fn start() {
     }
 }
 
-/// The motors whose drivers have been asked for, as bits.
+/// The motors whose drivers have been requested, as bits.
 static WANTED: SharedByte = SharedByte::new(0);
 
 /// Returns the motors whose drivers are on, as bits.

@@ -20,9 +20,9 @@ const _: () = assert!(
 
 /// No reading.
 const NONE: u16 = u16::MAX;
-/// How often to look at the converter before it counts as broken: some ten times the time of a conversion.
+/// Polls of the converter before it counts as broken: some ten times the time of a conversion.
 const PATIENCE: usize = 1_000;
-/// How many bits more than a sum of 10-bit conversions the sum has.
+/// Bits by which the sum is longer than a sum of 10-bit conversions.
 const FINER: u32 = 2;
 
 static READING: AtomicU16 = AtomicU16::new(NONE);

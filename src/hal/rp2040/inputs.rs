@@ -5,9 +5,9 @@
 //! | IO_IRQ_BANK0, priority 0 | takes a sample at an edge of a switch; passes edges of the encoder on |
 //! | TIMER_IRQ_1, priority 0 | takes a sample of all pins, when [`Switches`] asks for one |
 //!
-//! While no switch moves none of these interrupts comes. At a limit the sample itself stops the steps, at most 9.4 us
-//! after the edge, of which 3 us pass between two samples. The place of a contact is the place of the generator's
-//! words at the first of two samples; the feeder works out the position ([`stepper::contact`]).
+//! While no switch changes, none of these interrupts comes. At a limit the sample itself stops the steps, at most 9.4
+//! us after the edge, of which 3 us pass between two samples. A contact is recorded as the position in the generator's
+//! words at the first of two samples; the feeder computes the motor position from it ([`stepper::contact`]).
 
 use core::cell::UnsafeCell;
 
@@ -30,7 +30,7 @@ const SOONEST_US: u32 = 2;
 /// Bits of a pin's four events that are edges: falling and rising.
 const EDGES: u32 = 0b1100;
 
-/// The state of sampling, and what thread mode tells it.
+/// The state of sampling, and its parameters from thread mode.
 struct State {
     switches: Switches,
     /// Inputs that are read, as bits. The pins of the others belong to an encoder.
@@ -41,7 +41,7 @@ struct State {
     stops: u16,
     /// Inputs that have stopped the steps since [`take_hits`] took them last.
     hits: u16,
-    /// Ends of axes that are not limits for now.
+    /// Ends of axes that are ignored as limits for now.
     spared: u8,
     /// Inputs that end a move, and in `awaited` the state of each that ends it.
     armed: u16,
@@ -191,7 +191,7 @@ fn sample(state: &mut State) {
         flags::set(Event::Realtime);
     }
     match next {
-        // An edge that came before this sample has been seen by it; an edge that comes later plans another sample.
+        // This sample includes all edges before it; a later edge plans another sample.
         Next::Edge if state.found() == now => {}
         Next::Edge => state.ask(),
         Next::Soon => state.plan(SOON_US),
@@ -210,7 +210,7 @@ pub fn set_up(low: u16, stops: u16) {
     });
 }
 
-/// Leaves the pins of these inputs to an encoder from now on. Thread mode.
+/// Gives the pins of these inputs to an encoder from now on. Thread mode.
 pub(super) fn leave_out(inputs: u16) {
     with(|state| {
         (state.used, state.fresh) = (!inputs, true);
@@ -223,7 +223,7 @@ pub fn left_out() -> u16 {
     with(|state| !state.used)
 }
 
-/// Sets the ends of axes that are not limits for now. Thread mode.
+/// Sets the ends of axes that are ignored as limits for now. Thread mode.
 pub fn spare(ends: u8) {
     with(|state| state.spared = ends);
 }

@@ -20,8 +20,8 @@
 //!
 //! # When full or late
 //!
-//! - **Words** last for half a millisecond to one. If the feeder comes later than that, all motors pause between
-//!   two words: no step is lost, and no step is made twice.
+//! - **Words** last for half a millisecond to one. If the feeder is later than that, all motors pause between two
+//!   words; no step is lost or made twice.
 //! - **A byte** that is not taken before the next one has come is lost, and marked ([`serial`](super::serial)).
 //! - **Entries in buffers** at a stop are counted, not made into steps: see [`stepper::settle`].
 
@@ -79,7 +79,7 @@ pub fn begin() {
     if let Ok(clocks) = ClockConfig::system_freq(ACTIVE.clock_hz) {
         config.clocks = clocks;
     }
-    // Only the flash is taken from the peripherals: pins and units are the board's data.
+    // Only the flash is taken from the peripherals, because pins and units are data of the board.
     let peripherals = embassy_rp::init(config);
     if clk_sys_freq() != ACTIVE.clock_hz {
         panic::halt();

@@ -1,6 +1,5 @@
-//! The last resort. No panic is meant to be reachable after start-up. If one happens all the same, motion and outputs
-//! stop and the machine stays still until it is reset. The message of the panic is told [after the
-//! reset](super::last_words).
+//! The panic handler. No panic is meant to be reachable after start-up. If one happens, motion and outputs stop and the
+//! machine stays still until it is reset. The message of the panic is sent [after the reset](super::last_words).
 
 use super::{gpio, last_words, pwm, stepper, watchdog};
 use crate::boards::ACTIVE;

@@ -1,5 +1,5 @@
-//! The count of milliseconds, which the interrupt of SysTick counts, and its event. Tasks wait by means of
-//! `embassy-rp`'s time driver.
+//! The count of milliseconds, by the interrupt of SysTick, and its event. Tasks wait by means of `embassy-rp`'s time
+//! driver.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 

@@ -1,4 +1,4 @@
-//! How fast the RP2040 is.
+//! Timing constants of the RP2040.
 
 use super::Chip;
 use crate::boards::MOTORS;

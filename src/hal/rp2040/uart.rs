@@ -1,15 +1,15 @@
 //! The serial ports: they move bytes between their lines and two rings each.
 //!
 //! The first port is [USB](super::usb). The other one is a UART without its FIFOs, so that a byte acts when it comes,
-//! not when others have come after it: the handler itself takes real-time characters out. A byte has to be taken
-//! before the next one has come, within 87 us at 115,200 baud.
+//! not when others have come after it: the handler itself removes real-time characters. A byte has to be taken before
+//! the next one has come, within 87 us at 115,200 baud.
 //!
 //! USB brings up to 64 bytes at once. Real-time characters among them act when they come, even if there is no room
 //! for the bytes before them. Those bytes wait ([`Line::behind`]), and the computer waits with the next packet.
 //!
 //! `embassy-rp`'s buffered driver has rings of its own, from which a task takes the bytes: a `!` would wait for the
-//! turn of a task, up to 10 ms of a busy CPU. So these handlers are our own. Thread mode and exec share the state of
-//! a port with them with interrupts off.
+//! turn of a task, up to 10 ms of a busy CPU. So Kerf has its own handlers. Thread mode and exec share the state of a
+//! port with them with interrupts off.
 //!
 //! Where bytes are lost, because a ring was full or the hardware overran, a mark tells the reader: see
 //! [`serial`](crate::hal::serial).
@@ -87,7 +87,7 @@ impl Filling {
     }
 }
 
-/// Bytes of a packet that are handled at a time with interrupts off: some microseconds.
+/// Bytes of a packet that are handled at once with interrupts off, which takes some microseconds.
 const AT_ONCE: usize = 32;
 /// Like [`AT_ONCE`], for bytes that are looked at one by one.
 const ONE_BY_ONE: usize = 8;
@@ -107,7 +107,7 @@ struct Line {
     open: bool,
     /// The other side has sent XOFF.
     held: bool,
-    /// Whether XOFF and XON from the other side count.
+    /// Whether XOFF and XON from the other side are obeyed.
     heeds_xoff: bool,
     /// Whether XOFF has stopped the sender.
     stopped: bool,
@@ -308,7 +308,7 @@ impl Line {
         sent
     }
 
-    /// Takes the byte that leaves next; `None` if nothing may leave.
+    /// Takes the byte to send next; `None` if nothing may be sent.
     fn next(&mut self) -> Option<u8> {
         let may_pass = self.wait_ms == 0 || !self.open;
         if let Some(ahead) = self.ahead.take_if(|_| may_pass) {
@@ -332,8 +332,8 @@ impl Line {
         flags::set(Event::Received);
     }
 
-    /// Queues the mark of a real-time character. If there is no room, the mark becomes that of a loss; a resume goes
-    /// without a place.
+    /// Queues the mark of a real-time character. If there is no room, the mark becomes that of a loss; a resume is then
+    /// not marked.
     fn place(&mut self, character: u8) {
         let Some(ring) = self.rx.as_mut() else { return };
         match ring.is_full() {
@@ -381,7 +381,7 @@ impl Line {
         Came::Text
     }
 
-    /// Adds what a character asks of the overrides. Returns whether it asks anything.
+    /// Adds the override request of a character. Returns whether it is one.
     fn ask(&mut self, byte: u8) -> bool {
         let last = self.asked.back().copied().unwrap_or(Asked::NOTHING);
         let is_far = last.percent.iter().any(|percent| percent.unsigned_abs() > FAR);
@@ -397,8 +397,8 @@ impl Line {
         true
     }
 
-    /// Handles a byte that has come by USB. If there is no room, text waits. A mark is queued after everything that
-    /// waits has been queued, or lost; a resume goes without a place.
+    /// Handles a byte that has come by USB. If there is no room, text waits. A mark is queued after all waiting bytes
+    /// have been queued or lost; a resume is then not marked.
     fn bring(&mut self, byte: u8) {
         let waits = !self.behind.is_empty() || self.rx.as_ref().is_none_or(Filling::is_full);
         match self.act(byte, true) {
@@ -448,8 +448,8 @@ impl Line {
         count > 0 && self.behind.is_empty()
     }
 
-    /// Takes bytes that leave next and lie side by side. Returns how many; 0 also if a byte is to leave ahead of
-    /// them.
+    /// Takes the next bytes to send that are contiguous in the ring. Returns how many; 0 also if a byte is to be sent
+    /// ahead of them.
     fn take_run(&mut self, to: &mut [u8]) -> usize {
         if self.held || self.ahead.is_some() {
             return 0;
@@ -573,7 +573,7 @@ pub fn take_closed() -> bool {
     usb::take_closed()
 }
 
-/// Takes what is to leave by USB next. Returns how many bytes it is.
+/// Takes the bytes to send by USB next. Returns how many.
 pub(super) fn take(packet: &mut [u8]) -> usize {
     let mut count = 0;
     while let Some(to) = packet.get_mut(count..).filter(|to| !to.is_empty()) {
@@ -594,8 +594,8 @@ pub(super) fn take(packet: &mut [u8]) -> usize {
     count
 }
 
-/// Whether what is to leave by USB should leave now: it fills a packet, or it is a whole answer and no other line
-/// waits for its answer.
+/// Whether the bytes for USB should be sent now: they fill a packet, or are a whole answer while no other line waits
+/// for its answer.
 pub(super) fn is_due() -> bool {
     let used = USB_TX.used();
     used >= PACKET - 1 || used > 0 && USB_RX.used() == 0
@@ -671,7 +671,7 @@ pub fn last_cut(port: u8) -> Option<u8> {
     last_mark(&ring)
 }
 
-/// Whether a `!` has come, on any port, that nobody has taken yet. Any level.
+/// Whether a `!` has come, on any port, that has not been taken yet. Any level.
 pub fn asks_hold() -> bool {
     (0..PORTS as u8).any(|port| with(port, |line| line.realtime & realtime::HOLD != 0))
 }
@@ -691,7 +691,7 @@ pub fn take_realtime(port: u8) -> u8 {
     with(port, |line| core::mem::take(&mut line.realtime))
 }
 
-/// Ends the lines of which a part has been sent. The rest of what the rings hold is never sent. Interrupts are off,
+/// Completes lines that have been sent in part. The remaining contents of the rings are never sent. Interrupts are off,
 /// and stay so.
 pub(super) fn end_lines() {
     for port in 0..PORTS as u8 {

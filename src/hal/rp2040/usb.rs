@@ -4,9 +4,9 @@
 //! acts when its packet comes. After a packet that the receive ring has no room for, no other one is taken: the
 //! computer is told to wait (NAK) until all of that packet has been queued.
 //!
-//! Nobody listens while no program has the port open, or while the bus sleeps. Output is dropped then, so that no
-//! task waits for it. Only the first [`KEPT`] bytes after start-up, with the greeting, are kept for the first program
-//! that opens the port. Tasks are told when another program opens it ([`take_opened`]).
+//! While no program has the port open, or while the bus sleeps, output is dropped, so that no task waits for it. Only
+//! the first [`KEPT`] bytes after start-up, with the greeting, are kept for the first program that opens the port.
+//! Tasks are told when another program opens it ([`take_opened`]).
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
@@ -29,7 +29,7 @@ use crate::hal::event::Event;
 
 /// The longest packet of a full-speed bus.
 pub(super) const PACKET: usize = 64;
-/// Output is cut into pieces that are shorter than a packet, so that none needs an empty packet behind it.
+/// Output is cut into pieces that are shorter than a packet, so that none needs an empty packet after it.
 const PIECE: usize = PACKET - 1;
 /// Bytes kept for the first program that opens the port.
 const KEPT: usize = 256 + last_words::LINE;
@@ -46,16 +46,16 @@ bind_interrupts!(struct Handlers {
 
 /// All received bytes have been queued: the next packet may come.
 pub(super) static ROOM: Signal<CriticalSectionRawMutex, ()> = Signal::new();
-/// There may be something to send, or somebody to send it to.
+/// There may be something to send, or a program may have opened the port.
 static NEWS: Signal<CriticalSectionRawMutex, ()> = Signal::new();
-/// A piece is being sent. What is put meanwhile leaves after it.
+/// A piece is being sent. Output written meanwhile is sent after it.
 static SENDS: AtomicBool = AtomicBool::new(false);
 /// The bus sleeps, or its cable is out.
 static ASLEEP: AtomicBool = AtomicBool::new(false);
 
-/// A program, not the first, has opened the port, and nobody has taken this yet.
+/// A program, not the first, has opened the port, and this has not been taken yet.
 static OPENED: AtomicBool = AtomicBool::new(false);
-/// The program has closed the port, and nobody has taken this yet.
+/// The program has closed the port, and this has not been taken yet.
 static CLOSED: AtomicBool = AtomicBool::new(false);
 
 /// Notices when the bus sleeps.
@@ -138,7 +138,7 @@ pub(super) fn kick() {
     }
 }
 
-/// Lets what is there leave. Any level.
+/// Has all waiting output sent. Any level.
 pub(super) fn flush() {
     if !SENDS.load(Ordering::Relaxed) {
         NEWS.signal(());
@@ -191,7 +191,7 @@ async fn tell(mut sender: Sender<'static, Driver>, control: ControlChanged<'stat
         if piece.is_empty() {
             select(NEWS.wait(), control.control_changed()).await;
         } else if hears {
-            // If nobody listens any more, the piece is dropped.
+            // If the port has been closed, the piece is dropped.
             SENDS.store(true, Ordering::Relaxed);
             select(sender.write_packet(piece), silence(&control)).await;
             SENDS.store(false, Ordering::Relaxed);
@@ -206,7 +206,7 @@ fn hears(control: &ControlChanged<'_>) -> bool {
     control.dtr() && !ASLEEP.load(Ordering::Relaxed)
 }
 
-/// Waits until nobody listens any more.
+/// Waits until no program has the port open.
 async fn silence(control: &ControlChanged<'_>) {
     while hears(control) {
         select(NEWS.wait(), control.control_changed()).await;
@@ -243,7 +243,7 @@ impl Door {
     }
 }
 
-/// What was said before anybody listened.
+/// Output from before a program has opened the port.
 struct First {
     bytes: Deque<u8, KEPT>,
     keeps: bool,

@@ -1,4 +1,4 @@
-//! The watchdog, and why the machine has started.
+//! The watchdog, and the cause of the last reset.
 //!
 //! After [`start`] the firmware has [`TIME_US`] between two calls of [`feed`]; if it is late, the chip resets. A
 //! scratch register, which this reset does not clear, keeps a [`Mark`]. After a reset all pins are inputs.
@@ -29,7 +29,7 @@ fn left() -> Mark {
     Mark(WATCHDOG.scratch0().read() as u16)
 }
 
-/// Notes why the machine has started. First thing at start-up.
+/// Stores the cause of the reset. First thing at start-up.
 pub(super) fn begin() {
     off();
     let reason = WATCHDOG.reason().read();
@@ -44,7 +44,7 @@ pub(super) fn begin() {
     leave(Mark::running(resets::cause(bits, left())));
 }
 
-/// Returns why the machine has started.
+/// Returns the cause of the last reset.
 pub fn cause() -> Cause {
     left().cause().unwrap_or(Cause::PowerOn)
 }
@@ -56,7 +56,7 @@ pub(super) fn start() {
     WATCHDOG.ctrl().modify(|w| w.set_enable(true));
 }
 
-/// Restarts the time of the watchdog: all is well. Thread mode, and exec.
+/// Restarts the time of the watchdog. Thread mode, and exec.
 pub fn feed() {
     WATCHDOG.load().write_value(Load(2 * TIME_US));
 }

@@ -24,7 +24,7 @@ const HALF_TAKEN: [core::ops::RangeInclusive<u8>; 2] = [1..=4, 10..=12];
 const TAKEN: u8 = 13;
 /// Bit of the interrupt flag that a marked entry raises.
 const MARKED: u32 = 1;
-/// How often [`place`] looks again when the state machine moves on meanwhile.
+/// How often [`place`] reads again when the state machine moves on meanwhile.
 const TRIES: u8 = 8;
 /// Words of an entry.
 const WORDS: u32 = 2;
@@ -259,13 +259,13 @@ impl Chunk {
     }
 }
 
-/// Returns how far entries have been carried out right now. Any level. Cost: 80 cycles.
+/// Returns how far entries have been carried out. Any level. Cost: 80 cycles.
 pub fn place() -> Place {
     let mut found = Place::NONE;
     if SENT.load(Relaxed) == 0 {
         return found;
     }
-    // If the state machine moves on meanwhile, it is looked at again. In each entry that happens for a moment only.
+    // If the state machine moves on meanwhile, its state is read again. In each entry that happens for a moment only.
     for _ in 0..TRIES {
         let (place, waiting) = (sent(), waiting());
         let at = PIO0.sm(SM).addr().read().addr();

@@ -1,6 +1,6 @@
 //! Steps: a state machine of PIO0, which two DMA channels feed in turn with words from RAM.
 //!
-//! An entry of two words makes a rest, a pulse, and sets the pins for it ([`words`]). The state machine runs at the
+//! An entry of two words is a pause, a pulse, and the pins for that pulse ([`words`]). The state machine runs at the
 //! system clock, so each edge comes at its exact cycle whatever the CPU does, and all motors share one time base. The
 //! pins may be anywhere, because an entry has bits for all pins of the chip.
 //!
@@ -14,8 +14,8 @@
 //! place are steps that have not been made: after a stop [`settle`] subtracts them from the position, and the place
 //! of a contact is computed from them.
 //!
-//! **When late.** Two chunks are ready, each at least [`CHUNK_CYCLES`] long unless segments come late. If the feeder
-//! comes later than that, all pins keep their levels until it does; no step is lost.
+//! **When late.** Two chunks are ready, each at least [`CHUNK_CYCLES`] long unless segments come late. If the feeder is
+//! later than that, all pins keep their levels until it runs; no step is lost.
 
 mod feeder;
 mod machine;
@@ -95,7 +95,7 @@ pub fn running() -> bool {
     RUNNING.load(Relaxed) && !is_stopped()
 }
 
-/// Always returns `u32::MAX`, unknown: what the feeder has made of the running segment still waits to be sent. Exec.
+/// Always returns `u32::MAX`, unknown: the entries of the running segment still wait to be sent. Exec.
 pub fn left() -> u32 {
     u32::MAX
 }

@@ -9,8 +9,8 @@
 //! Ticks without a step have no entry; they lengthen the rest before the next entry. Directions change after the last
 //! pulse with the old directions, one tick before the first pulse with the new ones.
 //!
-//! Time is counted in cycles of the system clock. An entry lasts at least [`Writer::least`]. If it ought to be
-//! shorter, it lasts that long all the same, and the rests of the entries behind it make up for the delay.
+//! Time is counted in cycles of the system clock. An entry lasts at least [`Writer::least`]. An entry that ought to be
+//! shorter is extended to that, and the rests of the entries after it make up for the delay.
 
 use crate::boards::{MOTORS, MotorPins};
 use crate::dda::{Dda, Pins, SEGMENTS, STEP};
@@ -41,7 +41,7 @@ pub const CYCLES_PER_US: u32 = 128;
 /// See [`CYCLES_PER_US`].
 pub const CYCLES_PER_COUNT: u32 = 2;
 
-/// The shortest pulse, cycles: what the setting calls 0 us.
+/// The shortest pulse, cycles, which the setting 0 us selects.
 const SHORTEST: i32 = CYCLES_PER_US as i32 / 2;
 
 /// Pairs of motors: the phases of a pair are added at once.
@@ -125,7 +125,7 @@ impl<'a> List<'a> {
     }
 }
 
-/// What the entries have put at the pins, and since when.
+/// The levels that the entries have set at the pins, and since when.
 pub struct Writer {
     wiring: &'static Wiring,
     /// The pins between pulses.
@@ -287,7 +287,7 @@ fn pairs(values: &[u16; MOTORS]) -> [u32; PAIRS] {
     pairs
 }
 
-/// Turns what the generator says of a segment into entries.
+/// Turns the outputs of the generator into entries.
 pub struct Out<'a, 'b> {
     /// Keeps the state of the pins.
     pub writer: &'a mut Writer,
