@@ -1,79 +1,79 @@
-//! From temperatures to power: PID with its integral held in bounds, or on and off with a hysteresis.
+//! Temperature control: PID with anti-windup, or on-off control with a hysteresis.
 //!
 //! Stepped five times a second. Temperatures are in 1/64 degree. Full power is 255. Farther than [`RANGE`] from the
-//! target the power is full or 0; within it
+//! target the power is full or 0. Within this range it is
 //!
 //! `power = p * error + sum of i * error * time - d * change in a second + f * fan`
 //!
-//! with the integral growing only while the power is within its bounds, or where it leads back there. With `p` 0 the
-//! heater is switched on half the hysteresis below the target, and off half the hysteresis above it. Cost of a step:
-//! 2,500 cycles.
+//! The integral changes only while the power is within its bounds, or towards them. With `p` 0 the heater is switched
+//! on half the hysteresis below the target, and off half the hysteresis above it. Cost of a step: 2,500 cycles.
 
 use super::sensor::UNIT;
 
 /// Steps in a second.
 pub const STEPS: i32 = 5;
-/// All there is.
+/// Full power.
 pub const FULL: u8 = 255;
-/// The factors count when the temperature is within this distance of the target, 1/64 degree.
+/// PID control is used within this distance of the target, 1/64 degree.
 const RANGE: i16 = 12 * UNIT;
-/// What factors are counted in: hundredths.
+/// The unit of factors: hundredths.
 const HUNDREDTHS: i32 = 100;
 
 /// The factors of a heater.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Factors {
-    /// Hundredths of power for a degree.
+    /// Proportional: hundredths of power per degree.
     pub p: u16,
-    /// Hundredths of power a second for a degree.
+    /// Integral: hundredths of power per degree and second.
     pub i: u16,
-    /// Hundredths of power for a degree a second.
+    /// Derivative: hundredths of power per degree a second.
     pub d: u16,
-    /// Power beside that while the fan is at full.
+    /// Feed-forward: additional power while the fan runs at full speed.
     pub fan: u8,
-    /// How far the temperature goes without a change where `p` is 0, 1/64 degree.
+    /// Width of the hysteresis if `p` is 0, 1/64 degree.
     pub hysteresis: u16,
 }
 
-/// What is kept from step to step.
+/// The state of the control.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Control {
-    /// The sum, in hundredths of power by 1/64 degree by a step.
+    /// The integral, in hundredths of power by 1/64 degree by a step.
     sum: i32,
-    /// How fast it gets hotter, 1/64 degree a step, smoothed, in sixteenths.
+    /// Smoothed rise of the temperature a step, in sixteenths of 1/64 degree.
     slope: i16,
-    /// The temperature of the step before.
+    /// The temperature in the last step, 1/64 degree.
     last: i16,
-    /// The power of the step before.
+    /// The power of the last step.
     power: u8,
 }
 
-/// The sum that is all the power.
+/// The integral that gives full power.
 const SUM_MAX: i32 = FULL as i32 * HUNDREDTHS * UNIT as i32 * STEPS;
 
 #[small]
 impl Control {
-    /// At start-up.
+    /// The state at start-up.
     pub const OFF: Self = Self { sum: 0, slope: 0, last: 0, power: 0 };
 
-    /// How much power it has now.
+    /// The present power, 255 for full power.
     pub fn power(&self) -> u8 {
         self.power
     }
 
-    /// Off. How fast it gets colder is measured on.
+    /// Switches off. The slope of the temperature is still measured.
     pub fn stop(&mut self, now: i16) {
         self.measure(now);
         (self.sum, self.power) = (0, 0);
     }
 
-    /// The power of the next step is this.
+    /// Sets the power of the next step.
     pub fn drive(&mut self, now: i16, power: u8) {
         self.measure(now);
         (self.sum, self.power) = (0, power);
     }
 
-    /// The power of the next step, to get from `now` to `wanted`.
+    /// Returns the power of the next step, to get from `now` to `wanted`, 1/64 degree; `fan` is the fan's speed, 255
+    /// for full.
     #[inline(never)]
     pub fn step(&mut self, now: i16, wanted: i16, fan: u8, factors: &Factors) -> u8 {
         self.measure(now);
@@ -96,7 +96,7 @@ impl Control {
         let change = i32::from(now) - i32::from(self.last);
         let change = change.clamp(-200, 200) as i16;
         self.last = now;
-        // Smoothed over a second and a half.
+        // A low-pass filter with a time constant of a second and a half.
         self.slope += (change * 16 - self.slope) / 8;
     }
 
@@ -126,7 +126,8 @@ impl Control {
     }
 }
 
-/// The power of a pin until the next sample: what is asked for where the chip makes pulses of it, else all or nothing, [spread].
+/// Returns the power of a pin until the next sample: `power` if the chip makes PWM of it, else full or none
+/// ([`spread`]).
 #[small]
 pub fn level(pulsed: bool, owed: &mut u8, power: u8) -> u8 {
     match pulsed {
@@ -136,7 +137,8 @@ pub fn level(pulsed: bool, owed: &mut u8, power: u8) -> u8 {
     }
 }
 
-/// Spreads power over samples: on so often that it is on for its share of the time.
+/// Pulse-density modulation: returns whether the pin is on until the next sample, so that its share of time on is
+/// `power`.
 #[small]
 pub fn spread(owed: &mut u8, power: u8) -> bool {
     if power == FULL {

@@ -1,81 +1,81 @@
-//! What may be wrong with a heater, by its temperature alone.
+//! Heater faults that its temperature alone shows.
 //!
-//! | phase | it is | leads on | is a fault |
+//! | phase | condition | next phase | fault |
 //! |---|---|---|---|
-//! | off | wanted cold | wanted hot: heats, or cools if it is hotter | 20 degrees hotter than it has been since, and above 70: [`HeatRunaway`](Status::HeatRunaway), a transistor that stays on |
-//! | heats | more than [`NEAR`] colder than wanted | near: holds | less than [`RISE`] hotter in the time for it: [`HeatTooSlow`](Status::HeatTooSlow) |
-//! | holds | near, or has been | another temperature is wanted | [`FAR`] colder or hotter than wanted for [`AWAY_S`]: [`HeatRunaway`](Status::HeatRunaway) |
-//! | cools | more than [`NEAR`] hotter than wanted | near: holds | 20 degrees hotter than it has been since: [`HeatRunaway`](Status::HeatRunaway) |
-//! | any | hotter than its maximum and [`BEYOND`] | | [`TooHot`](Status::TooHot) |
+//! | off | no target | a target: heats, holds or cools, by the temperature | 20 degrees above the lowest temperature since, and above 70: [`HeatRunaway`](Status::HeatRunaway), a transistor that stays on |
+//! | heats | more than [`NEAR`] below the target | near: holds | a rise of less than [`RISE`] in [`Rule::rise_s`]: [`HeatTooSlow`](Status::HeatTooSlow) |
+//! | holds | near the target, or has been | another target | more than [`FAR`] from the target for [`AWAY_S`]: [`HeatRunaway`](Status::HeatRunaway) |
+//! | cools | more than [`NEAR`] above the target | near: holds | 20 degrees above the lowest temperature since: [`HeatRunaway`](Status::HeatRunaway) |
+//! | any | | | more than [`BEYOND`] above the maximum: [`TooHot`](Status::TooHot) |
 //!
-//! A sensor that is broken is a fault before that ([`Broken`](super::sensor::Broken)). Stepped five times a second. Temperatures are in 1/64 degree.
-//! Cost: 150 cycles.
+//! A broken sensor is found earlier ([`Broken`](super::sensor::Broken)). Stepped five times a second. Temperatures are
+//! in 1/64 degree. Cost: 150 cycles.
 
 use super::control::STEPS;
 use super::sensor::UNIT;
 use crate::status::Status;
 
-/// Within this distance of the target the heater counts as there.
+/// Within this distance of the target the target counts as reached.
 pub const NEAR: i16 = 3 * UNIT;
-/// At this distance from the target the heater counts as run away, after [`AWAY_S`].
+/// Beyond this distance from the target, for [`AWAY_S`], the heater counts as run away.
 pub const FAR: i16 = 10 * UNIT;
-/// How long a heater may be [`FAR`] from its target, seconds.
+/// How long a heater may be more than [`FAR`] from its target, seconds.
 pub const AWAY_S: u16 = 30;
-/// A heater must get this much hotter within [`Rule::rise_s`].
+/// The least rise of a heater's temperature within [`Rule::rise_s`].
 pub const RISE: i16 = 2 * UNIT;
 /// How far above its maximum a heater may get.
 pub const BEYOND: i16 = 15 * UNIT;
-/// A heater that is off may get this much hotter, by the heat beside it and the heat that it held.
+/// The most by which the temperature of a heater may rise while it is off, from stored heat and other heaters.
 const BY_ITSELF: i16 = 20 * UNIT;
-/// A heater that is off may get up to this temperature, however cold it was.
+/// Up to this temperature a heater that is off has no fault, however cold it was.
 const WARM: i16 = 70 * UNIT;
 
-/// What holds for a heater.
+/// The limits of a heater.
 #[derive(Clone, Copy, Debug)]
 pub struct Rule {
     /// How long [`RISE`] may take, seconds.
     pub rise_s: u16,
-    /// How hot it may be made, 1/64 degree.
+    /// Maximum temperature, 1/64 degree.
     pub hottest: i16,
 }
 
-/// See the table above.
+/// The phase of a heater: see the table of this module.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Phase {
-    /// Wanted cold.
+    /// No target.
     #[default]
     Off,
-    /// On its way up.
+    /// On the way up to the target.
     Heats,
-    /// There.
+    /// At the target.
     Holds,
-    /// On its way down.
+    /// On the way down to the target.
     Cools,
 }
 
-/// What is known of a heater's way.
+/// The supervision of a heater.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Watch {
     phase: Phase,
-    /// Where it began to heat, or the coldest since.
+    /// In `Heats`: the temperature from which the rise is measured. In `Off` and `Cools`: the lowest temperature since.
     mark: i16,
-    /// Steps left until it has to be better.
+    /// Steps left until a fault.
     left: u16,
-    /// What was wanted in the step before.
+    /// The target of the last step, 0 for off.
     wanted: i16,
 }
 
 #[small]
 impl Watch {
-    /// At start-up.
+    /// The state at start-up.
     pub const OFF: Self = Self { phase: Phase::Off, mark: 0, left: 0, wanted: 0 };
 
-    /// The phase it is in.
+    /// The present phase.
     pub fn phase(&self) -> Phase {
         self.phase
     }
 
-    /// Looks at the temperature `now`, where `wanted` is wanted, 0 for off.
+    /// Checks the temperature `now`; `wanted` is the target, 0 for off. The error is the fault.
     #[inline(never)]
     pub fn step(&mut self, now: i16, wanted: i16, rule: &Rule) -> Result<(), Status> {
         if now > rule.hottest.saturating_add(BEYOND) {
@@ -89,7 +89,7 @@ impl Watch {
         match self.phase {
             Phase::Off | Phase::Cools => {
                 if self.left == 0 {
-                    // The first of all.
+                    // The first step after start-up.
                     (self.mark, self.left) = (now, 1);
                 }
                 self.mark = self.mark.min(now);
@@ -112,7 +112,7 @@ impl Watch {
         Ok(())
     }
 
-    /// Begins to watch for another target.
+    /// Begins with another target.
     fn begin(&mut self, now: i16, error: i16, rule: &Rule) {
         (self.mark, self.left) = (now, steps(rule.rise_s));
         self.phase = match () {
@@ -130,7 +130,7 @@ impl Watch {
         (self.phase, self.left) = (Phase::Holds, steps(AWAY_S));
     }
 
-    /// A step without getting better.
+    /// Counts a step without improvement.
     fn pass(&mut self, fault: Status) -> Result<(), Status> {
         match self.left {
             0 => Err(fault),
@@ -142,7 +142,7 @@ impl Watch {
     }
 }
 
-/// Steps in so many seconds.
+/// Converts seconds to steps.
 const fn steps(seconds: u16) -> u16 {
     seconds * STEPS as u16
 }
@@ -173,7 +173,7 @@ mod tests {
         watch
     }
 
-    /// What comes of a temperature that stays, in each phase, and after how many seconds at most.
+    /// The result of a constant temperature in each phase, and the seconds until a fault at most.
     #[test]
     fn every_phase_knows_its_faults() {
         use Phase::{Cools, Heats, Holds, Off};

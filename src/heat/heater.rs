@@ -1,6 +1,7 @@
 //! A heater with its sensor: readings in, power out.
 //!
-//! Sampled each 40 ms; five samples make a [step](super::control), of their mean. Cost of a sample: 3,000 cycles, of one with a step 6,000.
+//! Sampled every 40 ms. Every five samples their mean makes a [step](super::control) of the control. Cost of a sample:
+//! 3,000 cycles; 6,000 with a step.
 
 use super::control::{Control, Factors, STEPS, level};
 use super::fault::{Rule, Watch};
@@ -11,13 +12,13 @@ use crate::boards::PULSED;
 use crate::config::groups::hot_end;
 use crate::status::Status;
 
-/// Readings that may be missing one after the other.
+/// Missing readings in a row that count as an open sensor.
 const MISSING: u8 = 3;
-/// Looks from one reading of a MAX6675 to the next: 240 ms.
+/// Samples from one reading of a MAX6675 to the next: 240 ms.
 const ASKED_EVERY: u8 = 6;
-/// Samples at which it may be out of reach, while an SD card has a block on its way: 160 ms.
+/// Samples for which a MAX6675 may be unreadable, while a block of the SD card is being transferred: 160 ms.
 const DENIED: u8 = 4;
-/// How long the hot end and the bed may take for two degrees, seconds.
+/// [`Rule::rise_s`] of the hot end and of the bed.
 const RISE_S: [u16; HEATERS] = [20, 90];
 
 /// A heater with its sensor.
@@ -25,9 +26,9 @@ const RISE_S: [u16; HEATERS] = [20, 90];
 pub struct Heater {
     kind: Kind,
     factors: Factors,
-    /// How hot it may be made, 1/64 degree.
+    /// Maximum temperature, 1/64 degree.
     hottest: i16,
-    /// How hot it must be to extrude, 1/64 degree.
+    /// Minimum temperature to extrude, 1/64 degree.
     least: i16,
     control: Control,
     watch: Watch,
@@ -35,28 +36,28 @@ pub struct Heater {
     sum: i32,
     samples: u8,
     missing: u8,
-    /// What a MAX6675 has sent last, and looks until it is asked again.
+    /// The last word of a MAX6675; in `rests`, samples until it is read again.
     word: u16,
     rests: u8,
     denied: u8,
     owed: u8,
-    /// How hot it is, 1/64 degree.
+    /// Present temperature, 1/64 degree.
     now: i16,
     level: u8,
 }
 
-/// What a sample has found.
+/// What a sample has done.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Seen {
-    /// A sample between two steps.
+    /// It was a sample between two steps.
     Sample,
-    /// A step.
+    /// It completed a step.
     Step,
 }
 
 #[small]
 impl Heater {
-    /// Off, without settings.
+    /// A heater that is off, without settings.
     pub const OFF: Self = Self {
         kind: Kind::None,
         factors: Factors { p: 0, i: 0, d: 0, fan: 0, hysteresis: 0 },
@@ -75,7 +76,8 @@ impl Heater {
         level: 0,
     };
 
-    /// Takes over the value of a setting, scaled as kept: a row of the hot end, with which those of the bed agree.
+    /// Sets the value of a setting, scaled as stored. `row` is the row in the group of the hot end; the rows of the bed
+    /// have equal numbers.
     #[inline(never)]
     pub fn set(&mut self, row: u8, value: i32) {
         let degrees = |value: i32| (value * i32::from(UNIT)) as i16;
@@ -93,44 +95,46 @@ impl Heater {
         }
     }
 
-    /// How hot lines may make it, eighths of a degree; 0 without a sensor.
+    /// The highest target that lines may set, eighths of a degree; 0 without a sensor.
     pub fn hottest(&self) -> u16 {
         if self.kind == Kind::None { 0 } else { self.hottest.unsigned_abs() / 8 }
     }
 
-    /// How hot it must be for filament to be moved, degrees.
+    /// The minimum temperature to move filament, degrees.
     pub fn least(&self) -> i16 {
         self.least / UNIT
     }
 
-    /// Whether it is colder than filament asks for by more than this, 1/64 degree. None is too cold where there is no sensor.
+    /// Whether the temperature is more than `by`, 1/64 degree, below the minimum to move filament. Always false without
+    /// a sensor.
     pub fn is_cold(&self, by: i16) -> bool {
         self.kind != Kind::None && self.now < self.least.saturating_sub(by)
     }
 
-    /// The power of its pin until the next sample, 255 for all.
+    /// The power of the heater's pin until the next sample, 255 for full power.
     pub fn level(&self) -> u8 {
         self.level
     }
 
-    /// Off at once.
+    /// Switches off at once.
     pub fn stop(&mut self) {
         self.level = 0;
         self.control.stop(self.now);
     }
 
-    /// How it stands, where this is wanted.
+    /// Returns the state that reports show, for the target `to`, eighths of a degree.
     pub fn standing(&self, to: u16) -> Standing {
         Standing { now: self.now / 8, to, power: self.control.power() }
     }
 
-    /// How far it is from what is wanted, 1/64 degree; above 0 if it is too cold.
+    /// Returns the distance to the target `to` (eighths of a degree), 1/64 degree; above 0 if the heater is too cold.
     pub fn error(&self, to: u16) -> i16 {
         in_units(to).saturating_sub(self.now)
     }
 
-    /// The reading of its sensor: what the converter has, or of a MAX6675 what `ask` has been sent, each sixth sample. Where there is none
-    /// for now it is asked for again at the next sample, and counts as missing after [`DENIED`].
+    /// Returns the reading of the sensor: `converted`, from the converter, or the word of a MAX6675, for which `ask` is
+    /// called at every sixth sample. If `ask` returns none, the last word is used and `ask` is called again at the next
+    /// sample; after [`DENIED`] samples the reading counts as missing.
     pub fn reading(
         &mut self,
         converted: Option<u16>,
@@ -150,8 +154,8 @@ impl Heater {
         Some(self.word)
     }
 
-    /// Takes a reading, `None` if it is not there in time. `number` is 0 for the hot end, `to` what is wanted, eighths of a degree. A fault
-    /// leaves it off. A `tune` that is under way says how much power it has.
+    /// Takes a reading, `None` if it is missing. `number` is 0 for the hot end; `to` is the target, eighths of a
+    /// degree; an autotune under way, `tune`, sets the power. The error is a fault, which leaves the heater off.
     #[inline(never)]
     pub fn sample(
         &mut self,
@@ -176,7 +180,7 @@ impl Heater {
         seen
     }
 
-    /// The mean temperature, when it is due. A broken sensor of a heater that is off is none.
+    /// Returns the mean temperature if a step is due. A broken sensor is no fault while the heater is off.
     fn read(&mut self, reading: Option<u16>, wanted: i16) -> Result<Option<i16>, Status> {
         let read = match reading {
             Some(reading) => {
@@ -235,13 +239,13 @@ impl Heater {
     }
 }
 
-/// Eighths of a degree in 1/64.
+/// Converts eighths of a degree to 1/64 degree.
 #[small]
 pub fn in_units(to: u16) -> i16 {
     (to.min(4_000) * 8) as i16
 }
 
-/// The rows of both heaters that mean the same have the same number.
+/// Equivalent rows of both heaters have equal numbers.
 const _: () = {
     use crate::config::groups::bed;
     assert!(bed::K == hot_end::K && bed::P == hot_end::P && bed::I == hot_end::I);

@@ -1,6 +1,6 @@
-//! Heaters, their sensors and the fan: the decisions, without any pin.
+//! Heaters, their sensors and the fan: control and supervision, without access to pins.
 //!
-//! A printer has a hot end, a bed and a fan that cools what has been printed. What they are to be is said by lines ([`Orders`], which exec
+//! A printer has a hot end, a bed and a part cooling fan. Program lines set their targets ([`Orders`], which exec
 //! changes in step with motion). Temperatures are integers, in eighths of a degree Celsius.
 
 pub mod control;
@@ -12,17 +12,17 @@ pub mod tune;
 use crate::capability::Capability;
 use crate::gcode::heating::{Heat, Part};
 
-/// How many machines there are with heaters: none in an image that cannot print.
+/// The number of machines with heaters: 0 in an image that cannot print, else 1.
 pub const PRINTERS: usize = Capability::Printer.is_built_in() as usize;
 /// The hot end and the bed, in this order.
 pub const HEATERS: usize = 2;
 
-/// What program lines have asked for so far.
+/// The targets that program lines have set.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Orders {
-    /// How hot each heater is to be, eighths of a degree; 0 for off.
+    /// Target of each heater, eighths of a degree; 0 for off.
     pub to: [u16; HEATERS],
-    /// How fast the fan is to be, 255 for all it can.
+    /// Speed of the fan, 255 for full speed.
     pub fan: u8,
 }
 
@@ -31,7 +31,7 @@ impl Orders {
     /// Everything off.
     pub const OFF: Self = Self { to: [0; HEATERS], fan: 0 };
 
-    /// Does what a line asks for. Cost: 60 cycles.
+    /// Takes over the targets of a line. Cost: 60 cycles.
     pub fn carry_out(&mut self, heat: &Heat) {
         let Some(to) = heat.to else { return };
         let [hot_end, bed] = &mut self.to;
@@ -44,14 +44,14 @@ impl Orders {
     }
 }
 
-/// How a heater stands.
+/// The state of a heater that reports show.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Standing {
-    /// How hot it is, eighths of a degree.
+    /// Present temperature, eighths of a degree.
     pub now: i16,
-    /// How hot it is to be, eighths of a degree; 0 for off.
+    /// Target, eighths of a degree; 0 for off.
     pub to: u16,
-    /// How much of its power it has, 255 for all.
+    /// Present power, 255 for full power.
     pub power: u8,
 }
 

@@ -1,13 +1,14 @@
-//! Sensors of temperature: what the converter reads, and how hot that is.
+//! Temperature sensors: conversion of readings to temperatures.
 //!
-//! A reading is the sum of [`SAMPLES`] conversions of 10 bits, taken one after the other: noise of the wires makes it finer than one
-//! conversion. A thermistor hangs between pin and ground, with 4,700 ohms from the pin to the supply, as on RAMPS; its table is worked out
-//! when the firmware is built, from its resistance at 25 degrees and its beta. Between two entries, 5 degrees apart, it is a straight line:
-//! 0.15 degrees off at most. An AD595 gives 10 mV a degree, an AD8495 5 mV. A PT100 has an amplifier (E3D's): ten times what it has of 5 V
-//! behind 4,400 ohms. Cost of a reading: 2,500 cycles.
+//! A reading is the sum of [`SAMPLES`] successive conversions of 10 bits; noise of the wires makes the sum finer than
+//! one conversion. A thermistor is between pin and ground, with a pull-up of 4,700 ohms, as on RAMPS. Its table is
+//! computed when the firmware is built, from its resistance at 25 degrees and its beta. Entries are 5 degrees apart;
+//! linear interpolation between them is 0.15 degrees off at most. An AD595 gives 10 mV a degree, an AD8495 5 mV. A
+//! PT100 has an amplifier (E3D's): ten times its voltage in series with 4,400 ohms at 5 V. Cost of a reading: 2,500
+//! cycles.
 //!
-//! A MAX6675 is read over SPI, and its reading is the word that it sends: quarters of a degree from bit 3 on, bit 2 for a thermocouple that is
-//! open. It converts for 220 ms after each reading.
+//! A MAX6675 is read over SPI, and its reading is the word that it sends: quarters of a degree from bit 3 on, bit 2 for
+//! an open thermocouple. It converts for 220 ms after each reading.
 
 use crate::progmem::Progmem;
 
@@ -15,10 +16,10 @@ use crate::progmem::Progmem;
 pub const SAMPLES: u16 = 32;
 /// The highest reading.
 const FULL: u16 = SAMPLES * 1_023;
-/// Temperatures are worked out in 1/64 degree.
+/// Temperatures are computed in 1/64 degree.
 pub const UNIT: i16 = 64;
 
-/// Which sensor a heater has.
+/// The kind of a heater's sensor.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[repr(u8)]
 pub enum Kind {
@@ -39,10 +40,11 @@ pub enum Kind {
     Max6675 = 6,
 }
 
-/// Bits of a MAX6675's word that are 0: its first, that of an open thermocouple, and that of its kind. A line without the chip is high.
+/// Bits of a MAX6675's word that must be 0: the dummy sign bit, the bit of an open thermocouple, and the device ID.
+/// Without the chip the line is high.
 const MAX6675_FAULT: u16 = 1 << 15 | 1 << 2 | 1 << 1;
 
-/// What is wrong with a sensor.
+/// The fault of a sensor.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Broken {
     /// The sensor reads as if a wire were off.
@@ -51,35 +53,35 @@ pub enum Broken {
     Short,
 }
 
-/// Temperatures of the entries, degrees.
+/// Temperatures of the entries, degrees: -20 to 355. A reading beyond these is that of a broken sensor.
 const LOW: i16 = -20;
 const STEP: i16 = 5;
 const ENTRIES: usize = 76;
 
-/// Beyond these the sensor is broken: colder than -20 degrees, hotter than 355.
+/// A reading of an amplifier that is this near to the highest one is that of an open sensor.
 const MARGIN: u16 = SAMPLES * 2;
 
 crate::progmem! {
-    /// The reading at each temperature, falling.
+    /// The reading at each temperature, in falling order.
     static SEMITEC: [u16; ENTRIES] = thermistor(100_000.0, 4_267.0);
     static EPCOS: [u16; ENTRIES] = thermistor(100_000.0, 4_092.0);
-    /// How far the reading is from the highest.
+    /// The highest reading less the reading at each temperature.
     static PT100: [u16; ENTRIES] = pt100();
 }
 
 const _: () = assert!(SAMPLES as u32 * 1_023 <= i16::MAX as u32 + 1);
 
-/// From the pin to the supply, ohms.
+/// Pull-up resistor, ohms.
 const PULL_UP: f64 = 4_700.0;
 
-/// The table of a thermistor.
+/// Returns the table of a thermistor.
 const fn thermistor(at_25: f64, beta: f64) -> [u16; ENTRIES] {
     let mut table = [0; ENTRIES];
     let mut n = 0;
     while n < ENTRIES {
         let kelvin = 273.15 + LOW as f64 + n as f64 * STEP as f64;
         let ohms = at_25 * exp(beta * (1.0 / kelvin - 1.0 / 298.15));
-        // A conversion gives the step below: half of one too little.
+        // A conversion rounds down, which is half a step too little on average.
         let reading = SAMPLES as f64 * (1_024.0 * ohms / (ohms + PULL_UP) - 0.5);
         table[n] = if reading < 0.0 { 0 } else { (reading + 0.5) as u16 };
         n += 1;
@@ -87,7 +89,7 @@ const fn thermistor(at_25: f64, beta: f64) -> [u16; ENTRIES] {
     table
 }
 
-/// The table of a PT100 with its amplifier, by what IEC 60751 says of its resistance.
+/// Returns the table of a PT100 with its amplifier, from the resistances of IEC 60751.
 const fn pt100() -> [u16; ENTRIES] {
     let mut table = [0; ENTRIES];
     let mut n = 0;
@@ -100,13 +102,13 @@ const fn pt100() -> [u16; ENTRIES] {
     table
 }
 
-/// The part of the supply at its amplifier's output.
+/// Returns the output of the PT100's amplifier, as a share of the supply.
 const fn pt100_share(degrees: f64) -> f64 {
     let ohms = 100.0 * (1.0 + degrees * (3.9083e-3 - 5.775e-7 * degrees));
     10.0 * ohms / (ohms + 4_400.0)
 }
 
-/// The exponential function, for tables that are made when the firmware is built.
+/// The exponential function, for tables that are computed when the firmware is built.
 const fn exp(x: f64) -> f64 {
     // exp(x) is exp(x / 1024) squared ten times.
     let x = x / 1_024.0;
@@ -121,7 +123,7 @@ const fn exp(x: f64) -> f64 {
 
 #[small]
 impl Kind {
-    /// The kind of a setting's value.
+    /// Returns the kind that a value of the setting selects.
     pub fn of(value: u8) -> Self {
         match value {
             1 => Self::Semitec,
@@ -134,7 +136,7 @@ impl Kind {
         }
     }
 
-    /// How hot it is, in 1/64 degree.
+    /// Converts a reading to a temperature, 1/64 degree. The error is that of a broken sensor.
     #[inline(never)]
     pub fn temperature(self, reading: u16) -> Result<i16, Broken> {
         match self {
@@ -143,7 +145,7 @@ impl Kind {
             Self::Epcos => of_table(&EPCOS, reading),
             Self::Pt100 => {
                 of_table(&PT100, FULL.saturating_sub(reading)).map_err(|broken| match broken {
-                    // It rises with the temperature.
+                    // The resistance of a PT100 rises with the temperature.
                     Broken::Open => Broken::Short,
                     Broken::Short => Broken::Open,
                 })
@@ -158,14 +160,16 @@ impl Kind {
     }
 }
 
-/// A voltage that is in proportion to the temperature, the supply at `full` degrees. All that can be read is an amplifier without its thermocouple.
+/// Converts a voltage that is proportional to the temperature: 0 at 0 degrees, the supply at `full` degrees. The
+/// highest readings are those of an amplifier without its thermocouple.
 #[inline(never)]
 #[small]
 fn of_line(reading: u16, full: u16) -> Result<i16, Broken> {
     if reading > FULL - MARGIN {
         return Err(Broken::Open);
     }
-    // Half of a step, by which each conversion is too little. 510 degrees are the most that a number holds.
+    // Adds half a step for each conversion, because conversions round down. 510 degrees are the most that an `i16`
+    // holds.
     let sum = u32::from(reading) + u32::from(SAMPLES / 2);
     let degrees = sum * (u32::from(full) * UNIT as u32) / (u32::from(SAMPLES) * 1_024);
     Ok(degrees.min(510 * UNIT as u32) as i16)
@@ -192,7 +196,7 @@ fn of_table(table: &Progmem<[u16; ENTRIES]>, reading: u16) -> Result<i16, Broken
     Err(Broken::Short)
 }
 
-/// What is read on average at a temperature in degrees, without noise; for tests.
+/// Returns the mean reading at a temperature in degrees, without noise; for tests.
 #[cfg(feature = "std")]
 pub fn reading(kind: Kind, degrees: f64) -> f64 {
     if kind == Kind::Max6675 {
@@ -201,7 +205,8 @@ pub fn reading(kind: Kind, degrees: f64) -> f64 {
     (f64::from(SAMPLES) * (1_024.0 * share(kind, degrees) - 0.5)).clamp(0.0, FULL.into())
 }
 
-/// The part of the supply that a sensor of a kind gives at a temperature in degrees; for tests and simulated machines.
+/// Returns the output of a sensor at a temperature in degrees, as a share of the supply; for tests and simulated
+/// machines.
 #[cfg(feature = "std")]
 pub fn share(kind: Kind, degrees: f64) -> f64 {
     let beta = match kind {
@@ -253,7 +258,7 @@ mod tests {
         let max6675 = |word| Kind::Max6675.temperature(word);
         let at_25 = reading(Kind::Max6675, 25.0) as u16;
         assert_eq!(max6675(at_25), Ok(25 * UNIT));
-        // The thermocouple is open; the chip is not there; it has no supply.
+        // The thermocouple is open; the chip is missing; the chip has no supply.
         assert_eq!(max6675(at_25 | 4), Err(Broken::Open));
         assert_eq!(max6675(u16::MAX), Err(Broken::Open));
         assert_eq!(max6675(0), Err(Broken::Short));

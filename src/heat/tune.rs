@@ -1,91 +1,95 @@
-//! Autotune: the factors of a heater from how it swings between two powers (M303).
+//! Autotune (M303): finds the PID factors of a heater by relay oscillation.
 //!
-//! A relay: the heater has the power `bias + swing` until it is hotter than wanted, then `bias - swing` until it is colder, and so on. After
-//! each cycle `bias` moves so that both halves last as long. The height of the swing and its period `t` say how much a factor may be before
-//! it swings by itself, `ku = 4 * swing / (pi * height)`; the factors are [`RULE`]'s shares of that.
+//! The heater has the power `bias + swing` until it is hotter than the target, then `bias - swing` until it is colder,
+//! and so on. After each cycle `bias` is adjusted so that both halves become equally long. The height of the
+//! oscillation gives the ultimate gain, `ku = 4 * swing / (pi * height)`. The factors follow from `ku` and the period
+//! by [`RULE`].
 //!
-//! Stepped five times a second in place of [`Control`](super::control::Control). Temperatures are in 1/64 degree. It ends after the cycles asked for, and fails
-//! when a half takes longer than [`HALF_S`], or when it gets [`FAR`] hotter than wanted. Faults of heaters and sensors are looked for all the while, by others.
-//! Cost of a step: 100 cycles, of the last of a cycle 4,000.
+//! Stepped five times a second in place of [`Control`](super::control::Control). Temperatures are in 1/64 degree. It
+//! ends after the requested cycles. It fails when half a cycle takes longer than [`HALF_S`], or when the heater gets
+//! more than [`FAR`] above the target. The supervision of heaters and sensors goes on meanwhile. Cost of a step: 100
+//! cycles; 4,000 for the last step of a cycle.
 
 use super::control::{FULL, STEPS};
 use super::sensor::UNIT;
 
-/// The power is switched when the temperature is this far from the target.
+/// The power is switched when the temperature has passed the target by more than this.
 const BAND: i16 = UNIT / 4;
 /// The autotune fails when the temperature is this far above the target.
 const FAR: i16 = 25 * UNIT;
-/// How long a half of a cycle may take, seconds.
+/// How long half a cycle may take, seconds.
 const HALF_S: u16 = 1_200;
-/// The least and the greatest power around which the autotune swings.
+/// The least and the greatest mean power of the oscillation.
 const BIAS: (u8, u8) = (20, FULL - 20);
-/// The least cycles. The first ones are not measured: the heater comes from the cold, and the power is not in the middle yet.
+/// The least number of cycles. The first cycle is not measured, because the heater starts cold; the next ones adjust
+/// the mean power.
 pub const CYCLES_MIN: u8 = 3;
-/// The most cycles.
+/// The greatest number of cycles.
 pub const CYCLES_MAX: u8 = 50;
-/// The share of `ku` that `p` is, in hundredths; of `p` by a period that `i` is; and of `p` times a period that `d` is.
+/// Hundredths: `p` as a share of `ku`, `i` as a share of `p` over the period, and `d` as a share of `p` times the
+/// period.
 const RULE: (u32, u32, u32) = (60, 100, 30);
 
-/// What is known of a heater's factors by its swing: hundredths, as settings have them.
+/// The factors found by the oscillation, in hundredths as in [`Factors`](super::control::Factors).
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Found {
-    /// Power for a degree.
+    /// Power per degree.
     pub p: u16,
-    /// Power a second for a degree.
+    /// Power per degree and second.
     pub i: u16,
-    /// Power for a degree a second.
+    /// Power per degree a second.
     pub d: u16,
 }
 
-/// How far an autotune is.
+/// The stage of an autotune.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Stage {
-    /// There is nothing to tell of.
+    /// There has been no autotune.
     #[default]
     Idle,
-    /// The temperature swings around the target.
+    /// The temperature oscillates around the target.
     Swings,
     /// The factors have been found.
     Done,
-    /// A half of a cycle has taken too long.
+    /// Half a cycle has taken too long.
     TooSlow,
     /// The heater has got too hot.
     TooHot,
-    /// Somebody has ended it.
+    /// The autotune has been stopped.
     Stopped,
 }
 
 /// A heater being tuned.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Tune {
-    /// How far it is.
+    /// The stage.
     pub stage: Stage,
-    /// The bed is tuned, not the hot end.
+    /// Whether the bed is tuned, not the hot end.
     pub bed: bool,
-    /// How many cycles it has made.
+    /// The number of completed cycles.
     pub cycle: u8,
-    /// The power around which it swings, 255 for all, and how far it does to either side.
+    /// The mean power of the oscillation, 255 for full power.
     pub bias: u8,
-    /// How far.
+    /// The amplitude of the power around `bias`.
     pub swing: u8,
-    /// The lowest and the highest temperature of the last cycle.
+    /// The lowest and the highest temperature of the last cycle, 1/64 degree.
     pub extremes: (i16, i16),
-    /// What has been found so far.
+    /// The factors of the last cycle.
     pub found: Found,
     cycles: u8,
-    /// The power is in its upper half.
+    /// Whether the power is `bias + swing`.
     more: bool,
     wanted: i16,
     low: i16,
     high: i16,
-    /// Steps of this half, and of the one before.
+    /// Steps of this half of the cycle; in `before`, those of the half before.
     steps: u16,
     before: u16,
 }
 
 #[small]
 impl Tune {
-    /// No autotune. All bytes are 0, for it is part of a static.
+    /// No autotune. All bytes are 0, because it is part of a static.
     pub const IDLE: Self = Self {
         stage: Stage::Idle,
         bed: false,
@@ -103,7 +107,7 @@ impl Tune {
         before: 0,
     };
 
-    /// Begins, for a heater that is to be so hot, with so many cycles.
+    /// Begins an autotune at the target `wanted`, 1/64 degree, with `cycles` cycles.
     pub fn begin(bed: bool, wanted: i16, cycles: u8) -> Self {
         let cycles = cycles.clamp(CYCLES_MIN, CYCLES_MAX);
         Self {
@@ -120,19 +124,19 @@ impl Tune {
         }
     }
 
-    /// Whether it is under way.
+    /// Whether the autotune is under way.
     pub fn is_on(&self) -> bool {
         self.stage == Stage::Swings
     }
 
-    /// Somebody ends it.
+    /// Stops the autotune.
     pub fn stop(&mut self) {
         if self.is_on() {
             self.stage = Stage::Stopped;
         }
     }
 
-    /// The power of the next step: 0 when it is over.
+    /// Returns the power of the next step; 0 when the autotune is over.
     #[inline(never)]
     pub fn step(&mut self, now: i16) -> u8 {
         if !self.is_on() {
@@ -159,16 +163,16 @@ impl Tune {
         }
     }
 
-    /// The other half begins.
+    /// Begins the other half of the cycle.
     fn turn(&mut self) {
         self.more = !self.more;
         (self.before, self.steps) = (self.steps, 0);
     }
 
-    /// Below what is wanted again.
+    /// Ends a cycle: the temperature is below the target again.
     fn end_cycle(&mut self) {
         let (up, down) = (i32::from(self.before), i32::from(self.steps));
-        // The first half was the way from the cold.
+        // The first cycle is not measured, because it began cold.
         if self.cycle > 0 {
             self.found = self.factors((up + down) as u32);
             let by = i32::from(self.swing) * (up - down) / (up + down).max(1);
@@ -184,10 +188,10 @@ impl Tune {
         }
     }
 
-    /// The factors of a swing with a period of so many steps.
+    /// Returns the factors for a cycle of `period` steps.
     fn factors(&self, period: u32) -> Found {
         let height = u32::from(self.high.abs_diff(self.low)).max(1);
-        // Hundredths: 400 / pi * 2 * 64 by the difference of both extremes, 1/64 degree.
+        // Hundredths: 400 / pi * 2 * 64, over the difference of both extremes in 1/64 degree.
         let ku = 16_297 * u32::from(self.swing) / height;
         let (p, i, d) = RULE;
         let p = ku * p / 100;
@@ -205,7 +209,8 @@ mod tests {
     use super::*;
     use crate::heat::control::{Control, Factors};
 
-    /// Heat flows from the heater into the block, from there to the air, and the sensor follows the block.
+    /// A simulated heater: heat flows from the heater into the block, and from there to the air; the sensor follows the
+    /// block.
     #[derive(Clone)]
     struct Plant {
         capacity: f64,
@@ -225,7 +230,7 @@ mod tests {
             Self { capacity, watts, loss, fan, delay, heater, block, sensor, noise }
         }
 
-        /// A step of a fifth of a second at a power, and what is measured then.
+        /// Simulates a step of a fifth of a second at a power. Returns the measured temperature.
         fn step(&mut self, power: u8, fan: bool) -> i16 {
             let watts = self.watts * f64::from(power) / 255.0;
             for _ in 0..20 {

@@ -1,22 +1,20 @@
-//! Heaters and the fan, looked at within the turns of the power task.
+//! Heaters and the fan, controlled within the turns of the power task.
 //!
-//! Owns the converter, the pins of heaters and fan, and [`Heaters`]. Reads what lines have told exec ([`Orders`] in
-//! `tasks::common`). A turn comes every 20 ms. It takes the reading of one heater and begins that of the other, so
-//! that each heater has a reading every 40 ms, and a step of its control every 200 ms. Heaters are driven at these
-//! turns alone. Their power is that of pulses which the chip makes ([`PULSED`]), or it is spread over the turns. The
-//! power task feeds the watchdog in the same turn: if the watchdog gets nothing, the chip resets within half a second,
-//! with its heaters off.
+//! Owns the converter, the pins of heaters and fan, and [`Heaters`]. Reads the targets that exec has set ([`Orders`] in
+//! `tasks::common`). A turn comes every 20 ms. It takes the reading of one heater and begins that of the other, so that
+//! each heater has a reading every 40 ms, and a step of its control every 200 ms. Heater pins change in these turns
+//! only. Their power is set by PWM of the chip ([`PULSED`]), or spread over the turns. The power task feeds the
+//! watchdog in the same turn: if the watchdog is not fed, the chip resets within half a second, with the heaters off.
 //!
-//! An autotune ([`tune`](crate::heat::tune)) is a wait: the lines behind it wait for its end. M108, a flush or an
-//! alarm end it, too. It is an alarm if filament is being moved although the hot end is more than 10 degrees colder
-//! than it must be.
+//! An autotune ([`tune`](crate::heat::tune)) is a wait: later lines wait for its end. M108, a flush or an alarm end it,
+//! too. Moving filament while the hot end is more than 10 degrees below its minimum raises an alarm.
 //!
 //! A fault ([`heater`](crate::heat::heater), [`fault`](crate::heat::fault)) switches all heaters off in its turn,
 //! [locks](lock) them, and raises an alarm. Any alarm switches them off. While a wait is on ([`Heaters::begin_wait`]),
 //! the planner is woken when the wait is over.
 //!
-//! Thread mode. Cost of a turn: 3,500 cycles; 7,000 in every fifth turn. A turn that comes late switches late: thread
-//! mode has half a second under the hardest of motion.
+//! Thread mode. Cost of a turn: 3,500 cycles; 7,000 in every fifth turn. A late turn switches the heaters late. Under
+//! the hardest motion a turn may be half a second late, because thread mode has little of the CPU.
 
 use core::cell::{Cell, RefCell};
 
@@ -48,40 +46,41 @@ use crate::status::Status;
 
 /// A temperature this near to the target counts as reached, 1/64 degree.
 const NEAR: i16 = UNIT + UNIT / 2;
-/// For how many steps the temperature has to be reached: 3 s.
+/// For how many steps the temperature must stay reached: 3 s.
 const STAYS: u8 = 15;
-/// By how much colder, than for planning a move, the hot end may be while filament moves, 1/64 degree. So a
-/// temperature that swings does not stop what is already queued.
+/// By how much the hot end may be below the minimum for planning a move while filament moves, 1/64 degree. So a
+/// temperature that oscillates does not stop queued moves.
 const GRACE: i16 = 10 * UNIT;
-/// How many turns a fan that is switched on has all of its power: 200 ms.
+/// For how many turns a fan that is switched on gets full power to start: 200 ms.
 const KICK: u8 = 10;
 
-/// What tasks share of heaters. Thread mode.
+/// The state of heaters that tasks share. Thread mode.
 pub struct Heaters {
     parts: [Parts; PRINTERS],
 }
 
-/// The heaters of a machine that has some.
+/// The state of a machine with heaters.
 struct Parts {
     heaters: RefCell<[Heater; HEATERS]>,
     /// What the planner waits for.
     awaited: Cell<Heat>,
-    /// For how many steps what is awaited has been reached.
+    /// For how many steps the awaited temperature has been reached.
     stays: Cell<u8>,
     /// The heater whose reading has been begun.
     next: Cell<u8>,
-    /// For how many turns the fan still has all of its power; in `owed`, what power it is owed.
+    /// For how many turns the fan still gets full power; in `owed`, the accumulator of its
+    /// [`spread`](crate::heat::control::spread).
     kick: Cell<u8>,
     owed: Cell<u8>,
-    /// How many cycles an autotune is to have, and whether the heater is to take over its factors.
+    /// The requested cycles of an autotune, and whether the heater is to take over its factors.
     asked: Cell<(u8, bool)>,
-    /// The autotune that is under way, or was last.
+    /// The autotune under way, or the last one.
     tune: RefCell<Tune>,
-    /// The number of the heater that is tuned, plus 1; 0 when everything that belongs to the autotune is done.
+    /// The number of the heater that is tuned, plus 1; 0 when the autotune and the saving of its factors are done.
     tuned: Cell<u8>,
-    /// How many of the factors that it has found are in the settings.
+    /// How many of its factors have been written to the settings.
     kept: Cell<u8>,
-    /// How far the autotune was when it was told last.
+    /// Cycle and stage of the autotune in the last report.
     told: Cell<(u8, Stage)>,
 }
 
@@ -117,7 +116,7 @@ impl Parts {
         if left > 0 { FULL } else { power }
     }
 
-    /// Whether the temperatures that are waited for have been reached.
+    /// Whether the awaited temperatures have been reached.
     fn has_come(&self, orders: &Orders) -> bool {
         let awaited = self.awaited.get();
         let heaters = self.heaters.borrow();
@@ -129,7 +128,7 @@ impl Parts {
         })
     }
 
-    /// After a step, lets the planner go on if what it waits for has been reached for long enough.
+    /// After a step, ends the planner's wait if the awaited temperature has been reached for long enough.
     fn see_to_wait(&self, orders: &Orders) {
         if matches!(self.awaited.get().wait, Wait::Nothing | Wait::Tuned) {
             return;
@@ -178,7 +177,7 @@ impl Heaters {
         Self { parts: [const { Parts::new() }; PRINTERS] }
     }
 
-    /// Notes what the planner waits for from now on.
+    /// Begins a wait of the planner.
     pub fn begin_wait(&self, heat: Heat) {
         if let Some(parts) = self.parts.first() {
             parts.stays.set(0);
@@ -199,7 +198,8 @@ impl Heaters {
         let Some(parts) = self.parts.first() else { return };
         match parts.tuned.get() {
             0 => parts.end_wait(),
-            // An autotune ends in the next turn, when its heater has been switched off: a line behind it may heat.
+            // An autotune ends in the next turn, which switches its heater off first, because a later line may heat
+            // again.
             _ => parts.tune.borrow_mut().stop(),
         }
     }
@@ -212,13 +212,13 @@ impl Default for Heaters {
     }
 }
 
-/// Returns what lines have asked for.
+/// Returns the targets that lines have set.
 #[small]
 fn orders(thread: Thread) -> Orders {
     common::with(thread, |common| common.heat.first().copied()).unwrap_or(Orders::OFF)
 }
 
-/// Forgets what lines have asked for: everything is to be off then.
+/// Sets all targets to off.
 #[small]
 pub fn forget_orders(thread: Thread) {
     common::with(thread, |common| {
@@ -244,7 +244,7 @@ pub fn stop(links: &Links) {
     }
 }
 
-/// Returns how a heater stands: 0 is the hot end, 1 the bed. `None` without the capability.
+/// Returns the state of a heater, 0 the hot end, 1 the bed. `None` without the capability.
 #[small]
 pub fn standing(links: &Links, heater: u8) -> Option<Standing> {
     let parts = links.heat.parts.first()?;
@@ -253,7 +253,7 @@ pub fn standing(links: &Links, heater: u8) -> Option<Standing> {
     Some(parts.heaters.borrow().get(heater)?.standing(to))
 }
 
-/// Returns how fast the fan is to be, 255 for full speed.
+/// Returns the target speed of the fan, 255 for full speed.
 #[small]
 pub fn fan(thread: Thread) -> u8 {
     orders(thread).fan
@@ -355,7 +355,7 @@ fn look_at(
 }
 
 /// Ends an autotune whose heater has been switched off by lines. When an autotune has ended, switches its heater off,
-/// puts the factors into the settings if that has been asked for, one at a time, and lets the planner go on.
+/// writes the factors to the settings one at a time if requested, and ends the planner's wait.
 #[inline(never)]
 #[small]
 fn see_to_tune(links: &Links, parts: &Parts, orders: &Orders) {
@@ -398,7 +398,7 @@ fn see_to_tune(links: &Links, parts: &Parts, orders: &Orders) {
     }
 }
 
-/// Says how many cycles the next autotune is to have, and whether its heater is to take over what is found.
+/// Sets the cycles of the next autotune, and whether its heater is to take over the factors.
 #[cfg(feature = "dialect-reprap")]
 #[small]
 pub fn ask_tune(heaters: &Heaters, cycles: u8, uses: bool) {
@@ -407,14 +407,14 @@ pub fn ask_tune(heaters: &Heaters, cycles: u8, uses: bool) {
     }
 }
 
-/// Returns the autotune that is under way, or was last.
+/// Returns the autotune under way, or the last one.
 #[cfg(feature = "dialect-reprap")]
 #[small]
 pub fn tune(heaters: &Heaters) -> Tune {
     heaters.parts.first().map_or(Tune::IDLE, |parts| *parts.tune.borrow())
 }
 
-/// Whether there is something new to tell of an autotune, since this was asked last.
+/// Whether cycle or stage of the autotune have changed since the last call.
 #[cfg(feature = "dialect-reprap")]
 #[small]
 pub fn takes_news(heaters: &Heaters) -> bool {
@@ -424,7 +424,8 @@ pub fn takes_news(heaters: &Heaters) -> bool {
     parts.told.replace(now) != now
 }
 
-/// Notes whether filament may be moved. Returns whether it is being moved although the hot end has got far too cold.
+/// Updates whether filament may be moved. Returns whether it is being moved although the hot end is more than [`GRACE`]
+/// too cold.
 #[inline(never)]
 #[small]
 fn note_cold(links: &Links, parts: &Parts) -> bool {
@@ -447,8 +448,8 @@ fn moves_filament(thread: Thread, settings: &Settings) -> bool {
             .any(|(motor, steps)| *steps != 0 && usize::from(moved_by(settings, motor)) == EXTRUDER)
 }
 
-/// Changes how cold filament may be moved, until the next start. Returns how hot the hot end must be, degrees, and
-/// whether it may be colder all the same.
+/// Changes the minimum temperature to move filament, or whether it applies, until the next start. Returns the minimum,
+/// degrees, and whether colder extrusion is allowed.
 #[cfg(feature = "dialect-reprap")]
 #[inline(never)]
 #[small]
@@ -466,7 +467,7 @@ pub fn extrude_cold(heaters: &Heaters, settings: &mut Settings, change: Cold) ->
     (hot_end.least(), heating.allows_cold)
 }
 
-/// Notes that a printing host has been heard, so that the A axis is an extruder.
+/// Records that a printing host has sent something, so that the A axis is an extruder.
 #[cfg(feature = "dialect-reprap")]
 #[small]
 pub fn has_extruder(settings: &mut Settings) {
@@ -475,8 +476,8 @@ pub fn has_extruder(settings: &mut Settings) {
     }
 }
 
-/// Handles a fault: everything is off, and no line may heat again until a reset, or until somebody [unlocks](unlock)
-/// the heaters.
+/// Handles a fault: switches everything off, and refuses lines that heat until a reset or until the heaters are
+/// [unlocked](unlock).
 #[inline(never)]
 #[small]
 fn lock(links: &Links, fault: Status) {
@@ -494,7 +495,7 @@ fn lock(links: &Links, fault: Status) {
     }
 }
 
-/// Lets lines heat again.
+/// Allows lines to heat again.
 #[small]
 pub fn unlock(settings: &mut Settings) {
     if let Some(heating) = settings.heating.first_mut() {
