@@ -1,4 +1,4 @@
-//! How an alarm begins and how it ends. What each alarm does is in [`machine::alarm`](mod@crate::machine::alarm).
+//! The begin and the end of an alarm. The effects of each alarm are in [`machine::alarm`](mod@crate::machine::alarm).
 //!
 //! ```text
 //!  raise   steps stop at once if the alarm is sudden (the interrupt of a limit has stopped them already); outputs off;
@@ -8,7 +8,7 @@
 //!  clear   steps may be made again
 //! ```
 //!
-//! Thread mode raises and clears, any level asks. Nothing here waits, and nothing can be full.
+//! Thread mode raises and clears alarms; any level may read the state. Nothing here waits, and nothing can be full.
 
 use kerf_macros::small;
 
@@ -22,13 +22,13 @@ use crate::hal::stepper;
 use crate::machine::{self, Alarm};
 use crate::status::Status;
 
-/// Begins an alarm, unless there is one that is as bad or worse.
+/// Begins an alarm, unless one of equal or higher severity is on.
 #[small]
 pub fn raise(links: &Links, alarm: Alarm) {
     raise_for(links, alarm, alarm.status());
 }
 
-/// Begins an alarm, unless there is one that is as bad or worse, and reports it with `reason` as its status.
+/// Begins an alarm, unless one of equal or higher severity is on, and reports it with `reason` as its status.
 #[inline(never)]
 #[small]
 pub fn raise_for(links: &Links, alarm: Alarm, reason: Status) {
@@ -47,16 +47,16 @@ pub fn raise_for(links: &Links, alarm: Alarm, reason: Status) {
     links.except_at_once(reason);
 }
 
-/// Starts the machine in an alarm, after a reset that nobody wanted: whoever sends to it is to look first. Called
-/// before anything runs.
+/// Starts the machine in an alarm after an unexpected reset, so that the operator looks at it first. Called before
+/// anything runs.
 pub fn wake_up_in(links: &Links) {
     machine::start_alarmed();
-    // The reporter looks before it waits.
+    // The reporter checks this before it waits.
     links.notices.exception.set(Some(Status::HardReset));
 }
 
-/// Ends the alarm. Returns [`Status::Again`] while the machine comes to rest, and the status of an alarm that cannot
-/// end.
+/// Ends the alarm. Returns [`Status::Again`] while the machine is still slowing down, and the status of an alarm that
+/// cannot end.
 #[inline(never)]
 #[small]
 pub fn clear(links: &Links, settings: &Settings) -> Status {

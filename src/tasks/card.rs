@@ -1,10 +1,9 @@
 //! Lines of a file on the SD card, within the turns of the parser task.
 //!
-//! A line is taken when the planner is free and no answer is under way, behind the lines that hosts have sent. While a
-//! line is under way, G-code of hosts waits, and nothing else does. A line is carried out as if the host that has
-//! chosen the file had sent it, but without its `ok`; what the line tells goes to that host. If a line cannot be
-//! carried out, the host is told, and the next line is taken. An alarm or a flush ends the print; the file stays
-//! chosen.
+//! A line is taken when the planner is free and no answer is under way, after the lines that hosts have sent. While a
+//! line is under way, only G-code of hosts waits. A line is carried out as if the host that has chosen the file had
+//! sent it, but without its `ok`; messages of the line go to that host. If a line cannot be carried out, the host is
+//! told, and the next line is taken. An alarm or a flush ends the print; the file stays chosen.
 //!
 //! Cost: that of a line of the host, and 3,000 cycles for each 40 bytes. Each 512 bytes cost 25,000 more, of thread
 //! mode alone.
@@ -65,7 +64,7 @@ impl Feed {
         self.request.is_some()
     }
 
-    /// Whether the feed is to have a turn each millisecond.
+    /// Whether the feed needs a turn each millisecond.
     pub fn waits(&self) -> bool {
         self.waits
     }
@@ -82,7 +81,7 @@ impl Feed {
         if self.request.is_some() {
             return self.go_on(links);
         }
-        // The part of a line that has been read is kept: M24 goes on in the middle of it.
+        // The part of a line that has been read is kept, because M24 continues after it.
         if !links.card.borrow().prints() {
             return false;
         }

@@ -1,8 +1,7 @@
-//! State that exec and thread mode both change: how motion stands, the overrides, which motors have power, the
-//! outputs.
+//! State that exec and thread mode both change: the motion snapshot, the overrides, the powered motors, the outputs.
 //!
-//! Exec has the state, by its [end](avr_embassy::InterruptEnd), while it does one step. All others use the state with
-//! exec locked out ([`with`]). What is done with its parts is in `overrides`, `power` and `spindle`.
+//! Exec holds the state, by its [end](avr_embassy::InterruptEnd), while it does one step. All others use the state with
+//! exec locked out ([`with`]). The operations on its parts are in `overrides`, `power` and `spindle`.
 
 use crate::encoder::Encoder;
 use crate::gcode::overrides::Overrides;
@@ -15,17 +14,17 @@ use crate::spindle::Spindle;
 
 /// The state: see the module's text.
 pub struct State {
-    /// How motion stands. Exec changes this, all others read it.
+    /// The motion snapshot. Exec changes it, all others read it.
     pub motion: Snapshot,
     /// The overrides in force.
     pub overrides: Overrides,
     /// Which motors have power.
     pub motors: Motors,
-    /// What settings and override say of the outputs.
+    /// Settings and override of the outputs.
     pub spindle: Spindle,
-    /// What the encoder tells of the spindle.
+    /// The state of the spindle's encoder.
     pub encoder: Encoder,
-    /// What heaters are to be, in an image that has heaters.
+    /// The targets of heaters, in an image that has heaters.
     pub heat: [Orders; PRINTERS],
 }
 
@@ -57,13 +56,13 @@ avr_embassy::shared_static! {
     };
 }
 
-/// Has `act` use the state while exec cannot run.
+/// Calls `act` on the state while exec cannot run.
 #[inline(always)]
 pub fn with<R>(thread: Thread, act: impl FnOnce(&mut State) -> R + Send) -> R {
     exec::lock(thread, |ceiling| Common.with(ceiling, act))
 }
 
-/// Returns how motion stands.
+/// Returns the motion snapshot.
 pub fn snapshot(thread: Thread) -> Snapshot {
     with(thread, |common| common.motion)
 }

@@ -1,11 +1,10 @@
 //! The control task: real-time characters, which act at once and get no response.
 //!
-//! Reads what the receive interrupt has taken out of the streams; waits on [`Event::Realtime`]. [`hold`] says what the
-//! characters lead to. Besides, `^x` resets the machine, and ENQ asks whether anybody is there, which the parser
-//! answers.
+//! Reads the characters that the receive interrupt has taken out of the streams; waits on [`Event::Realtime`]. Most of
+//! them act by [`hold`]. In addition `^x` resets the machine, and ENQ is an enquiry that the parser answers.
 //!
-//! The task also sees to switches that change ([`switches`]), and to a program that opens the first port, if the chip
-//! sees that.
+//! The task also handles switches that change ([`switches`]), and a program that opens the first port, on chips that
+//! detect that.
 
 use super::hold;
 use super::links::Links;

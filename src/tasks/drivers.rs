@@ -1,4 +1,4 @@
-//! Settings of drivers that are told by UART. An image without such drivers has nothing here. Thread mode.
+//! Settings of drivers that are set up by UART. Empty in an image without such drivers. Thread mode.
 
 use super::storage::Storage;
 use crate::config::{Setting, Settings};
@@ -19,7 +19,7 @@ pub fn recall(settings: &mut Settings, storage: &Storage) {
     }
 }
 
-/// Tells the drivers what all settings say of them. Cost: eight divisions of floats.
+/// Sends all settings to the drivers. Cost: eight divisions of floats.
 #[cfg(feature = "drivers")]
 pub fn tell(settings: &Settings) {
     for motor in 0..DRIVERS {
@@ -39,7 +39,7 @@ pub fn set(_settings: &mut Settings, _setting: Setting, _value: i32) -> bool {
 #[inline(always)]
 pub fn recall(_settings: &mut Settings, _storage: &Storage) {}
 
-/// Without drivers, nobody is told.
+/// Without drivers, does nothing.
 #[cfg(not(feature = "drivers"))]
 #[inline(always)]
 pub fn tell(_settings: &Settings) {}

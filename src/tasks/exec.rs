@@ -37,8 +37,8 @@ use crate::tasks::{Never, hold, links, overrides, power, spindle};
 /// time.
 const PATIENCE: u8 = 6;
 
-/// After more than this many segments without a turn of thread mode, while somebody waits for an answer, a
-/// jerk-limited motion makes no scans that may wait.
+/// After more than this many segments without a turn of thread mode, while an answer is due, a jerk-limited motion
+/// makes no scans that may wait.
 const PATIENCE_ASKED: u8 = 1;
 
 /// While motion has just begun, thread mode gets a turn after this many segments. To fill the ring from empty to the
@@ -54,7 +54,7 @@ pub fn run(
     segments: Segments,
 ) -> impl Future<Output = Never> {
     async move {
-        // A variable of its own: it would otherwise be built on the stack and copied.
+        // A separate variable: otherwise it would be built on the stack and copied.
         let mut machine = Exec::new();
         let mut task = Task::new(common, blocks, segments, &mut machine);
         loop {
@@ -72,7 +72,7 @@ pub fn run(
 /// CPU cycles from the start of the steppers to their first tick.
 const FIRST_TICK: u32 = 400;
 
-/// What the task waits for before it goes on.
+/// The condition for the next turn of the task.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Next {
     /// Exec takes the next turn at once, if there is room.
@@ -85,7 +85,7 @@ enum Next {
     Block,
 }
 
-/// What the task owns.
+/// The state that the task owns.
 struct Runner<'a> {
     waiting: Waiting,
     finished: Finished,
@@ -138,8 +138,7 @@ impl<'a> Task<'a> {
 }
 
 impl Runner<'_> {
-    /// Returns what there is room for. `None` if there is no room for a segment and the steppers have not been
-    /// stopped.
+    /// Returns the room in the ring. `None` if there is no room for a segment and the steppers have not been stopped.
     #[inline(always)]
     fn is_due(&mut self) -> Option<Room> {
         health::answer(Sign::Exec);
@@ -201,13 +200,13 @@ impl Runner<'_> {
             Capability::Lathe.is_built_in() && (has_left.is_some() || encoder.pass == Status::Noop);
         let holds = hold::is_wanted(out.running) || contact::is_noted() || left;
         self.machine.set_hold(holds, out);
-        // An output that has paused in a hold is switched on again before motion goes on.
+        // An output that was paused in a hold is switched on again before motion resumes.
         if out.outputs != spindle::on() {
             if !machine::is_held() {
                 spindle.go_on();
             }
             let ms = spindle::switch(spindle, out, false);
-            // In the middle of G33.1 the axes follow the encoder and do not wait.
+            // Within G33.1 the axes follow the encoder and do not wait.
             if self.machine.thread().is_none() {
                 self.machine.wait(ms, out);
             }
@@ -242,7 +241,7 @@ impl Runner<'_> {
             Step::Switched => self.machine.wait(spindle::switch(spindle, out, true), out),
             Step::Again | Step::Leaves | Step::Idle | Step::Standstill | Step::Heat => {}
         }
-        // A standstill lasts until a segment leads out of it: `out.velocity` runs ahead of the segments.
+        // A standstill lasts until a segment ends it, because `out.velocity` is ahead of the segments.
         self.rests = out.velocity.to_bits() == 0 || (self.rests && step != Step::Segment);
         step
     }
@@ -278,8 +277,8 @@ impl Runner<'_> {
     fn held(&mut self, out: &mut Snapshot, spindle: &mut Spindle) {
         spindle::switch(spindle, out, false);
         machine::drop_if_wanted(|| {
-            // An output that has paused stays off. A kill switches off all outputs here, because the end of the
-            // program, which would do it as well, may have to wait for a door.
+            // A paused output stays off. A kill switches off all outputs here, because the end of the program, which
+            // would do so too, may have to wait for a door.
             out.outputs = if machine::is_killing() { 0 } else { spindle::on() };
             spindle.go_on();
             spindle::switch(spindle, out, false);
@@ -295,7 +294,7 @@ impl Runner<'_> {
         });
     }
 
-    /// Has X leave the cut in the segments that already wait in the ring.
+    /// Adds the retract of X to the segments that already wait in the ring.
     #[inline(never)]
     #[small]
     fn lead(&mut self, out: &mut Snapshot, motors: &mut Motors) {
@@ -342,8 +341,8 @@ impl Runner<'_> {
         waiting.fewest = if has_jerk { 2 } else { 1 };
         let short = waiting.is_short(*rests);
         let passed_over = event::pass_over();
-        // While somebody waits for an answer, a ramp in stretches of the usual length would delay the answer by 9 ms,
-        // and scans in one segment after the other by 14 ms.
+        // While an answer is due, a ramp in stretches of the usual length would delay it by 9 ms, and scans in
+        // successive segments by 14 ms.
         let asked = event::is_asked();
         waiting.coarse = short || asked || passed_over > PATIENCE || waiting.is_busy();
         let scans_too_long = asked && has_jerk && passed_over > PATIENCE_ASKED;
@@ -361,8 +360,8 @@ impl Runner<'_> {
     }
 }
 
-/// Takes a sample of the encoder, which a pass in step with the spindle follows. Not inlined, so that it takes up the
-/// stack only while it runs.
+/// Takes a sample of the encoder, which a pass in step with the spindle follows. Not inlined, so that it uses the stack
+/// only while it runs.
 #[inline(never)]
 #[small]
 fn look_at_spindle(exec: &mut Exec, encoder: &mut Encoder) {
@@ -418,14 +417,14 @@ fn follow_speed(exec: &mut Exec, encoder: &mut Encoder, out: &Snapshot) {
     }
 }
 
-/// Tells a pass that the steppers have just been started: their first tick comes [`FIRST_TICK`] cycles later.
+/// Passes the start time of the steppers to a pass: their first tick comes [`FIRST_TICK`] cycles later.
 #[inline(never)]
 #[small]
 fn start_thread(thread: &mut Thread, encoder: &Encoder) {
     thread.anchor(encoder.time_at(sensors::read().now), FIRST_TICK);
 }
 
-/// How long the segments last that wait in the ring, in units of 2^11 CPU cycles.
+/// The durations of the segments that wait in the ring, in units of 2^11 CPU cycles.
 struct Waiting {
     /// The lengths of the last segments. The newest is at `count - 1`, modulo `SEGMENTS`.
     lengths: [u8; SEGMENTS],
@@ -446,7 +445,7 @@ struct Waiting {
     busy: u8,
 }
 
-/// What there is room for.
+/// The room in the ring.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Room {
     /// There is no room for another segment.
@@ -472,7 +471,7 @@ const fn units(tenths: u32) -> u16 {
 struct Amount {
     /// The most that may be queued, the segment that runs included.
     most: u16,
-    /// What is prepared before thread mode gets a turn.
+    /// The amount that is prepared before thread mode gets a turn.
     least: u16,
 }
 
@@ -480,7 +479,7 @@ struct Amount {
 /// override, and the layout of a ramp, which takes up to 4.1 ms while ticks take two thirds of the CPU.
 const USUAL: Amount = Amount { most: units(88), least: units(42) };
 
-/// In force for a while after too little has been waiting: more is prepared in one run. A feedhold still begins within
+/// Applies for a while after too little motion was queued: more is prepared in one run. A feedhold still begins within
 /// 10 ms.
 const PRESSED: Amount = Amount { most: units(94), least: units(65) };
 
@@ -491,7 +490,7 @@ const PRESSED_FOR: u8 = 100;
 const WAITING_SHORT: u16 = units(25);
 
 /// With less than this queued, an acceleration under a jerk limit that is about to end does end, without a further
-/// look ahead. The rest of the segment that runs is included.
+/// scan. The remainder of the running segment is included.
 const TIGHT: u16 = units(58);
 
 /// With less than this waiting, another segment may be queued in any case, unless the ring is full.
@@ -565,7 +564,7 @@ impl Waiting {
         self.busy >= BUSY
     }
 
-    /// Whether thread mode gets the CPU because somebody asks it for something and enough motion waits.
+    /// Whether thread mode gets the CPU because a request waits for it and enough motion is queued.
     #[inline(always)]
     fn gives_way(&self) -> bool {
         event::is_asked() && self.sum >= USUAL.least
@@ -589,8 +588,8 @@ impl Waiting {
         short
     }
 
-    /// Whether too little is queued to outlast the end of an acceleration and a ramp behind it. The rest of the
-    /// segment that runs is included.
+    /// Whether too little is queued to outlast the end of an acceleration and a ramp after it. The remainder of the
+    /// running segment is included.
     #[inline(always)]
     fn is_tight(&self) -> bool {
         let all = self.length(self.used + 1);
@@ -607,8 +606,8 @@ impl Waiting {
         self.used >= self.fewest && (self.sum >= least || self.gives_way())
     }
 
-    /// Returns what there is room for. The queued amount is limited because queued segments can be neither slowed down
-    /// nor kept from beginning.
+    /// Returns the room in the ring. The queued amount is limited because queued segments can be neither slowed down
+    /// nor held.
     #[inline(never)]
     fn room(&self) -> Room {
         if self.used >= SEGMENTS as u8 - 1 {

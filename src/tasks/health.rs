@@ -1,16 +1,16 @@
-//! Whether the firmware is well. If it is, the watchdog is fed; otherwise the chip resets within half a second, with
-//! the outputs off and the motors without power.
+//! Health checks of the firmware. While they pass, the watchdog is fed; otherwise the chip resets within half a second,
+//! with the outputs off and the motors without power.
 //!
-//! The power task asks every 20 ms. That it has its turn shows that ticks come, that timers are served, and that no
-//! task of thread mode keeps the others waiting. Exec answers each time ([`answer`]). While ticks of the step timer
-//! come, exec must also have queued a segment since, for which the step interrupt must have taken one.
+//! The power task checks every 20 ms. That it runs shows that the millisecond tick and timers work, and that no task of
+//! thread mode blocks the others. Exec must answer each check ([`answer`]). While ticks of the step timer come, exec
+//! must also have queued a segment since the last check, for which the step interrupt must have taken one.
 //!
 //! While motors move on fine ticks, thread mode may have a few percent of the CPU, and one report may take all of half
-//! a second. So exec feeds the watchdog as well, every [`OFTEN`] segments, [`PATIENCE`] times without thread mode:
-//! that is 3 s of the shortest segments, 8 s of usual ones.
+//! a second. So exec feeds the watchdog as well, every [`OFTEN`] segments, up to [`PATIENCE`] times without thread
+//! mode: that is 3 s of the shortest segments, 8 s of usual ones.
 //!
-//! Exec also counts how often the steppers have waited for it in mid-motion ([`starvations`]). That is a fault, but no
-//! fault that a reset mends: `{stv:n}` tells the count, and the reporter tells the first one. Cost: 300 cycles a look,
+//! Exec also counts how often the steppers have run out of segments in motion ([`starvations`]). A reset would not help
+//! against this fault: `{stv:n}` returns the count, and the reporter reports the first one. Cost: 300 cycles a check,
 //! and one poll of exec.
 
 use kerf_macros::small;

@@ -1,7 +1,7 @@
-//! Feedhold, resume, queue flush and kill: what real-time characters, and `{qf:1}`, lead to.
+//! Feedhold, resume, queue flush and kill: the actions of real-time characters and of `{qf:1}`.
 //!
-//! Called by the control task, and by the reader where a tilde, `%` or `^d` stands in the stream. Exec asks whether a
-//! hold is on. Thread mode decides, exec comes to rest, and the planner drops what is queued:
+//! Called by the control task, and by the reader where a tilde, `%` or `^d` stands in the stream. Exec checks whether a
+//! hold is on. Thread mode decides, exec decelerates to a standstill, and the planner drops the queue:
 //!
 //! ```text
 //!  !   Event::Hold: exec slows down               ~   Event::Resume: exec goes on, once it is at rest
@@ -13,29 +13,28 @@
 //!
 //! The states that these events lead to are in [`machine`].
 //!
-//! A cut goes through the streams of all ports at once. The port of the character is cut where the character stands,
-//! the other ports behind the byte that has come last. What the line pools hold is dropped at once. What is still in a
-//! receive ring is dropped when the reader comes to it ([`Port::cut`]). Neither the planner nor exec waits for the
-//! reader, because a pool may be full and its sender may take no answers.
+//! A cut applies to the streams of all ports. The port of the character is cut where the character stands, the other
+//! ports after the last byte received. Lines in the line pools are dropped at once. Bytes in a receive ring are dropped
+//! when the reader reaches them ([`Port::cut`]). Neither the planner nor exec waits for the reader, because a pool may
+//! be full and its sender may take no answers.
 //!
-//! A hold is on from the moment when the character comes, whatever the machine does, as long as there is anything to
-//! do: also between two blocks, in a dwell, or while M0 waits. An idle machine has nothing to hold and ignores the
-//! character.
+//! A hold is on from the moment the character comes, as long as there is anything to do: also between two blocks, in a
+//! dwell, or while M0 waits. An idle machine has nothing to hold and ignores the character.
 //!
-//! A `%` flushes only if it comes in a hold, or if an exclamation mark comes right behind it. Any other `%` begins or
-//! ends a program. Its arrival counts, not its place: the `%` of a program may still wait behind data when a hold
+//! A `%` flushes only if it arrives in a hold, or if an exclamation mark comes directly after it. Any other `%` begins
+//! or ends a program. The time of arrival decides, because the `%` of a program may still wait behind data when a hold
 //! begins.
 //!
-//! A tilde that comes while the machine slows down has its effect when the machine stands. The machine does not go on
-//! if an exclamation mark comes behind the tilde, or a `%` before or behind it.
+//! A tilde that comes while the machine slows down takes effect at the standstill. The machine does not resume if an
+//! exclamation mark comes after the tilde, or a `%` before or after it.
 //!
-//! In a comment, tilde and `%` are text. The receive interrupt leaves marks where they stand (`serial::GO`,
-//! `serial::CUT`), and the reader knows whether a mark is in a comment. The exclamation mark stops the machine
-//! wherever it stands, and at once.
+//! In a comment, tilde and `%` are text. The receive interrupt puts marks in their place (`serial::GO`, `serial::CUT`),
+//! and the reader knows whether a mark is in a comment. The exclamation mark stops the machine at once, also in a
+//! comment.
 //!
 //! A dropped line still gets its response, because senders count responses: [`Status::Terminated`], or the status of
 //! the alarm if there is one. Only lines before a reset of their own sender get none ([`Class::Gone`]). Nothing here
-//! waits, and nothing can be full: everything is kept as states.
+//! waits, and nothing can be full, because everything is kept as states.
 
 use super::jog;
 #[cfg(doc)]
@@ -56,16 +55,16 @@ use crate::protocol::{Hold, Machine, Speech};
 use crate::realtime::{ENQUIRY, FLUSH, HOLD, KILL, LET_GO, RESET, RESUME, UNPLACED};
 use crate::status::Status;
 
-/// Whether a machine that is `running` is to come to rest. A hold begins without thread mode, which may be busy with a
-/// report: the character alone is enough. Exec only.
+/// Whether a machine that is `running` must stop. The character alone begins the hold, because thread mode may be busy
+/// with a report. Exec only.
 #[inline(always)]
 pub fn is_wanted(running: bool) -> bool {
     machine::is_held() || (running && uart::asks_hold())
 }
 
-/// Drops everything when an alarm begins: what is queued, when the machine has come to rest, and the lines of G-code
-/// that have come by now. A pool that is in use is left out: the reader or the parser has found the line there that
-/// begins the alarm, and drops what that pool holds.
+/// Drops everything when an alarm begins: the queue, once the machine has stopped, and the lines of G-code received so
+/// far. Skips a pool that is in use: the reader or the parser has found the line there that begins the alarm, and drops
+/// the contents of that pool.
 pub fn abandon(links: &Links) {
     links.signs.clear();
     for port in &links.ports {
@@ -157,12 +156,12 @@ fn may_hold_at_rest() -> bool {
     !machine::is_alarmed() && !machine::is_checking()
 }
 
-/// Acts on the real-time characters that have come, on any port.
+/// Acts on the real-time characters received on any port.
 pub fn serve(links: &Links) {
     // Before the character is taken: exec has begun the hold because the character waits, and must not go on in
     // between.
     if uart::asks_hold() && is_busy(links) {
-        // Signs of an earlier hold do not count.
+        // A `%` of an earlier hold is ignored.
         links.signs.percent.set(links.signs.percent.get() && machine::is_held());
         links.signs.door.set(links.signs.door.get() && machine::is_held());
         machine::take(machine::Event::Hold);
@@ -347,17 +346,17 @@ pub fn ahead(links: &Links, port: &Port, mark: u8, slot: u8) {
     }
 }
 
-/// Lets what is held, or what waits at a program stop, go on, if a tilde has come.
+/// Resumes a hold or a program stop if a tilde has come.
 pub(super) fn go_on(links: &Links) {
     if links.signs.resume.take() && machine::may_resume() {
         machine::take(machine::Event::Resume);
         links.cycle_start.signal();
-        // The reporter may have looked already, when the character came, and sleep again.
+        // The reporter may have checked already when the character came, and be waiting again.
         links.reporter_wake.notify_now();
     }
 }
 
-/// Has the planner drop the queue.
+/// Makes the planner drop the queue.
 fn drop_queue(links: &Links) {
     links.parser_wake.signal();
     // Wakes the planner wherever it waits.
@@ -366,8 +365,8 @@ fn drop_queue(links: &Links) {
     flags::set(Event::BlockDone);
 }
 
-/// Whether anything is being carried out. What is held at rest, waits at a program stop or is only checked does not
-/// count, and neither does a built-in job of which nothing is under way.
+/// Whether anything is being carried out. Not true for a hold at standstill, a program stop, check mode, or a built-in
+/// job without a line under way.
 #[inline(never)]
 #[small]
 fn is_moving(links: &Links, port: &Port) -> bool {

@@ -1,5 +1,4 @@
-//! Homing of an axis, as the settings describe it: which switch, which way, how fast, and which position the place
-//! gets.
+//! Homing of an axis from the settings: the switch, the direction, the speeds, and the position of the axis afterwards.
 //!
 //! Pure functions. They are called by the interpreter before a line is taken (`Setup::homing`), by the planner at each
 //! stage, and by the view for `home`. Lengths are [`Length`]s, speeds are in mm or degrees per minute.
@@ -11,12 +10,12 @@
 //!      |<-zb->| here the axis is at tn                  here at tm
 //! ```
 //!
-//! An axis needs no switch if the driver of its motor tells the motor's load ([`Settings::homes_by_stall`]): the pin
-//! of that driver takes the place of the switch.
+//! An axis needs no switch if the driver of its motor detects a stall ([`Settings::homes_by_stall`]): the pin of that
+//! driver replaces the switch.
 //!
-//! Where the axis ends up, `zb` off the switch, is the end of its travel, so that machine coordinates and soft limits
-//! fit the machine: `tn` at a lower switch, `tm` at an upper one. The place is 0 if that end is not set, or if both
-//! ends are equal.
+//! The final position of the axis, `zb` off the switch, is the end of its travel, so that machine coordinates and soft
+//! limits fit the machine: `tn` at a lower switch, `tm` at an upper one. The position is 0 if that end is not set, or
+//! if both ends are equal.
 
 use super::switches;
 use crate::boards::{ACTIVE, inputs};
@@ -31,7 +30,7 @@ const HOMING: u8 = 1;
 /// The axes that may have switches: X Y Z A.
 pub const AXES: u8 = inputs::ENDS as u8 / 2;
 
-/// The ends that are on one pin with the other end of their axis.
+/// The ends that share a pin with the other end of their axis.
 const SHARED: u8 = {
     let (mut bits, mut end) = (0, 0);
     while end < inputs::ENDS {
@@ -46,7 +45,7 @@ const SHARED: u8 = {
     bits
 };
 
-/// How an axis is homed.
+/// The parameters of homing an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Homing {
     /// The input of the axis's switch.
@@ -55,13 +54,13 @@ pub struct Homing {
     pub search: f32,
     /// The speed of the latching.
     pub latch: f32,
-    /// How far the axis searches at most.
+    /// The longest distance of the search.
     pub way: Length,
     /// How far the axis backs off the switch.
     pub backoff: Length,
-    /// How far from the switch the axis ends.
+    /// Distance from the switch at which the axis ends.
     pub zero: Length,
-    /// The position that the place gets.
+    /// The position of the axis there.
     pub place: Length,
     /// The switch at the other end of the axis is on the same pin.
     pub shared: bool,
@@ -83,13 +82,13 @@ impl Homing {
         3 << (self.end & !1)
     }
 
-    /// Returns the place that is `way` from `from` towards the switch.
+    /// Returns the position at the distance `way` from `from`, towards the switch.
     pub fn towards(&self, from: Length, way: Length) -> Length {
         let upper = self.end & 1 != 0;
         if upper { from.saturating_add(way) } else { from.saturating_sub(way) }
     }
 
-    /// Returns the place that is `way` from `from` away from the switch.
+    /// Returns the position at the distance `way` from `from`, away from the switch.
     pub fn away(&self, from: Length, way: Length) -> Length {
         self.towards(from, Length(-way.0))
     }
@@ -115,8 +114,8 @@ pub fn axes(settings: &Settings) -> u8 {
         .fold(0, |bits, axis| bits | 1 << axis)
 }
 
-/// Returns how an axis is homed, or why it cannot be. TinyG's status 245, `lb` below 0, never occurs: no setting can
-/// say that.
+/// Returns the homing parameters of an axis, or why it cannot be homed. TinyG's status 245, `lb` below 0, never occurs,
+/// because no setting has such a value.
 #[inline(never)]
 #[small]
 pub fn of(settings: &Settings, axis: u8) -> Result<Homing, Status> {

@@ -1,12 +1,12 @@
-//! The end of a jog by hand: the character 0x85, which a sender sends when a button is let go.
+//! Jog cancel: the character 0x85, which a sender sends when a button is released.
 //!
-//! A jog under way slows down and is dropped, as by `!%`; anything else goes on. A button may be let go before its jog
-//! has begun, even before the line of the jog has been read. So no jog begins whose line came before the character: it
-//! is refused by [`Status::Terminated`](crate::status::Status). An exclamation mark that finds nothing to hold bars
-//! such jogs as well.
+//! A jog under way slows down and is dropped, as by `!%`; other motion continues. A button may be released before its
+//! jog has begun, even before the line of the jog has been read. So a jog whose line came before the character is
+//! refused with [`Status::Terminated`](crate::status::Status). An exclamation mark with nothing to hold refuses such
+//! jogs as well.
 //!
-//! A jog whose line comes right behind the character, before tasks have had their turn, is refused too. Nobody knows
-//! any more which was first, and a motor that stands is the better mistake. A [`Bar`] keeps what is waited for.
+//! A jog whose line comes directly after the character, before tasks have had their turn, is refused too: their order
+//! is not known any more, and standing still is the safer error. A [`Bar`] holds the state.
 
 use super::hold;
 use super::links::Links;
@@ -15,7 +15,7 @@ use crate::hal::flags;
 use crate::machine::jog::Bar;
 use crate::machine::{self, Cycle};
 
-/// Ends the jog that is under way, and bars any jog that waits.
+/// Ends the jog under way, and refuses jogs whose lines wait.
 #[small]
 pub fn end(links: &Links) {
     if machine::cycle() == Cycle::Jog {
@@ -24,7 +24,7 @@ pub fn end(links: &Links) {
     bar(links);
 }
 
-/// Bars the jogs that have come by now.
+/// Refuses the jogs received so far.
 #[small]
 pub fn bar(links: &Links) {
     links.signs.jogs.set(Bar::Barred);

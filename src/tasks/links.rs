@@ -1,22 +1,21 @@
-//! Every link between tasks: what goes through it, who fills it, who empties it, what happens when it
-//! is full.
+//! Every link between tasks: its contents, producer, consumer, and behaviour when full.
 //!
 //! | link | carries | depth | RAM | from | to | when full |
 //! |---|---|---|---|---|---|---|
 //! | `uart` receive ring | bytes | 255; 63 | 259 B, 67 B | RX interrupt | reader | what is damaged or lost is refused with status 13 |
 //! | [`Port::lines`] | lines | 9 lines; 412 B, 96 B | 448 B, 132 B | reader | parser | bytes stay in the receive ring |
 //! | [`Links::commands`] | canonical commands | 1 | 98 B | parser | planner | the parser takes control lines only |
-//! | block ring | blocks | 64 | 1,912 B | planner | exec | the planner waits; `commands` stays taken |
+//! | block ring | blocks | 61 | 2,079 B with the speed constraints | planner | exec | the planner waits; `commands` stays taken |
 //! | segment ring | segments | 7 | 131 B | exec | step interrupt | exec waits for its next run |
 //! | `uart` transmit ring | bytes | 127 each port | 131 B each | parser, reporter | TX interrupt | parser: the port waits, response half sent; reporter: waits |
 //! | [`Links::storage`] | which settings to look at, a row of the tables | a range, 1 | 46 B | parser | storage | the range grows; a line that changes another row waits |
 //! | [`Links::rate`] | a new rate of the line | 1 | 6 B | parser | parser | overwritten: the newest counts |
-//! | [`Port::seen`] | how the machine stood when the report under way first told of motion | 1 | 33 B each port | whoever tells it on the port | the same | overwritten |
+//! | [`Port::seen`] | the state of the machine when the report under way first read motion | 1 | 33 B each port | the task that reports on the port | that task | overwritten |
 //! | [`Links::restart`] | a reset that is due | 1 | 1 B | parser | parser | overwritten |
-//! | [`Links::changes`] | what the planner has to look at before the next line | a bit each | 1 B | parser, planner | planner | bits merge |
+//! | [`Links::changes`] | changes that the planner handles before the next line | a bit each | 1 B | parser, planner | planner | bits merge |
 //! | [`Links::notices`], [`Links::probe`] | what is to be told: an exception, the end of a jog or of a flush, a probing | 1 each | 4 B, 26 B | all | reporter | overwritten: the newest counts, but in an alarm its reason |
 //! | [`Links::job`] | the built-in job, and how far it has come | 1 | 4 B | parser | parser, reporter, planner in a flush | a second one is refused |
-//! | [`Links::cleared_by`] | who has ended an alarm last | 1 | 1 B | parser | parser | overwritten |
+//! | [`Links::cleared_by`] | the port that has ended an alarm last | 1 | 1 B | parser | parser | overwritten |
 //! | [`Links::feeder`] | which port's lines are carried out | 1 | 1 B | parser | all | never: it changes at rest |
 //!
 //! What the machine is doing is no link: that is in [`machine`](crate::machine). [`Links::signs`] belong to the
@@ -51,7 +50,7 @@ use crate::protocol::Memory;
 // In this order: AVR reaches a field within 63 bytes of the first in one instruction.
 #[repr(C)]
 pub struct Links {
-    /// Shows that all of this belongs to thread mode.
+    /// The proof that all links belong to thread mode.
     pub thread: Thread,
     /// The number of the port that feeds the machine.
     pub feeder: Cell<u8>,
@@ -59,7 +58,7 @@ pub struct Links {
     pub commands_taken: Cell<bool>,
     /// The last line that the planner has been given moves the machine.
     pub moves_last: Cell<bool>,
-    /// A line has come, or the planner is ready: the parser looks again.
+    /// A line has come, or the planner is ready: wakes the parser.
     pub parser_wake: Wake,
     /// `commands` has been filled.
     pub planner_wake: Wake,
@@ -67,9 +66,9 @@ pub struct Links {
     pub reporter_wake: ReporterWake,
     /// A line has left a pool. The reader waits for this when a pool is full.
     pub pool_space: Wake,
-    /// A chain of lines may wait for more. The power task then has the planner look.
+    /// A chain of lines may wait for more. The power task then wakes the planner.
     pub chain_waits: Cell<bool>,
-    /// What the planner has to look at before the next line.
+    /// Changes that the planner handles before the next line.
     pub changes: Changes,
     /// The built-in job that runs.
     pub job: Cell<Job>,
@@ -77,17 +76,17 @@ pub struct Links {
     pub rate: Cell<Option<u32>>,
     /// The machine is to be reset; `true` starts its boot loader. The parser does so when its response has left.
     pub restart: Cell<Option<bool>>,
-    /// What has to be saved, and where the other settings are.
+    /// The settings and tables to save, and the log of saved ones.
     pub storage: &'static Storage,
-    /// A tilde has come: what has stopped goes on.
+    /// A tilde has come: resume.
     pub cycle_start: Wake,
     /// Blocks that came and went, for queue reports.
     pub queue_count: QueueCount,
     /// The number of the port that has asked last for the end of an alarm.
     pub cleared_by: Cell<u8>,
-    /// What is still to be told. Any task writes, the reporter takes.
+    /// Notices for the reporter. Any task writes, the reporter takes.
     pub notices: Notices,
-    /// What probing has found.
+    /// The result of probing.
     pub probe: Probe,
     /// Real-time characters that have not had all their effect yet. They belong to the control task and the reader,
     /// with `tasks::hold`.
@@ -97,11 +96,11 @@ pub struct Links {
     /// The SD card, and the file that is printed from it.
     #[cfg(feature = "sd")]
     pub card: &'static RefCell<crate::card::Card>,
-    /// What dialects remember between reports.
+    /// The memory of dialects between reports.
     pub report: RefCell<Memory>,
     /// The serial ports.
     pub ports: [Port; PORTS],
-    /// What the planner is to do; valid while `commands_taken`.
+    /// The commands for the planner; valid while `commands_taken`.
     pub commands: RefCell<Commands>,
     /// The G-code model. The parser advances it; reports read it.
     pub model: RefCell<Interpreter<&'static Storage>>,
@@ -109,16 +108,17 @@ pub struct Links {
     pub settings: RefCell<Settings>,
 }
 
-/// What has changed other than by lines. Whoever changes it notes it, and the planner takes it before the next line.
+/// Changes other than by lines. The code that changes something sets its bit; the planner takes the bits before the
+/// next line.
 pub struct Changes(Cell<u8>);
 
 impl Changes {
-    /// The meaning of steps has changed: they are to be counted anew.
+    /// The relation of steps to positions has changed: positions in steps must be computed again.
     pub const STEPS: u8 = 1;
     /// A setting has changed.
     pub const SETTINGS: u8 = 2;
 
-    /// Coolant outputs that have been switched other than by a line, as bits of [`outputs`]. To switch one twice is no
+    /// Coolant outputs that have been toggled other than by a line, as bits of [`outputs`]. Toggling one twice is no
     /// change.
     pub const COOLANT: u8 = outputs::MIST | outputs::FLOOD;
 
@@ -202,8 +202,8 @@ pub fn wait_for_block(yes: bool) {
     waits().set(yes.into());
 }
 
-/// Pends exec if it waits for a block, now that one has been queued. Otherwise exec looks when a segment has been used
-/// up.
+/// Pends exec if it waits for a block, now that one has been queued. Otherwise exec sees the block when a segment has
+/// been used up.
 pub fn feed() {
     if waits().get() != 0 {
         crate::hal::exec::pend();

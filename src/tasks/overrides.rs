@@ -1,9 +1,9 @@
-//! The overrides in force: one state for everyone who changes overrides or goes by them.
+//! The overrides in force, shared by all that set or use them.
 //!
 //! Requests and real-time characters change overrides ([`change`]). So do M48 to M51 and the end of a program, when
-//! exec comes to them ([`change_in_stream`]). Exec goes by the factors from its next stretch on: the stretches that
-//! are queued already take 9 ms at most. A factor that rises waits for the planner (`motion::replan`), which the
-//! control task wakes: [`Event::Realtime`]. Nothing here waits, and nothing can be full.
+//! exec comes to them ([`change_in_stream`]). Exec uses the factors from its next stretch on; stretches that are
+//! already queued take 9 ms at most. A higher factor waits for the planner (`motion::replan`), which the control task
+//! wakes ([`Event::Realtime`]). Nothing here waits, and nothing can be full.
 //!
 //! [`tell`] passes the factor of the spindle's speed on to the spindle.
 
@@ -20,7 +20,7 @@ use crate::motion::factors::Factors;
 use crate::motion::queue::{self, BlockSource};
 use crate::realtime::{Asked, NO_JOG, TRAVERSE};
 
-/// The least override that characters ask for in grbl's dialect, thousandths.
+/// The least override that characters set in grbl's dialect, thousandths.
 const LEAST_IN_ORDER: u16 = 100;
 
 /// Returns the overrides as they are.
@@ -68,8 +68,8 @@ pub fn change_in_stream(overrides: &mut Overrides, change: Change, blocks: &mut 
     flags::set(Event::Realtime);
 }
 
-/// Does what real-time characters ask for, at once. A step that would go too far goes as far as possible, and further
-/// steps count from there. Control only.
+/// Carries out override characters at once. Steps are clamped to the range, and further steps start from there. Control
+/// only.
 #[small]
 pub fn serve(links: &Links) {
     for port in &links.ports {
@@ -77,7 +77,7 @@ pub fn serve(links: &Links) {
     }
 }
 
-/// Does what characters on a port ask for. Thread mode.
+/// Carries out the override characters of a port. Thread mode.
 #[inline(never)]
 #[small]
 pub fn apply(links: &Links, port: &Port, asked: Asked) {
@@ -107,7 +107,7 @@ fn step(thread: Thread, which: Override, percent: i8, anew: bool, least: u16) {
         return;
     }
     let before = if anew { FULL } else { now(thread).factor(which) };
-    // If it has been set lower, asking for less does not raise it.
+    // If it has been set lower, a step down does not raise it.
     let least = least.min(before).cast_signed();
     let factor = (before.cast_signed() + 10 * i16::from(percent)).max(least);
     change(thread, Change::to(which, factor.cast_unsigned().min(which.most())));
@@ -122,7 +122,7 @@ pub fn tell(links: &Links) {
     links.reporter_wake.signal();
 }
 
-/// Returns the factors that motion goes by. A factor of 1 is exact: velocities are then as programmed, to the bit.
+/// Returns the factors for motion. A factor of 1 is exact: velocities are then as programmed, to the bit.
 #[inline(never)]
 #[small]
 fn factors(overrides: &Overrides) -> Factors {

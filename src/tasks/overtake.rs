@@ -1,7 +1,7 @@
 //! Control lines that overtake data in the receive ring.
 //!
-//! When the pool takes no more lines in order, bytes stay in the ring. The reader looks on through them for short
-//! control lines, so that a stop or a question never waits for the moves before it:
+//! When the pool takes no more lines in order, bytes stay in the ring. The reader scans them for short control lines,
+//! so that a stop or a question never waits for the moves before it:
 //!
 //! ```text
 //!  pool  | g1x1.. | g1x2.. | g1x3   part |  reserve  |
@@ -9,17 +9,16 @@
 //!             | 00 | g1x4 |                   and what is before it in the ring moves up
 //! ```
 //!
-//! A line overtakes if it has come whole, is no longer than the pool's reserve, and is a control line. A longer
-//! control line waits in order, and shorter ones overtake it. The sender's count stays right: the bytes of the line
+//! A line overtakes if it has come whole, is no longer than the pool's reserve, and is a control line. A longer control
+//! line waits in order, and shorter ones overtake it. The sender's character count stays right: the bytes of the line
 //! count with the line, and their room is free when the line has been answered. At most one byte of the line's end
-//! stays in the ring and counts nothing. It is a carriage return that a line feed may follow, or the newest byte of a
-//! full ring.
+//! stays in the ring without being counted: a carriage return that a line feed may follow, or the newest byte of a full
+//! ring.
 //!
 //! While lines are being dropped, up to a slot of the ring, bytes there do not move: `serial::TAKEN` stands for each
 //! byte of a line that has been taken.
 //!
-//! Each byte is looked at once (11 cycles). The bytes of a line whose end has not come are looked at each time that
-//! the reader looks.
+//! Each byte is scanned once (11 cycles). The bytes of an unfinished line are scanned at each turn of the reader.
 
 use super::lines::{LinePool, is_blank};
 use super::links::Links;
@@ -27,11 +26,11 @@ use crate::hal::ring::Window;
 use crate::hal::serial::{CLEAN, CUT, GO, MARKS, TAKEN, TAKEN_RETURN};
 use crate::protocol::may_be_control;
 
-/// How far a ring has been looked through.
+/// How far a ring has been scanned.
 pub struct Scan {
-    /// How many of the bytes that wait have been looked at.
+    /// How many of the bytes that wait have been scanned.
     pub(super) looked: u8,
-    /// What follows is the rest of a line that does not overtake.
+    /// The next bytes belong to a line that does not overtake.
     pub(super) within: bool,
     /// How many of the bytes that wait have been searched for alarms: 0, or up to the beginning of a line.
     pub(super) stops: u8,
@@ -39,7 +38,7 @@ pub struct Scan {
     pub(super) begun: u8,
 }
 
-/// What begins at a place in the ring.
+/// What begins at a position in the ring.
 enum Found {
     /// A line that may overtake, of this many bytes without its end.
     Line(u8),
@@ -52,7 +51,7 @@ enum Found {
 }
 
 impl Scan {
-    /// A scan that has looked at nothing yet.
+    /// A scan before the first byte.
     pub const NONE: Self = Self { looked: 0, within: false, stops: 0, begun: 0 };
 
     /// Notes that the reader has taken this many bytes in order.
@@ -70,8 +69,8 @@ impl Scan {
         self.stops != 0
     }
 
-    /// Looks on, and takes the lines that overtake, as long as there is room for them. Returns whether there were any.
-    /// If the ring `closes` behind them, it has fewer bytes afterwards, and the difference is to be released.
+    /// Scans further, and takes the lines that overtake, as long as there is room for them. Returns whether there were
+    /// any. If the ring `closes` behind them, it has fewer bytes afterwards, and the difference is to be released.
     #[inline(never)]
     #[small]
     pub fn run(
@@ -95,7 +94,7 @@ impl Scan {
             }
             let byte = ring.get(self.looked);
             if byte < MARKS && byte != CUT && byte != GO {
-                // Bytes were lost here. If the mark is the newest byte, it may yet come to tell of more.
+                // Bytes were lost here. If the mark is the newest byte, it may still change when more is lost.
                 if self.looked + 1 == ring.len() {
                     break;
                 }

@@ -1,4 +1,4 @@
-//! The parser task: takes lines, answers them, and hands what they ask for to the planner.
+//! The parser task: takes lines, answers them, and hands their commands to the planner.
 //!
 //! Reads the line pools, writes `Links::commands`, the G-code model, the settings and the response; waits for lines,
 //! for the planner, and for room to transmit. Control lines are taken at any time. Data lines of the port that feeds
@@ -40,9 +40,9 @@ use crate::status::Status;
 use answer::{Answer, finish, go_on, has_room, leave};
 use block::{has_room_for_startup, is_working, job_line, waits_for_jog};
 
-/// How many turns in a row an answer leaves to answers on other ports that have had no turn yet.
+/// How many turns in a row an answer yields to answers on other ports that have had no turn yet.
 const PATIENCE: u8 = 8;
-/// What [`Parser::turns`] returns for a port on which no answer can go on.
+/// The value of [`Parser::turns`] for a port on which no answer can go on.
 const NONE: u8 = u8::MAX;
 
 /// How many turns in a row are left to a report that ends its line early for an answer.
@@ -62,7 +62,7 @@ enum Session {
     Leave(Line, Option<u16>),
 }
 
-/// What a turn has come to.
+/// The result of a turn.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Turn {
     /// Something has been done; there may be more to do.
@@ -71,15 +71,15 @@ enum Turn {
     Nothing,
 }
 
-/// Whether the feeder's next line of G-code waits for the machine to rest. The line stays in the pool and is begun
-/// anew then. Lines that overtake come before it.
+/// Whether the feeder's next line of G-code waits for a standstill. The line stays in the pool and is begun again then.
+/// Lines that overtake come before it.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Deferred {
     /// The line does not wait.
     No,
-    /// The line is carried out when the machine rests.
+    /// The line is carried out at the standstill.
     Line,
-    /// The line has been carried out, and is answered when the machine rests.
+    /// The line has been carried out, and is answered at the standstill.
     Answer,
 }
 
@@ -96,7 +96,7 @@ struct Parser {
     last: u8,
     /// The line that was begun last is G-code of the feeder: other lines come before the next one.
     has_fed: bool,
-    /// Whether the next line of G-code waits for rest.
+    /// Whether the next line of G-code waits for a standstill.
     deferred: Deferred,
     /// How many turns in a row have been left to others: by a long answer to short ones, or by a line that waits to a
     /// report.
@@ -130,7 +130,7 @@ pub fn run(
                 yield_now().await;
             }
             match parser.turn() {
-                // The reader has its turn, so that it stops the sender in time.
+                // Gives the reader a turn, so that it stops the sender in time.
                 Turn::More => yield_now().await,
                 Turn::Nothing => parser.wait().await,
             }
@@ -150,7 +150,7 @@ impl Parser {
         let waits = self.deferred != Deferred::No && is_working(links);
         let data = free && !runs_job && !self.is_feeding() && !waits;
         let straight = !alarmed && !matches!(machine::cycle(), Cycle::Check | Cycle::Jog);
-        // What a port is told at once goes first: an acknowledgement must not wait for a move.
+        // Immediate messages of a port go first, because an acknowledgement must not wait for a move.
         let declined = if data && straight && self.is_idle() && !self.has_more() {
             match row::run(links, self.planner) {
                 Row::Over => false,
@@ -245,8 +245,7 @@ impl Parser {
         self.has_work() || self.links.ports.iter().any(has_lines)
     }
 
-    /// Goes on with what is under way, and tells what one port alone is told. Returns whether something has come to
-    /// its end.
+    /// Continues answers under way, and sends messages for single ports. Returns whether something has ended.
     #[inline(never)]
     fn go_on(&mut self) -> bool {
         let (mut ended, after) = (false, self.last + 1);
@@ -415,7 +414,7 @@ impl Parser {
         }
     }
 
-    /// Waits until something may go on.
+    /// Waits until something can continue.
     fn wait(&self) -> impl Future<Output = ()> + '_ {
         let links = self.links;
         // An answer that is still due does not wait for the CPU.
@@ -468,8 +467,7 @@ impl Parser {
     }
 }
 
-/// Answers a sender that asks whether anybody is there, or tells it that bytes were lost. Returns false if that has to
-/// wait.
+/// Answers an enquiry (ENQ), or reports lost bytes. Returns false if that has to wait.
 #[inline(never)]
 #[small]
 fn tell(links: &Links, port: &Port) -> bool {
@@ -482,7 +480,7 @@ fn tell(links: &Links, port: &Port) -> bool {
     told
 }
 
-/// What has become of a line that was begun.
+/// The result of beginning a line.
 enum Begun {
     /// The line is being answered.
     Answer,

@@ -69,10 +69,10 @@ pub struct Planner {
     waits_since: u16,
     /// How many lines in a row have not gone on with a chain.
     alone: u8,
-    /// What exec is told before anything else of the line.
+    /// The change that exec is told of before the line.
     announcement: Announcement,
     queue: BlockQueue,
-    /// What exec has been told to switch.
+    /// The outputs that exec has been commanded to switch.
     outputs: Outputs,
     /// Exec has been told of a surface speed; in `per_turn`, that feeds are per turn.
     has_surface: bool,
@@ -95,11 +95,11 @@ pub struct Planner {
     walk: Ongoing,
 }
 
-/// What of a line is left to be done.
+/// The remainder of a line.
 enum Begun {
     /// Nothing is left.
     Nothing,
-    /// The rest of the line's parts.
+    /// The remaining parts of the line.
     Parts(Parts),
     /// Nothing is left. Lines are only checked, and these are the modes from before the check.
     Check(Modes),
@@ -107,12 +107,12 @@ enum Begun {
     Chain(Chain),
 }
 
-/// What exec is to be told that no line says.
+/// A change that exec must be told of besides lines.
 #[derive(Clone, Copy, PartialEq)]
 enum Announcement {
     /// Nothing has changed.
     None,
-    /// The meaning of steps has changed: they are counted anew.
+    /// The relation of steps to positions has changed: positions in steps are computed again.
     Position,
     /// The demands of the drivers may have changed.
     Drivers,
@@ -120,12 +120,12 @@ enum Announcement {
     Lead,
 }
 
-/// What a turn of the planner has led to.
+/// The result of a turn of the planner.
 #[derive(Clone, Copy, PartialEq)]
 enum Turn {
     /// There is more to do.
     More,
-    /// The machine is to stop until somebody starts it.
+    /// The machine stops until a cycle start.
     Pause,
     /// The line probes.
     Probe,
@@ -222,11 +222,11 @@ pub fn take_at_once(planner: &mut Planner) -> bool {
     if planner.has_chain() {
         planner.links.chain_waits.set(true);
         if queue::used_here() <= 1 {
-            // Exec may have finished a block meanwhile without the planner's task having heard of it.
+            // Exec may have finished a block of which the planner's task has not been told yet.
             planner.make_up();
         }
         if !had_chain {
-            // The task sees to it that the chain does not wait long.
+            // The task limits the time for which the chain waits.
             planner.links.planner_wake.signal();
         }
     }
@@ -235,11 +235,11 @@ pub fn take_at_once(planner: &mut Planner) -> bool {
 
 /// With this many blocks queued, answers come before another block.
 const ENOUGH: usize = CAPACITY / 2;
-/// How many turns answers get then: enough for two answers and for what else thread mode does meanwhile.
+/// How many turns answers get then: enough for two answers and the other work of thread mode meanwhile.
 const PATIENCE: u8 = 16;
 
 impl Planner {
-    /// Returns a planner that knows of no move, for a queue that is empty.
+    /// Returns a planner without a move, for an empty queue.
     pub fn new(links: &'static Links, queue: BlockQueue) -> Self {
         Self {
             links,
@@ -271,8 +271,8 @@ impl Planner {
         is_asked() && queue::used_here() >= ENOUGH
     }
 
-    /// Carries out a straight move for which there is room, as most lines are, without the means to wait. Returns
-    /// false for all other lines, without having done anything of the line.
+    /// Fast path: carries out a straight move for which there is room, without waiting. Returns false for all other
+    /// lines, with nothing done.
     #[inline(never)]
     fn carry_out_at_once(&mut self) -> bool {
         let commands = self.links.commands.borrow();
@@ -331,7 +331,7 @@ impl Planner {
         self.take_up_changes();
     }
 
-    /// Takes up settings that have changed. Exec has to be told of some of them before anything else.
+    /// Applies changed settings. Exec must be told of some of them before the next line.
     #[inline(never)]
     fn take_up_changes(&mut self) {
         if self.links.changes.take(Changes::SETTINGS) {
@@ -425,7 +425,7 @@ impl Planner {
             Step::Stop(Stop::End) => self.pause(QueuedAction::ProgramEnd),
             Step::Stop(_) | Step::Tool(_) => {
                 let waits = self.links.settings.borrow().waits_at_stop();
-                // A tool is reported; a sender that changes it sees to the stop itself.
+                // The tool is reported; a sender that changes tools handles the stop itself.
                 if waits || matches!(step, Step::Stop(_)) {
                     self.pause(QueuedAction::ProgramStop);
                 }
@@ -447,7 +447,7 @@ impl Planner {
                     return Turn::Heat;
                 }
             }
-            // No line asks for it.
+            // No line has this step.
             #[cfg(not(feature = "printer"))]
             Step::Heat(_) => {}
         }
@@ -559,7 +559,7 @@ impl Planner {
         }
     }
 
-    /// Gives the place of the machine other coordinates, as G28.3 does. No motor moves.
+    /// Redefines the position of the machine, as G28.3 does. No motor moves.
     #[inline(never)]
     #[small]
     fn set_position(&mut self, position: &PerAxis<Length>) {
@@ -581,7 +581,7 @@ impl Planner {
         }
     }
 
-    /// Plans the queue anew if other overrides are wanted.
+    /// Computes the keys of the queue again if other overrides are requested.
     fn replan(&mut self) {
         if let Some(wanted) = self.queue.wanted() {
             self.queue.replan(wanted);
@@ -596,7 +596,7 @@ impl Planner {
         self.announce();
     }
 
-    /// Queues an action that is done at rest.
+    /// Queues an action that is done at a standstill.
     #[inline(never)]
     #[small]
     fn pause(&mut self, action: QueuedAction) {
@@ -607,7 +607,7 @@ impl Planner {
     #[inline(never)]
     #[small]
     fn push(&mut self, block: Block) {
-        // There is room: only this task fills the queue, and it looks for room before each turn.
+        // There is room: only this task fills the queue, and it checks for room before each turn.
         let _ = self.queue.push(block);
         self.announce();
     }
@@ -629,7 +629,7 @@ impl Planner {
             return;
         }
         machine::carry_out(machine::Event::Stopped);
-        // A sender that does not hear of the stop would wait for ever.
+        // Without this report a sender would wait for ever.
         self.links.except(Status::ProgramStopped);
         self.links.cycle_start.take();
         self.links.cycle_start.wait().await;
@@ -675,7 +675,7 @@ impl Planner {
         let (cycle, killed) = machine::dropped();
         match cycle {
             Cycle::Jog => links.notices.jogged.set(true),
-            // The motors of an axis may have moved apart, so that steps are counted anew.
+            // The motors of an axis may have moved apart, so positions in steps are computed again.
             Cycle::Homing => links.changes.note(Changes::STEPS),
             Cycle::Probe => links.probe.abandon(),
             // Check mode was about to begin.

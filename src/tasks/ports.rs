@@ -1,11 +1,11 @@
-//! The serial ports as tasks see them: what each has to itself, and which of them feeds the machine.
+//! The serial ports as tasks see them: the state of each port, and which of them feeds the machine.
 //!
-//! Each port is answered on itself, in the mode that it was spoken to last. Control lines of every port are taken at
+//! Each line is answered on its own port, in the mode of the last line there. Control lines of every port are taken at
 //! any time. G-code comes from one port at a time, the *feeder*: the first port to send some while the machine is at
 //! rest. It stays the feeder until the machine is at rest again. G-code from any other port is refused meanwhile, with
-//! status 117: if it waited instead, it would move the machine later, when nobody expects that.
+//! status 117: if it waited instead, it would move the machine later, unexpectedly.
 //!
-//! Reports that nobody asked for go to the feeder, or to USB while the feeder is on a bus that it shares with others.
+//! Unsolicited reports go to the feeder, or to USB while the feeder is on a bus that it shares with others.
 
 use core::cell::{Cell, RefCell};
 
@@ -63,7 +63,7 @@ pub fn greets_anew() -> bool {
     Speech::HAS_QUESTION || uart::sees_opening()
 }
 
-/// What has decided in which dialect a port is spoken to.
+/// What has decided the dialect of a port.
 #[derive(Clone, Copy, Default, PartialEq, Eq)]
 pub enum Choice {
     /// The image has one dialect alone.
@@ -77,22 +77,22 @@ pub enum Choice {
     Open = 3,
 }
 
-/// What belongs to one port.
+/// The state of one port.
 // In this order: AVR reaches a field within 63 bytes of the first in one instruction.
 #[repr(C)]
 pub struct Port {
     /// The number of the port.
     pub number: u8,
-    /// How the sender wants to be answered.
+    /// The dialect and mode of answers.
     pub speech: Cell<Speech>,
     /// What has decided in which dialect the port is spoken to.
     pub choice: Cell<Choice>,
-    /// What a sender has asked for by a byte, as bits. The parser answers a [`REPORT`]; control does a [`RESET`]; the
-    /// rest is the reporter's.
+    /// Requests by single bytes, as bits. The parser answers a [`REPORT`]; control carries out a [`RESET`]; the
+    /// reporter handles the others.
     pub asked: Cell<u8>,
-    /// The sender asks whether anybody is there. Control sets this, and the parser answers.
+    /// The sender has sent an enquiry (ENQ). Control sets this, and the parser answers.
     pub enquiry: Cell<bool>,
-    /// Bytes have been lost, which the parser is to tell.
+    /// Bytes have been lost, which the parser is to report.
     pub lost: Cell<bool>,
     /// The slot of the receive ring up to which lines of G-code are dropped. A kill or a flush has set it.
     pub cut: Cell<Option<u8>>,
@@ -104,7 +104,7 @@ pub struct Port {
     pub lines: RefCell<LinePool>,
     /// The line to the sender, for the parser and the reporter. The mutex knows of one task that waits, the reporter.
     pub tx: Mutex<NoopRawMutex, Tx>,
-    /// How the machine stood when the report or group that is being told on this port first told of motion.
+    /// The state of the machine when the report or group under way on this port first read motion.
     pub seen: Cell<Option<Seen>>,
 }
 
@@ -183,8 +183,7 @@ impl Port {
         Speech::HAS_PLAIN && self.speech.get().is_plain()
     }
 
-    /// Returns how the two sides stop each other. Characters do so only in dialects whose senders know these
-    /// characters.
+    /// Returns the flow control in force. XON and XOFF are used only in dialects whose senders know these characters.
     pub fn flow(&self, settings: &Settings) -> Flow {
         match Flow::of(self.number, settings.flow_control()) {
             Flow::Characters if self.speech.get().is_in_order() || self.is_plain() => Flow::None,
@@ -220,7 +219,7 @@ impl Port {
         self.tx.lock().await
     }
 
-    /// Whether there is something to tell on this port alone, or a byte to answer that is no line.
+    /// Whether there is a message for this port alone, or a byte to answer that is no line.
     #[inline(always)]
     pub fn tells(&self) -> bool {
         self.enquiry.get() || self.lost.get() || self.asks_report()
@@ -264,7 +263,7 @@ impl Links {
         self.model.borrow_mut().set_position(position);
     }
 
-    /// Returns the port that is told what nobody asked for.
+    /// Returns the port that gets unsolicited reports.
     #[inline(never)]
     pub fn told(&self) -> &Port {
         let feeder = self.feeder.get();
@@ -313,8 +312,8 @@ impl Links {
         self.reporter_wake.notify_now();
     }
 
-    /// Follows a change of dialect on any port: which ports are eager ([`Port::is_eager`]), how the sides stop each
-    /// other, and which motion mode is in force at first.
+    /// Applies a change of dialect on any port: which ports are eager ([`Port::is_eager`]), the flow control, and the
+    /// initial motion mode.
     #[inline(never)]
     #[small]
     pub fn decided(&self, settings: &Settings) {
@@ -329,7 +328,7 @@ impl Links {
         }
     }
 
-    /// Sets how the sides of each line stop each other, by the settings and the dialect.
+    /// Sets the flow control of each port, by the settings and the dialect.
     #[inline(never)]
     #[small]
     pub fn set_flow(&self, settings: &Settings) {
@@ -347,8 +346,8 @@ impl Links {
         Speech::HAS_QUESTION && self.ports.iter().any(is_interrupted)
     }
 
-    /// Reports an exception to whoever feeds the machine. It replaces one that waits, except in an alarm, where the
-    /// one that waits may be the reason of the alarm.
+    /// Reports an exception to the feeder. It replaces one that waits, except in an alarm, where the one that waits may
+    /// be the reason of the alarm.
     #[inline(never)]
     #[small]
     pub fn except(&self, status: Status) {
@@ -367,7 +366,7 @@ impl Links {
 
     /// Gives other tasks up to `turns` turns, as long as control lines wait or are being answered and `counts` says
     /// that they come first. Gives them one more turn first if bytes have come that may be such a line. A turn costs
-    /// 300 cycles if nobody has anything to do.
+    /// 300 cycles if no task has work.
     pub async fn give_way(&self, turns: u8, counts: impl Fn() -> bool) {
         if is_unheard() {
             yield_now().await;

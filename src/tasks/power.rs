@@ -1,9 +1,8 @@
 //! The power task: gives motors power, and takes it from them when they have been idle.
 //!
-//! Reads the settings, the milliseconds and exec's snapshot; writes the drivers' enables. Waits for [`LOOK_MS`]
-//! between looks, and also looks after the [`health`] of the firmware. Exec calls [`segment`] before it queues a
-//! segment, so that a driver is on before its step; that costs 40 cycles a segment. All others change the state under
-//! the ceiling.
+//! Reads the settings, the milliseconds and exec's snapshot; writes the drivers' enables. Runs every [`LOOK_MS`], and
+//! also checks the [`health`] of the firmware. Exec calls [`segment`] before it queues a segment, so that a driver is
+//! on before its step; that costs 40 cycles a segment. All others change the state under the ceiling.
 
 use super::common;
 use super::health;
@@ -18,7 +17,7 @@ use crate::hal::time::millis;
 use crate::machine;
 use crate::motors::{Modes, Motors};
 
-/// How often idle motors are looked for, ms.
+/// Period of the task, ms.
 const LOOK_MS: u64 = 20;
 
 /// The task.
@@ -59,7 +58,7 @@ fn look(links: &Links) {
 }
 
 /// Gives power to the motors `moving` (bits), before a segment of a block that moves them is queued. The increments of
-/// the segment alone would not tell: a motor may still have a rest of the block before. Exec only.
+/// the segment would not be enough, because a motor may still have a remainder of the block before. Exec only.
 #[small]
 pub fn segment(motors: &mut Motors, moving: u8) {
     carry_out(motors, |motors| motors.segment(moving));

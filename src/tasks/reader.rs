@@ -2,9 +2,9 @@
 //!
 //! Reads the receive rings, writes the line pools, waits on [`Event::Received`] or for pool space. Never runs longer
 //! than a full ring takes (255 bytes, about 6,000 cycles). When the pool is full, bytes stay in the ring, except for
-//! short control lines, which [overtake](super::overtake). When the ring is full too, bytes are lost: the line that is
-//! damaged is refused, and so is each line that is lost whole. With `ex` 1, XOFF stops the sender before that, and the
-//! sender may stop the machine's answers by XOFF; with `ex` 2, pins do both.
+//! short control lines, which [overtake](super::overtake). When the ring is full too, bytes are lost: damaged lines and
+//! lines lost whole are refused. With `ex` 1, XOFF stops the sender before that, and the sender may stop answers by
+//! XOFF; with `ex` 2, pins do both.
 
 use embassy_futures::select::select;
 use embassy_futures::yield_now;
@@ -101,7 +101,7 @@ impl Levels {
 struct Intake {
     port: &'static Port,
     received: Received,
-    /// How many of the lost line ends (`lost_ends`) have been seen to.
+    /// How many of the lost line ends (`lost_ends`) have been handled.
     seen: u16,
     /// How many lost lines are still to be refused.
     refused: u16,
@@ -131,13 +131,12 @@ impl Intake {
         }
     }
 
-    /// Whether there is nothing to do, as is mostly so on a port that nobody uses.
+    /// Whether there is nothing to do, as on a port that is not used.
     fn is_idle(&self) -> bool {
         self.received.is_empty() && self.refused == 0 && self.stopped == Flow::None
     }
 
-    /// Takes the bytes of a turn, stops the sender or lets it go on, and sees to real-time characters where they
-    /// stand.
+    /// Takes the bytes of a turn, applies flow control, and acts on real-time characters where they stand.
     fn take(&mut self, links: &Links) -> Left {
         if self.port.is_eager() {
             let taken = realtime::pick(links, self.port, &mut self.received.window());
@@ -259,7 +258,7 @@ impl Intake {
         links.parser_wake.signal();
     }
 
-    /// Has the pool take lines as the dialect of the port wants.
+    /// Sets up the pool for the dialect of the port.
     #[inline(never)]
     fn speak(&self, pool: &mut LinePool) {
         let speech = self.port.speech.get();
@@ -270,8 +269,7 @@ impl Intake {
         }
     }
 
-    /// The line that has come last may decide the dialect. The lines right behind it are then taken as that dialect
-    /// wants.
+    /// Lets the last line decide the dialect. The lines directly after it are then taken by the rules of that dialect.
     #[cold]
     #[inline(never)]
     #[small]
@@ -386,8 +384,8 @@ impl Intake {
     }
 }
 
-/// Looks through the ring while no line can be taken before the machine goes on. Acts on real-time characters that let
-/// it go on, and takes lines that overtake. Returns how many bytes of these lines are to be released.
+/// Scans the ring while no line can be taken before the machine resumes. Acts on real-time characters that resume it,
+/// and takes lines that overtake. Returns how many bytes of these lines are to be released.
 #[inline(never)]
 #[small]
 fn look_ahead(links: &Links, port: &Port, scan: &mut Scan, ring: &mut Window<'_>) -> u8 {
@@ -415,7 +413,7 @@ fn look_ahead(links: &Links, port: &Port, scan: &mut Scan, ring: &mut Window<'_>
 #[small]
 fn look_for_marks(links: &Links, port: &Port, ring: &Window<'_>) {
     let mut aside = port.lines.borrow().aside();
-    // Marks before a cut have had their effect already.
+    // Marks before a cut have already taken effect.
     let mut last = port.cut.get();
     for n in 0..ring.len() {
         let (byte, slot) = (ring.get(n), ring.slot(n));

@@ -25,7 +25,7 @@ use crate::hal::serial::{CUT, GO, MARKS};
 use crate::protocol::Speech;
 use crate::realtime::Asked;
 
-/// Opens the door and shuts it: what moves is held, and waits for a tilde.
+/// Safety door: holds motion until a tilde.
 const DOOR: u8 = 0x84;
 /// Stops the spindle in a hold, or lets it turn again.
 const SPINDLE_STOP: u8 = 0x9E;
@@ -34,8 +34,8 @@ const FLOOD: u8 = 0xA0;
 const MIST: u8 = 0xA1;
 const ASKS: u8 = b'?';
 
-/// Takes bytes that act out of a ring, and does what they ask for. Returns how many bytes are to be released. No blanks
-/// are left in their place, because the sender does not count these bytes.
+/// Removes bytes that act from a ring, and carries them out. Returns how many bytes are to be released. No blanks are
+/// left in their place, because the sender does not count these bytes.
 #[inline(never)]
 #[small]
 pub fn pick(links: &Links, port: &Port, ring: &mut Window<'_>) -> u8 {
@@ -67,7 +67,7 @@ pub fn pick(links: &Links, port: &Port, ring: &mut Window<'_>) -> u8 {
     waiting - ring.len()
 }
 
-/// Decides the dialect of a port: a sender that asks by a `?` alone speaks one that has it.
+/// Decides the dialect of a port: a sender that sends a `?` alone uses a dialect that has it.
 fn decide(links: &Links, port: &Port) {
     let settings = links.settings.borrow();
     if let Some(speech) = Speech::of_question(&settings) {

@@ -1,10 +1,10 @@
 //! The reporter task: the greeting, then status and queue reports, and exceptions.
 //!
-//! Reads everything through [`View`], writes to the port that is told. What only one port is told is the parser's
-//! ([`tell_at_once`]). Waits for something to report, and polls every [`POLL_MS`] while the machine moves. While it
-//! polls it is not woken as well, unless queue reports are wanted. A change of what the machine is doing is told at
-//! once, anything else every `si` milliseconds. The dialect says how it is told ([`Telling`]). While the sender is
-//! slow the reporter waits, and then reports what is so by then: it never holds up anything else.
+//! Reads everything through [`View`], writes to the port that gets reports. Messages for one port alone are sent by the
+//! parser ([`tell_at_once`]). Waits for something to report, and polls every [`POLL_MS`] while the machine moves. While
+//! it polls it is not woken as well, unless queue reports are requested. A change of the machine's state is reported at
+//! once, other values every `si` milliseconds. The dialect formats the report ([`Telling`]). While the sender is slow
+//! the reporter waits, and then reports the present values; it never delays anything else.
 
 use embassy_futures::select::select;
 use embassy_futures::yield_now;
@@ -33,12 +33,12 @@ use crate::motion::snapshot::Program;
 use crate::protocol::{Hold, Machine, Notice, Occasion, Speech, Telling, Tells};
 use crate::status::Status;
 
-/// How often a machine that moves is looked at, ms.
+/// Polling period while the machine moves, ms.
 const POLL_MS: u64 = 10;
-/// How often a machine at rest is looked at for a printing host, ms.
+/// Polling period at a standstill for a printing host, ms.
 const LOOK_MS: u64 = 100;
 #[cfg(feature = "dialect-reprap")]
-/// A printing host is told again and again when a line takes longer than this, ms.
+/// Period of the busy messages to a printing host while a line takes long, ms.
 const BUSY_MS: u32 = 2_000;
 /// How often room is looked for on a port that is told besides the usual one.
 const PATIENCE: u8 = 20;
@@ -46,7 +46,7 @@ const PATIENCE: u8 = 20;
 /// for its frame.
 const SPLITS: u8 = 2;
 
-/// What was told last.
+/// The values reported last.
 struct Told {
     state: State,
     blocks_free: usize,
@@ -70,7 +70,7 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
     let mut due = true;
     let mut clock = Clock::new();
     loop {
-        // Only once: `stv` counts further ones.
+        // Only the first one is reported; `stv` counts all.
         let exception = &links.notices.exception;
         if !told.starved && health::starvations() > 0 && exception.get().is_none() {
             told.starved = true;
@@ -155,7 +155,7 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
     }
 }
 
-/// What a printing host is told again and again.
+/// Periodic messages to a printing host.
 #[cfg(feature = "dialect-reprap")]
 struct Clock {
     /// Since when no further line has been begun, ms; in `lines`, how many had been.
@@ -171,7 +171,7 @@ impl Clock {
         Self { since: millis(), lines: 0, told: millis() }
     }
 
-    /// Returns what is due by now: temperatures, if the host wants them, or that a line takes long.
+    /// Returns the message that is due: temperatures, if the host has requested them, or busy.
     #[inline(never)]
     #[small]
     fn due(&mut self, links: &Links) -> Option<Notice> {
@@ -197,7 +197,7 @@ impl Clock {
     }
 }
 
-/// In an image without a dialect of printing hosts, nobody is told anything again and again.
+/// Without a dialect of printing hosts there are no periodic messages.
 #[cfg(not(feature = "dialect-reprap"))]
 struct Clock;
 
@@ -212,7 +212,7 @@ impl Clock {
     }
 }
 
-/// What is told at once when it changes.
+/// The state that is reported at once when it changes.
 #[derive(Clone, Copy, PartialEq)]
 struct State {
     doing: Doing,
@@ -240,7 +240,7 @@ fn reports_queue(links: &Links) -> bool {
     links.settings.borrow().queue_verbosity() != 0
 }
 
-/// Begins to tell `notice` on a port. What is told is what is so by now.
+/// Begins to report `notice` on a port, with the present values.
 #[inline(never)]
 #[small]
 fn begin(notice: Notice, links: &Links, port: &Port) -> Telling {
@@ -306,7 +306,7 @@ async fn tell(links: &Links, port: &Port, notice: Notice) -> usize {
     telling.blocks_free()
 }
 
-/// Returns what a sender is to be told that has reset the machine, and on which port; `None` if nobody has.
+/// Returns the port of a sender that has reset the machine, and the notice for it; `None` if no sender has.
 #[inline(never)]
 #[small]
 fn asked(links: &Links) -> Option<(u8, Notice)> {
@@ -363,7 +363,7 @@ fn start_up(links: &Links) {
     }
 }
 
-/// Tells what has become of a start-up line. The parser has made sure that there is room.
+/// Reports the status of a start-up line. The parser has made sure that there is room.
 #[inline(never)]
 #[small]
 pub fn tell_startup(links: &Links, line: u8, status: Status) {
@@ -387,8 +387,8 @@ fn greet_otherwise(links: &Links, port: &Port, tx: &mut Tx) {
     while step(&mut telling, links, port, tx) {}
 }
 
-/// Tells something short on a port, if nobody else talks there and there is room: at most 64 bytes, or for a greeting
-/// and a program stop all of an empty ring. Returns false if it cannot be told now.
+/// Sends a short message on a port, if its transmitter is free and there is room: at most 64 bytes, or for a greeting
+/// and a program stop all of an empty ring. Returns false if it cannot be sent now.
 #[inline(never)]
 #[small]
 pub fn tell_at_once(links: &Links, port: &Port, notice: Notice) -> bool {
@@ -402,7 +402,7 @@ pub fn tell_at_once(links: &Links, port: &Port, notice: Notice) -> bool {
     fits
 }
 
-/// Tells something on the ports that are not told everything. Gives up on a port that cannot talk for long, because
+/// Sends a message on the ports that do not get all reports. Gives up on a port that stays blocked for long, because
 /// its sender may hold it back.
 async fn tell_others(links: &Links, notice: Notice) {
     let told = links.told().number;

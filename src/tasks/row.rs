@@ -2,9 +2,10 @@
 //! turn for other tasks in between.
 //!
 //! Each line is a move with a brief response. For other lines the [parser](super::parser) takes four steps and a
-//! `Request`; in a row a line takes half the time. Whose line it is, how it is answered, the transmitter and the
-//! planner are found out once for a row. Real-time characters, alarms, and a reader that must not wait end a row
-//! ([`is_wanted`]). Nothing else can come in between, because whatever else keeps lines back comes from thread mode.
+//! `Request`; in a row a line takes half the time. The port, the form of the answer, the transmitter and the planner
+//! are determined once for a row. Real-time characters, alarms, and a reader that must not wait end a row
+//! ([`is_wanted`]). Nothing else can interrupt a row, because all other reasons to hold lines back arise in thread
+//! mode.
 //!
 //! Thread mode, in the parser's turn. Cost: 2,400 cycles a line, and the cost of its block.
 

@@ -1,4 +1,4 @@
-//! What the settings tell the interpreter of lines and the planner of moves.
+//! The settings as the interpreter and the planner read them.
 
 use kerf_macros::small;
 
@@ -19,7 +19,7 @@ use crate::motion::pace::Drivers;
 use crate::status::Status;
 use crate::units::{AXES, Length, PerAxis};
 
-/// An arc may bulge beyond the reach by this much at most: see `gcode::limits`.
+/// The most by which an arc may exceed the reach: see `gcode::limits`.
 const REACH_SLACK: i32 = 256;
 
 #[small]
@@ -127,8 +127,8 @@ pub fn moved_by(settings: &Settings, motor: usize) -> u8 {
 }
 
 /// Returns where an axis is when the motors are at these steps; `None` if no motor moves it. Of several motors the
-/// first counts. If the motor is at the steps of `end`, the axis is at `end` exactly, so that what is less than a step
-/// is not lost. Cost: 3,000 cycles.
+/// first one is used. If the motor is at the steps of `end`, the axis is at `end` exactly, so that fractions of a step
+/// are not lost. Cost: 3,000 cycles.
 #[inline(never)]
 #[small]
 pub fn counted(

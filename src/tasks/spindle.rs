@@ -1,12 +1,12 @@
 //! The outputs of M3 to M9 and the spindle's speed, carried out in step with motion.
 //!
-//! Exec says what the program has switched, and S ([`Snapshot`]). Here that becomes levels and the width of pulses
-//! ([`Spindle`]). Exec calls [`switch`] at rest, when something may have changed, and waits as long as that says: a
-//! spindle that has been started takes its time. In a feedhold, the outputs that the settings name pause, and they are
-//! on again before motion goes on.
+//! Exec keeps the outputs and S of the program ([`Snapshot`]). This module converts them to levels and pulse widths
+//! ([`Spindle`]). Exec calls [`switch`] at a standstill when something may have changed, and waits for the time that it
+//! returns: a spindle needs time to start. In a feedhold the outputs that the settings select pause, and they are on
+//! again before motion resumes.
 //!
-//! Thread mode takes over changes of settings ([`set`]) and of the override ([`follow`]), which are in force at once.
-//! A sender may [switch the coolant](flip), and [stop the spindle](pause) for the hold that is on. Cost of a change:
+//! Thread mode applies changes of settings ([`set`]) and of the override ([`follow`]), which take effect at once. A
+//! sender may [switch the coolant](flip), and [stop the spindle](pause) for the hold that is on. Cost of a change:
 //! 4,000 cycles.
 
 use super::common;
@@ -34,8 +34,8 @@ pub fn on() -> u8 {
     now_on().get()
 }
 
-/// Switches the outputs as they are to be now. Returns how long motion has to wait, ms. `changed` says that S may be
-/// another. Called by exec, or with exec locked out.
+/// Updates the outputs. Returns how long motion has to wait, ms. `changed` says that S may have changed. Called by
+/// exec, or with exec locked out.
 #[inline(never)]
 #[small]
 pub fn switch(spindle: &Spindle, out: &Snapshot, changed: bool) -> u16 {
@@ -50,7 +50,7 @@ pub fn switch(spindle: &Spindle, out: &Snapshot, changed: bool) -> u16 {
         return 0;
     }
     now_on().set(wanted);
-    // A spindle that starts finds its speed set.
+    // The speed is set before the spindle starts.
     pwm::set_share(spindle.share(wanted, out.speed));
     gpio::set_outputs(wanted);
     spindle.spin_up(before, wanted)
@@ -116,7 +116,7 @@ fn with<R>(thread: Thread, what: impl FnOnce(&mut Spindle) -> R + Send) -> R {
     common::with(thread, |common| what(&mut common.spindle))
 }
 
-/// Sets the outputs as they are to be by now.
+/// Updates the outputs.
 #[small]
 fn tell(thread: Thread) {
     common::with(thread, |common| {
@@ -125,8 +125,8 @@ fn tell(thread: Thread) {
     });
 }
 
-/// Switches a coolant output over at once, whatever lines have said. Does nothing in an alarm or in check mode. A line
-/// that waits in the queue to switch an output later switches all outputs as they were when that line was planned.
+/// Toggles a coolant output at once. Does nothing in an alarm or in check mode. A line that waits in the queue to
+/// switch an output later switches all outputs as they were when that line was planned.
 #[inline(never)]
 #[small]
 pub fn flip(links: &Links, output: u8) {

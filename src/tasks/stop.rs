@@ -1,12 +1,12 @@
-//! Lines that begin an alarm: they act when they arrive, and are answered in their turn.
+//! Lines that begin an alarm: they act on arrival, and are answered in order.
 //!
-//! Lines of one port are answered in their order, and the answers before one may take a second. So the reader looks at
+//! Lines of one port are answered in their order, and the answers before one may take a second. So the reader checks
 //! each short control line that is completed in the pool ([`LinePool::take_stop`]), and at the lines that wait in a
 //! receive ring behind a full pool ([`Scan::look_for_stops`]), and raises the alarm at once. When the parser comes to
 //! such a line, it begins the alarm again if a line before it has ended the alarm. It does not if another port has
 //! ended the alarm ([`Port::has_stopped`](super::ports::Port::has_stopped), [`Links::cleared_by`]).
 //!
-//! [`asks_alarm`] says which lines these are. Thread mode.
+//! [`asks_alarm`] recognises these lines. Thread mode.
 
 use heapless::Vec;
 use kerf_macros::small;

@@ -1,11 +1,11 @@
-//! The storage task: saves what has changed of the settings and tables, in the background.
+//! The storage task: saves changed settings and tables in the background.
 //!
-//! [`Storage`] is what the task shares with others: which settings may have changed; one row of the tables that is
-//! being saved ([`Edit`]), and one setting that is in EEPROM alone; and where the log is, in which all other rows and
-//! such settings are found. The task writes the EEPROM, a byte every 3.4 ms, and waits for it by the millisecond. A
-//! value that changes while it is written is written again. One look costs up to 3 ms of thread mode on AVR. If power
-//! fails meanwhile, items that the task has not come to keep their old values. When the EEPROM is full, status 34 is
-//! reported once, and a row keeps its old values.
+//! [`Storage`] is shared with other tasks. It holds which settings may have changed, the row of the tables that is
+//! being saved ([`Edit`]), the setting in EEPROM alone that is being saved, and the log, which contains all other rows
+//! and such settings. The task writes the EEPROM, a byte every 3.4 ms, and waits for it by the millisecond. A value
+//! that changes while it is written is written again. One check costs up to 3 ms of thread mode on AVR. If power fails
+//! meanwhile, items that have not been written keep their old values. When the EEPROM is full, status 34 is reported
+//! once, and a row keeps its old values.
 //!
 //! There is room for one row and one such setting. A line that changes another one meanwhile is refused with
 //! [`Status::Again`]. The parser keeps the line and is woken when the row has been saved: 0.3 s later at most, unless
@@ -40,7 +40,7 @@ const _: () = assert!(
 
 const _: () = assert!(program::STARTUP_MAX as usize == STARTUP_MAX);
 
-/// What the storage task shares with the tasks for which it saves things.
+/// The state that the storage task shares with other tasks.
 pub struct Storage {
     log: Cell<Log>,
     /// The settings that may have changed: from this number to before `to`.
@@ -59,7 +59,7 @@ pub struct Storage {
     wake: Wake,
 }
 
-/// What the task saves next.
+/// The next item to save.
 #[derive(Clone, Copy)]
 enum Work {
     /// The row of the tables.

@@ -1,4 +1,4 @@
-//! Constant surface speed (G96): while X moves, the spindle turns as fast as its radius asks for.
+//! Constant surface speed (G96): the speed of the spindle follows the radius while X moves.
 //!
 //! The power task calls [`look`] every 20 ms. It costs 60 cycles without a surface speed, and 5,000 with one. It reads
 //! the position of X from exec's snapshot and sets S in `tasks::common`, under the ceiling. Nothing waits. If no motor
@@ -16,7 +16,7 @@ use crate::gcode::command::Surface;
 /// The number of the X axis.
 const X: usize = 0;
 
-/// Has S follow X.
+/// Updates S from the position of X.
 #[inline(never)]
 #[small]
 pub fn look(links: &Links) {

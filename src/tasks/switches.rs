@@ -1,19 +1,18 @@
-//! Switches: what their settings make of them, and what the limits, the door and the emergency stop lead to.
+//! Switches: their settings, and the actions of limits, door and emergency stop.
 //!
 //! When a limit or the emergency stop is hit, the interrupt that finds it has stopped the steps already
 //! (`hal::inputs`). The control task calls this module, which raises the [`alarm`]. Nothing here waits, and nothing
 //! can be full.
 //!
 //! A limit is a switch whose `sn` or `sx` says so. By default none does, so that a machine without switches runs. A
-//! limit counts when it closes (with `st` 1: opens), not if it is closed already: a machine can start on its limit and
-//! move off it. While an axis is being homed, its ends are no limits (`spare`).
+//! limit acts when it closes (with `st` 1: opens), not while it is closed: a machine can start on its limit and move
+//! off it. While an axis is being homed, its ends are no limits (`spare`).
 //!
 //! The pins of an axis that homes by a stall ([`homing`](super::homing)) are wired to DIAG of its driver, which is
 //! high when the motor is held up, whatever `st` says.
 //!
-//! The door and the emergency stop count as they stand, if `saf` and `est` say that they exist. The door is a hold
-//! that no tilde ends before the door is shut. A door that is open while nothing runs keeps whatever comes from
-//! beginning.
+//! The door and the emergency stop act by their level, if `saf` and `est` say that they exist. An open door is a hold
+//! that no tilde ends before the door is shut. If the door is open while nothing runs, no motion can begin.
 
 use kerf_macros::small;
 
@@ -29,7 +28,7 @@ use crate::machine::{self, Alarm};
 
 /// A bit of the settings `sn` and `sx`: the switch is a limit.
 const LIMIT: u8 = 2;
-/// The value of the settings `saf` and `est` for a switch that opens when it is worked.
+/// The value of the settings `saf` and `est` for a normally closed switch.
 const OPENS: u8 = 2;
 
 /// The inputs that the board has.
@@ -59,8 +58,7 @@ pub fn mode(settings: &Settings, end: u8) -> u8 {
     }
 }
 
-/// Takes over the settings of all switches. Door and emergency stop close when they are worked, unless a setting says
-/// otherwise.
+/// Applies the settings of all switches. Door and emergency stop are normally open, unless a setting says otherwise.
 #[inline(never)]
 #[small]
 pub fn set_up(settings: &Settings) {
@@ -80,7 +78,7 @@ pub fn set_up(settings: &Settings) {
         stops |= 1 << inputs::STOP;
     }
     pins::set_up(closing & WIRED, stops & WIRED);
-    // Switches may be worked already.
+    // Switches may be active already.
     flags::set(Event::Realtime);
 }
 
@@ -89,7 +87,7 @@ pub fn is_stopped(settings: &Settings) -> bool {
     settings.stop_switch() != 0 && pins::worked() & 1 << inputs::STOP != 0
 }
 
-/// Looks at what switches have done, and acts on it.
+/// Acts on changes of switches.
 pub fn serve(links: &Links) {
     let hits = pins::take_hits();
     let settings = links.settings.borrow();

@@ -1,4 +1,4 @@
-//! The encoder of the spindle, looked after in thread mode: its settings, its speed, and pulses that do not fit.
+//! The encoder of the spindle in thread mode: its settings, its speed, and pulses that do not fit.
 //!
 //! The power task calls [`look`] every 20 ms, which costs 1,500 cycles, or nothing without an encoder. The state is an
 //! [`Encoder`](crate::encoder::Encoder) in `tasks::common`, under the ceiling. Nothing waits.
@@ -55,21 +55,21 @@ pub fn set_up(thread: Thread, storage: &Storage) {
     common::with(thread, |common| common.encoder.set_up(per_turn, tells, &pulses));
 }
 
-/// Looks at what the sensors of the encoder have seen.
+/// Reads the sensors of the encoder.
 #[inline(never)]
 #[small]
 pub fn look(links: &Links) {
     if !Capability::Lathe.is_built_in() || !encoder::is_set_up() {
         return;
     }
-    // Another exception is told first.
+    // Another exception is reported first.
     let may_tell = links.notices.exception.get().is_none();
     let first_misfit = common::with(links.thread, |common| {
-        // Under the lock, so that exec cannot have looked at newer pulses before. In a pass exec finds the misfits.
+        // Under the lock, so that exec cannot have read newer pulses before. In a pass exec detects the misfits.
         common.encoder.sample(&encoder::read());
         may_tell && common.encoder.take_misfit()
     });
-    // Whoever waits for the spindle asks again.
+    // Tasks that wait for the spindle check again.
     flags::set(Event::BlockDone);
     if first_misfit {
         links.except(Status::PulseMisfit);
@@ -86,8 +86,8 @@ pub fn look(links: &Links) {
     }
 }
 
-/// Returns how fast the spindle turns, in thousandths of a turn a minute. Negative means backwards, if the encoder
-/// tells the direction. `None` without an encoder.
+/// Returns the speed of the spindle, in thousandths of a turn a minute. Negative means backwards, if the encoder tells
+/// the direction. `None` without an encoder.
 #[small]
 pub fn speed(thread: Thread) -> Option<i32> {
     if !Capability::Lathe.is_built_in() {
@@ -102,8 +102,8 @@ pub fn speed(thread: Thread) -> Option<i32> {
     })
 }
 
-/// Returns how the pass in step with the spindle stands ([`Encoder::pass`](crate::encoder::Encoder::pass)). A refusal
-/// is returned once.
+/// Returns the status of the pass in step with the spindle ([`Encoder::pass`](crate::encoder::Encoder::pass)). A
+/// refusal is returned once.
 #[small]
 pub fn pass(thread: Thread) -> Status {
     if !Capability::Lathe.is_built_in() {
@@ -130,7 +130,7 @@ pub fn error(thread: Thread) -> i16 {
     common::with(thread, |common| common.encoder.error())
 }
 
-/// Whether the pass has come to another index pulse since this was asked last.
+/// Whether the pass has come to another index pulse since the last call.
 #[inline(never)]
 #[small]
 pub fn take_news(thread: Thread) -> bool {

@@ -1,7 +1,7 @@
-//! The line to the sender: whole responses and reports, one after the other.
+//! The transmitter of a port: whole responses and reports, one after the other.
 //!
-//! Owned by whoever holds `Port::tx`, for as long as one line takes, so lines never mix. Call
-//! [`Tx::room`] before each piece of at most [`PIECE`] bytes; it waits until the transmit ring has room.
+//! Owned by the task that holds `Port::tx`, for the time of one line, so that lines never mix. Call [`Tx::room`] before
+//! each piece of at most [`PIECE`] bytes; it waits until the transmit ring has room.
 
 use crate::hal::Thread;
 use crate::hal::event::wait_transmitted;
@@ -56,8 +56,8 @@ impl Tx {
         uart::kick(self.port);
     }
 
-    /// Goes on at `rate` bits a second. What has been put must have left at the old rate. What the sender says
-    /// meanwhile may be spoilt.
+    /// Continues at `rate` bits a second. All queued bytes must have been sent at the old rate. Bytes received
+    /// meanwhile may be damaged.
     pub fn set_rate(&mut self, rate: u32) {
         uart::set_rate(self.port, rate);
         self.rate = rate;
@@ -122,7 +122,7 @@ impl crate::protocol::Out for Tx {
             self.fill_again(left);
         }
         self.sum_behind(before);
-        // What is worked out next takes longer than these bytes need to leave.
+        // The next computation takes longer than sending these bytes.
         uart::kick(self.port);
     }
 

@@ -1,8 +1,8 @@
-//! What the protocol sees of the machine: the links, through one borrow at a time.
+//! The machine as the protocol sees it: access to the links, with one borrow at a time.
 //!
 //! A view is made anew for each step of a response or report, and never kept across an `.await`. Positions and speed
 //! come from exec's snapshot while something runs, and from the G-code model otherwise. All steps of one report or
-//! group share what was [`Seen`] when the first of them told of motion ([`Port::seen`]).
+//! group share the [`Seen`] state of the first of them that read motion ([`Port::seen`]).
 
 #[cfg(feature = "bed-plane")]
 mod bed;
@@ -70,11 +70,11 @@ pub fn moves(doing: Doing, hold: Hold) -> bool {
     }
 }
 
-/// The least `qr` that is told. That the queue is full shows in responses that do not come yet. A sender that is told
-/// of five or less (CNCjs) keeps the last response to itself, and forgets it if it is paused meanwhile.
+/// The least `qr` that is reported. Delayed responses show that the queue is full. If CNCjs reads five or less, it
+/// withholds the last response, and loses it if it is paused meanwhile.
 const QUEUE_FREE_MIN: usize = 6;
 
-/// A look at the machine.
+/// A view of the machine.
 pub struct View<'a> {
     links: &'a Links,
     port: &'a Port,
@@ -85,7 +85,7 @@ pub struct View<'a> {
     shares: bool,
 }
 
-/// How the machine stood at one moment.
+/// The state of the machine at one moment.
 #[derive(Clone, Copy)]
 pub struct Seen {
     motion: Moment,
@@ -94,7 +94,7 @@ pub struct Seen {
 }
 
 impl Seen {
-    /// Returns how the machine stands now. Thread mode.
+    /// Returns the present state of the machine. Thread mode.
     fn now(links: &Links) -> Self {
         // In this order, because exec may take up what is queued in between.
         let queued = is_queued(links);
@@ -110,7 +110,7 @@ fn is_queued(links: &Links) -> bool {
 
 #[small]
 impl<'a> View<'a> {
-    /// Looks at the machine now, as the sender on this port sees it.
+    /// Returns a view for the sender on this port.
     pub fn of(links: &'a Links, port: &'a Port) -> Self {
         Self {
             links,
@@ -122,8 +122,8 @@ impl<'a> View<'a> {
         }
     }
 
-    /// Returns how the machine stood. Cost: 6,000 cycles for the first value of a report or group that tells of
-    /// motion, 700 for further ones.
+    /// Returns the state of the machine. Cost: 6,000 cycles for the first value of motion in a report or group, 700 for
+    /// further ones.
     fn seen(&self) -> &Seen {
         self.seen.get_or_init(|| {
             let shared = if self.shares { self.port.seen.get() } else { None };
@@ -179,11 +179,11 @@ impl<'a> View<'a> {
     fn position(&self, axis: usize) -> Length {
         let programmed = self.links.model.borrow().position().get(axis).copied();
         let programmed = programmed.unwrap_or(Length::ZERO);
-        // Until the planner has counted steps anew, they mean what they meant before a setting changed.
+        // Until the planner has computed steps again, they are those of the settings before the change.
         if !self.is_busy() || self.links.changes.has(Changes::STEPS) {
             return programmed;
         }
-        // An axis that moves no motor is where lines have sent it.
+        // The position of an axis without a motor is that of the last line.
         let at = counted(&self.settings, &self.motion().position, axis, None);
         #[cfg(feature = "bed-plane")]
         let at = at.map(|at| bed::lowered(self, axis, at));
@@ -221,7 +221,7 @@ impl<'a> View<'a> {
         let free = !waits && !self.is_busy();
         if free {
             links.feeder.set(self.port.number);
-            // The new feeder has been told nothing so far.
+            // Nothing has been reported to the new feeder yet.
             self.report.refresh();
         }
         free
@@ -246,7 +246,7 @@ impl<'a> View<'a> {
     fn begin(&mut self, motion: Motion, cycle: machine::Event) -> Status {
         let links = self.links;
         if links.feeder.replace(self.port.number) != self.port.number {
-            // The new feeder has been told nothing so far.
+            // Nothing has been reported to the new feeder yet.
             self.report.refresh();
         }
         let mut commands = links.commands.borrow_mut();
@@ -258,7 +258,7 @@ impl<'a> View<'a> {
         Status::Ok
     }
 
-    /// Has a setting saved; or all of them, if the setting has changed `others`.
+    /// Orders a setting to be saved; or all of them, if the setting has changed `others`.
     fn note(&self, setting: Setting, others: bool) {
         match others {
             true => self.links.storage.note(0, ITEMS),
@@ -419,7 +419,7 @@ impl Machine for View<'_> {
     }
 
     fn hold_back(&mut self) {
-        // A tilde that has come before does not count for this hold.
+        // An earlier tilde does not end this hold.
         self.links.signs.clear();
         self.links.signs.door.set(false);
         machine::take(machine::Event::Hold);
@@ -548,7 +548,7 @@ pub fn queue_free() -> usize {
     queue::free().max(QUEUE_FREE_MIN)
 }
 
-/// Has outputs and inputs follow the settings.
+/// Applies the settings of outputs and inputs.
 #[small]
 pub fn set_hardware(thread: Thread, settings: &Settings) {
     switches::set_up(settings);

@@ -1,4 +1,5 @@
-//! The answer to a line. It goes on as far as there is room to transmit it, and gives way to others behind each step.
+//! The answer to a line. It continues as far as there is room to transmit it, and yields to other tasks after each
+//! step.
 
 use super::block::{is_free, run_block};
 use super::{Line, Session};
@@ -20,9 +21,9 @@ use crate::tasks::view::View;
 
 /// Bytes of an echo that are put in one step.
 const ECHO: usize = 62;
-/// The most steps of a response in one turn; most answers take six. While the ring of the second port is filling,
-/// others have their turn behind each step: to read a row of the tables may take 3 ms, and twice that while exec takes
-/// most of the CPU.
+/// The most steps of a response in one turn; most answers take six. While the ring of the second port is filling, other
+/// tasks get a turn after each step: reading a row of the tables may take 3 ms, and twice that while exec takes most of
+/// the CPU.
 const STEPS: u8 = 8;
 /// The most steps in a turn in which a millisecond has ended.
 const STEPS_LATE: u8 = 5;
@@ -41,7 +42,7 @@ pub(super) struct Answer {
     pub echoes: bool,
     /// The answer waits for the tables.
     pub waits: bool,
-    /// The transmitter, from the first byte of the answer on: nobody else talks on this port.
+    /// The transmitter, held from the first byte of the answer on.
     pub tx: Option<Line>,
 }
 
@@ -86,7 +87,7 @@ pub(super) fn go_on(
     true
 }
 
-/// Has a session wait until what is in the transmit ring has left, before anything else is said.
+/// Makes a session wait until the transmit ring has been sent, before anything else is sent.
 #[inline(never)]
 #[small]
 pub(super) fn leave(tx: Option<Line>, session: &mut Session) {
@@ -123,7 +124,7 @@ fn has_left(links: &Links, tx: &mut Tx, since: &mut Option<u16>) -> bool {
 
 impl Answer {
     /// Returns whether there is room for the next part of the answer; `None` if the answer does not wait for room. A
-    /// list goes on only while little waits to leave, because a `?` is answered behind what waits.
+    /// list continues only while few bytes wait to be sent, because a `?` is answered after them.
     #[inline(never)]
     #[small]
     pub(super) fn may_go_on(&self, port: &Port) -> Option<bool> {
@@ -135,7 +136,7 @@ impl Answer {
         }
     }
 
-    /// Goes on as far as there is room.
+    /// Continues as far as there is room.
     #[inline(never)]
     fn step(&mut self, links: &'static Links, port: &'static Port, awaited: bool) -> Progress {
         // The answer to a `?` never counts as one that has had a turn, so that it comes first.
@@ -169,7 +170,7 @@ impl Answer {
     ) -> (Progress, bool) {
         if Speech::HAS_QUESTION {
             match port.lines.borrow().class(self.id) {
-                // Nobody waits for the answer.
+                // The sender does not expect the answer any more.
                 Class::Gone if !begun => return (Progress::Done, false),
                 Class::Fault(_) => self.request.dropped(),
                 _ => {}
@@ -215,7 +216,7 @@ impl Answer {
     }
 }
 
-/// Whether others have their turn before a response goes on. The turn has made `done` steps and began at `since`, ms.
+/// Whether other tasks get a turn before a response continues. The turn has made `done` steps and began at `since`, ms.
 #[inline(never)]
 #[small]
 fn gives_way(done: u8, since: u32) -> bool {
@@ -223,8 +224,8 @@ fn gives_way(done: u8, since: u32) -> bool {
     uart::presses() || is_unheard() || late() || millis().wrapping_sub(since) >= TURN_MS
 }
 
-/// Whether there is room for the first part of an answer. `None` while somebody else talks on the port; the parser is
-/// woken when they have finished.
+/// Whether there is room for the first part of an answer. `None` while another task has the transmitter; the parser is
+/// woken when it is free.
 #[inline(never)]
 #[small]
 pub(super) fn has_room(port: &Port) -> Option<bool> {

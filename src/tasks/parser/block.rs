@@ -19,14 +19,14 @@ use crate::tasks::ports::Port;
 use crate::tasks::reporter::tell_startup;
 use crate::tasks::view::View;
 
-/// Whether a block can be carried out or refused now. It cannot while the planner or the tables are waited for, or
-/// while anything is being dropped.
+/// Whether a block can be carried out or refused now: not while the planner or the tables are busy, or while anything
+/// is being dropped.
 pub fn is_free(links: &Links) -> bool {
     let waits = links.commands_taken.get() || links.storage.is_awaited();
     !waits && !machine::is_flushing()
 }
 
-/// Whether there is room to tell what becomes of the job's next line, if that is to be told.
+/// Whether there is room to report the status of the job's next line, if it is to be reported.
 #[inline(never)]
 #[small]
 pub(super) fn has_room_for_startup(links: &Links) -> bool {
@@ -41,8 +41,8 @@ pub(super) fn waits_for_jog(links: &Links) -> bool {
     machine::cycle() == Cycle::Jog && !links.job.get().is_none() && is_working(links)
 }
 
-/// Carries out the next line of a built-in job. A line that is refused is told by an exception report. The end of the
-/// job is told by the reporter, when everything has been carried out.
+/// Carries out the next line of a built-in job. A refused line is reported as an exception. The reporter reports the
+/// end of the job when everything has been carried out.
 #[inline(never)]
 #[small]
 pub(super) fn job_line(links: &Links) {
@@ -111,9 +111,8 @@ fn interpret_rewritten(links: &Links, port: &Port, block: &[u8]) -> (Status, boo
     done
 }
 
-/// Gives the place where the machine is another position, at which the extruder is nearer to the origin. A printer's
-/// extruder only moves on and on, and this happens before it gets too far away. Returns [`Status::Again`]: the line is
-/// carried out afterwards.
+/// Redefines the position of the extruder as one nearer to the origin. A printer's extruder mostly moves forwards, and
+/// would leave the range of positions otherwise. Returns [`Status::Again`]: the line is carried out afterwards.
 #[cfg(feature = "dialect-reprap")]
 #[inline(never)]
 #[small]
@@ -175,11 +174,11 @@ fn carry_out(links: &Links, block: &[u8], declined: bool) -> (Status, bool) {
     if words.is_some()
         && (machine::is_held() || machine::is_checking() || (!jogs && is_working(links)))
     {
-        // A jog waits for nothing but other jogs: the character that ends a jog must find it under way.
+        // A jog waits for other jogs only, because the jog cancel character must find it under way.
         return (Status::NotAccepted, true);
     }
     if jogs && words.is_none() && !block.is_empty() && is_working(links) {
-        // The end of a jog drops what is queued. So nothing that has been answered may be queued behind a jog.
+        // The end of a jog drops the queue. So nothing that has been answered may be queued after a jog.
         return (Status::Again, true);
     }
     let mut commands = links.commands.borrow_mut();

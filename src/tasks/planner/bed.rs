@@ -1,9 +1,9 @@
 //! The bed of a printer: moves follow its plane ([`Bed`](crate::config::bed::Bed)).
 //!
-//! The planner's position is in machine coordinates, in which the bed is flat. The line builder, which knows of
-//! motors, gets places that are lifted by the plane, and what is counted from steps is lowered. So limits hold for
-//! what motors do, and a straight move is one block as before. When the plane begins or ceases to be followed, no
-//! motor moves: the place of the machine gets another Z.
+//! The planner's position is in machine coordinates, in which the bed is flat. The line builder, which works for
+//! motors, gets positions to which the height of the plane is added; positions counted from steps have it subtracted.
+//! So limits apply to the motors, and a straight move is still one block. When following the plane begins or ends, no
+//! motor moves: the position gets another Z.
 
 use kerf_macros::small;
 
@@ -16,8 +16,8 @@ use crate::units::{Length, PerAxis};
 const Z: usize = 2;
 
 impl Planner {
-    /// Has moves follow the plane from here on, if the plane is known, or not any more. The machine rests, because
-    /// reports go by the plane, too.
+    /// Makes moves follow the plane from here on, if the plane is known, or ends that. The machine stands still,
+    /// because reports use the plane, too.
     #[inline(never)]
     #[small]
     pub(super) fn follow_bed(&mut self, follows: bool) {
@@ -37,7 +37,7 @@ impl Planner {
         self.links.set_position(&self.position);
     }
 
-    /// Takes over other coordinates that G28.3 gives to the place of the machine. The bed stays where it is.
+    /// Shifts the plane when G28.3 redefines the position. The bed stays where it is.
     #[inline(never)]
     #[small]
     pub(super) fn rename_bed(&self, position: &PerAxis<Length>) {

@@ -1,11 +1,11 @@
-//! Check mode, `{chk:1}`: lines are interpreted, and refused if they are wrong. What they ask for is not carried out.
+//! Check mode, `{chk:1}`: lines are interpreted, and refused if they are wrong, but not carried out.
 //!
 //! The parser drops the commands of each line, and the tables take no change. The origin is in the G-code model, so a
 //! change of the coordinate system in force counts until the origin is computed from the tables again: when another
 //! system is chosen, and when check mode ends.
 //!
 //! The planner keeps what lines may change of the G-code model, in the memory where it has arcs and chains otherwise.
-//! It was at rest when check mode began, has nothing to do meanwhile, and is where it was when check mode ends.
+//! It was idle when check mode began, has nothing to do meanwhile, and its position does not change.
 //!
 //! Only `{chk:0}` and a reset end check mode. Otherwise an alarm or a `^d` in the middle of a file would have the rest
 //! of the file carried out. An alarm and `^d` only drop the lines that have come, and check mode goes on.
@@ -28,7 +28,7 @@ impl Planner {
         self.check();
     }
 
-    /// Keeps the state of the model when check mode begins, and gives it back when check mode has ended.
+    /// Stores the state of the model when check mode begins, and restores it when check mode has ended.
     #[inline(never)]
     #[small]
     pub(super) fn check(&mut self) {

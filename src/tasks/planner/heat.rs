@@ -1,9 +1,8 @@
-//! Heaters and the fan, and waits for them. Blocks switch heaters and fan where they stand in the program; the machine
-//! goes on over these blocks.
+//! Heaters and the fan, and waits for them. Blocks switch heaters and fan at their place in the program; they do not
+//! stop the machine.
 //!
-//! A wait begins when all moves before it have been made. It keeps back the lines behind it, and nothing else: a stop,
-//! a flush and questions have their effect at once, and [`Heaters::end_wait`](crate::tasks::heat::Heaters::end_wait)
-//! ends it.
+//! A wait begins when all moves before it have been made. It delays only the lines after it: a stop, a flush and
+//! questions act at once, and [`Heaters::end_wait`](crate::tasks::heat::Heaters::end_wait) ends it.
 
 use kerf_macros::small;
 
@@ -30,7 +29,7 @@ const VELOCITY_LEAST: f32 = 100.0;
 const MOST: f32 = 1e9;
 
 impl Planner {
-    /// Queues what a line asks for. Returns whether motion is to wait.
+    /// Queues the action of a line. Returns whether motion is to wait.
     #[inline(never)]
     #[small]
     pub(super) fn heat(&mut self, heat: &Heat) -> bool {
@@ -82,7 +81,7 @@ impl Planner {
         }
     }
 
-    /// Waits until the heaters that the line names are as hot as the line asks for, or until somebody ends the wait.
+    /// Waits until the heaters of the line have reached their targets, or until the wait is ended.
     pub(super) async fn await_heat(&self) {
         let links = self.links;
         wait(links.thread, Event::BlockDone, || {
@@ -100,7 +99,7 @@ impl Planner {
     }
 }
 
-/// Has a line from `from` to `to` say how much filament it pushes, as exactly as the lead needs it.
+/// Stores in a line from `from` to `to` how much filament it pushes, as exactly as the lead needs it.
 #[inline(always)]
 pub(super) fn refine_by(
     lead: &Lead,

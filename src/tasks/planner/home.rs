@@ -1,4 +1,4 @@
-//! Homing, G28.2 and G28.4, and `{home:1}`: each axis looks for its switch, in the order Z X Y A.
+//! Homing, G28.2 and G28.4, and `{home:1}`: each axis searches for its switch, in the order Z X Y A.
 //!
 //! | stage | move | ends |
 //! |---|---|---|
@@ -7,20 +7,19 @@
 //! | `Latch` | slowly to `lb` off where it closed | where it opens |
 //! | `Zero` | to `zb` off where it opened | at its end, which is the axis's place ([`homing`]) |
 //!
-//! Between two stages everything stands still for [`SETTLE_MS`], because a switch that has just been believed is not
-//! read again for a while. Contacts are exact to the step ([`seek`](super::seek)). So is the place, however fast the
-//! axis passed the switch. Without `lb`, the place is counted from where the switch closed.
+//! Between two stages everything stands still for [`SETTLE_MS`], because a switch that has just changed is not read
+//! again for a while. Contacts are exact to the step ([`seek`](super::seek)), and so is the position, whatever the
+//! speed at the switch. Without `lb`, the place is counted from where the switch closed.
 //!
-//! An axis that homes by a stall (`drs1`) has no switch. The driver of its motor raises DIAG while the motor is held
-//! up and its speed is about that of the search. Such an axis only searches, and its place is counted from where the
-//! axis has come to rest. Until then its motor has slipped at the stop by whole electrical periods of four full steps,
-//! and it stands two full steps from the stop at most. If DIAG is high at standstill, the driver has a fault or a wire
-//! is off.
+//! An axis that homes by a stall (`drs1`) has no switch. The driver of its motor raises DIAG while the motor is stalled
+//! at about the speed of the search. Such an axis only searches, and its position is counted from where it has stopped.
+//! Its motor may have slipped at the stop by whole electrical periods of four full steps, and stands two full steps
+//! from the stop at most. If DIAG is high at standstill, the driver has a fault or a wire is off.
 //!
-//! While an axis is homed its ends are no limits; limits of other axes hold. The settings of all axes are checked
-//! before anything moves. A failure ends the cycle: an exception tells the axis and the reason, the axis is not homed,
-//! and the position is where the axis is. A feedhold holds the cycle; a flush ends it as a failure. Lines that wait
-//! behind the homing line are carried out after it.
+//! While an axis is homed its own limit switches are ignored; those of other axes act. The settings of all axes are
+//! checked before anything moves. A failure ends the cycle: an exception gives the axis and the reason, the axis is not
+//! homed, and its position is where it has stopped. A feedhold holds the cycle; a flush ends it as a failure. Lines
+//! that wait behind the homing line are carried out after it.
 //!
 //! Several motors of an axis move together. A second motor that has a switch of its own squares the axis
 //! ([`square`](super::square)).
@@ -89,11 +88,11 @@ impl Stage {
 }
 
 impl Progress {
-    /// Skips stages that are not needed as the switches stand. `closed` are those that are closed; `all`: all of the
-    /// axis are.
+    /// Skips stages that the state of the switches makes unnecessary. `closed` are the closed switches; `all`: all
+    /// those of the axis are closed.
     fn pass(&mut self, homing: &Homing, closed: u16, all: bool) -> Result<(), Status> {
         if self.stage == Stage::Clear {
-            // Nobody knows which of two switches on one pin is closed.
+            // Which of two switches on one pin is closed cannot be known.
             let doubtful = closed & homing.switch() != 0 && homing.shared;
             return match closed {
                 _ if doubtful => Err(Status::HomingClosed),
@@ -207,7 +206,7 @@ impl Planner {
         } else {
             at.pass(&homing, closed, closed == own | second)?;
         }
-        // From where the axis moves, how far away from the switch, and which switches end the move.
+        // The start of the move, its distance away from the switch, and the switches that end it.
         let here = self.at(at.axis);
         // A motor may have gone beyond its own switch as far as the axis has.
         let back = homing.backoff.saturating_add(at.beyond);
@@ -264,7 +263,8 @@ impl Planner {
         Ok(true)
     }
 
-    /// Fixes the speed of a search for a stall, whatever the feed override is: the driver has been told that speed.
+    /// Fixes the speed of a search for a stall, whatever the feed override is, because the driver is set up for that
+    /// speed.
     #[inline(always)]
     fn fix_search(&mut self, axis: u8) {
         if Capability::Drivers.is_built_in() {
@@ -345,7 +345,7 @@ impl Planner {
         self.seek(&target, Feed::PerMinute(speed), armed, awaited);
     }
 
-    /// Gives the axis its place, where it stands now, unless its position is to stay.
+    /// Sets the position of the axis, where it stands now, unless its position is to stay.
     #[inline(never)]
     #[small]
     fn place_axis(&mut self, at: &Progress) -> Result<(), Status> {
@@ -361,7 +361,7 @@ impl Planner {
         Ok(())
     }
 
-    /// Ends the cycle, and tells why if it has failed.
+    /// Ends the cycle, and reports why if it has failed.
     #[inline(never)]
     #[small]
     fn end_homing(&mut self, at: &Progress, failure: Option<Status>) {
@@ -375,7 +375,7 @@ impl Planner {
         }
         if let Some(status) = failure {
             model.blame(at.axis);
-            // An alarm has already told what ended the cycle.
+            // An alarm has already reported what ended the cycle.
             if !machine::is_alarmed() {
                 links.except(status);
             }

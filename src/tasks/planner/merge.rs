@@ -1,17 +1,16 @@
 //! Lines that wait for the next one: a chain of short lines that lie on one straight line (`motion::chain`), and lines
 //! of less than half a step.
 //!
-//! CAM files are full of short lines. A block costs the planner and exec as much whether it is long or short. A block
-//! of less than half a step that takes less than 0.75 ms would slow the path down: it is over before exec could
-//! prepare it. A line waits only while other lines run. The planner's position stays where the chain began, and the
-//! chain knows where it ends. Either the next line goes on with the chain, or the chain becomes a block and the line
-//! begins another chain. A chain of less than half a step becomes no block then: the next line begins where the chain
-//! did.
+//! CAM files are full of short lines. Blocks cost the planner and exec the same time whether long or short. A block of
+//! less than half a step that takes less than 0.75 ms would slow the path down, because exec needs longer to prepare
+//! it. A line waits only while other lines run. The planner's position stays at the start of the chain, and the chain
+//! stores its end. Either the next line joins the chain, or the chain becomes a block and the line begins another
+//! chain. A chain of less than half a step becomes no block: the next line then begins where the chain did.
 //!
 //! **Nothing waits long.** A chain becomes a block when the last block runs, and before anything that is not a line.
-//! [`STALE_MS`] after its last line it also becomes a block at the next block or when the power task looks. So
-//! positions at stops are exact, and the last line of a program runs as if it had not waited: exec is some
-//! milliseconds ahead of the motors.
+//! [`STALE_MS`] after its last line it also becomes a block at the next block or at the next turn of the power task. So
+//! positions at stops are exact, and the last line of a program is not delayed, because exec is some milliseconds ahead
+//! of the motors.
 //!
 //! **N words.** A block has the N word of its last line: it is finished when that line is.
 
@@ -28,11 +27,11 @@ use crate::units::{Length, PerAxis};
 /// How long after its last line a chain becomes a block, ms.
 const STALE_MS: u16 = 8;
 
-/// Blocks that may be needed at once: for a chain, for the position, and for what drivers demand.
+/// Blocks that may be needed at once: for a chain, for the position, and for the timing of drivers.
 const BLOCKS: usize = 3;
 
-/// After this many lines in a row that have not gone on with a chain, only one line of this many begins a chain. A
-/// power of two.
+/// After this many lines in a row that have not joined a chain, only one line of this many begins a chain. A power of
+/// two.
 const ALONE: u8 = 8;
 /// After this many such lines in a row, only one line of [`SELDOM`] begins a chain. A multiple of that.
 const LONG: u8 = 64;
@@ -46,7 +45,7 @@ impl Planner {
         matches!(self.begun, Begun::Chain(_))
     }
 
-    /// Whether something is left to be done of what has been carried out.
+    /// Whether a begun line or chain is still to be completed.
     pub(super) fn has_begun(&self) -> bool {
         !matches!(self.begun, Begun::Nothing)
     }
@@ -124,8 +123,8 @@ impl Planner {
         true
     }
 
-    /// Carries out the line behind a chain, for which there is room: the line goes on with the chain, or the chain is
-    /// queued first.
+    /// Carries out the line after a chain, for which there is room: the line joins the chain, or the chain is queued
+    /// first.
     #[inline(never)]
     pub(super) fn end_chain(&mut self, commands: &Commands) -> Turn {
         if commands.is_straight() && self.carry_out_at_once() {
@@ -149,7 +148,7 @@ impl Planner {
         self.links.chain_waits.set(self.has_chain());
     }
 
-    /// Whether the chain is not to wait any longer, and there is room for it and for what changed settings need.
+    /// Whether the chain is not to wait any longer, and there is room for it and for the blocks of changed settings.
     fn is_due(&self) -> bool {
         let Begun::Chain(chain) = &self.begun else { return false };
         let is_stale =

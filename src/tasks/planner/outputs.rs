@@ -1,4 +1,4 @@
-//! Spindle and coolant, switched where they stand in the program: blocks that exec carries out at rest.
+//! Spindle and coolant, switched at their place in the program by blocks that exec carries out at a standstill.
 
 use kerf_macros::small;
 
@@ -30,7 +30,7 @@ impl Planner {
         };
         let which = outputs::SPINDLE | outputs::COUNTERCLOCKWISE;
         if Capability::Lathe.is_built_in() {
-            // The G-code model has interpreted this line and none behind it.
+            // The G-code model has interpreted this line and no later one.
             let surface = self.links.model.borrow().surface();
             if surface.is_some() || self.has_surface {
                 return self.turn_at_surface(which, turn, speed, surface);
@@ -65,7 +65,7 @@ impl Planner {
     }
 }
 
-/// Returns how the spindle turns, by the outputs that are on.
+/// Returns the direction of the spindle, by the outputs that are on.
 pub(super) fn turn(on: u8) -> modal::Turn {
     match on & (outputs::SPINDLE | outputs::COUNTERCLOCKWISE) {
         0 => modal::Turn::Off,

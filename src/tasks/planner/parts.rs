@@ -11,7 +11,7 @@ use crate::motion::curve::Curve;
 use crate::units::FIRST_ROTARY;
 use crate::units::{Length, PerAxis};
 
-/// What lasts longer than a turn. There is one at a time, so that one place in memory is enough.
+/// Work that lasts longer than a turn. There is one at a time, so that they share memory.
 pub(super) enum Ongoing {
     /// Nothing is going on.
     None,
@@ -48,8 +48,8 @@ impl Parts {
         parts
     }
 
-    /// Divides each part that is left into `of` parts. Interpreters refuse moves whose shortest part would still be
-    /// too long.
+    /// Divides each remaining part into `of` parts. Interpreters refuse moves whose shortest part would still be too
+    /// long.
     #[inline(never)]
     #[small]
     pub fn divide(&mut self, of: u16) {

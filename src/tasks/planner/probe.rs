@@ -1,12 +1,13 @@
-//! Probing, G38.2 to G38.5: straight towards the work until the probe touches it, or away until the probe lets go.
+//! Probing, G38.2 to G38.5: a straight move towards the work until the probe makes contact, or away until it loses
+//! contact.
 //!
-//! The result is the contact ([`seek`](super::seek)), in machine coordinates: `prbe` 1 and `prbx`... The machine comes
-//! to rest behind the contact and goes back to it, at the feed of the line. So G10 L20 and G92 in the next line take
-//! the contact for the position. Then the reporter tells the result. With `pbo` 0 the machine stays where it came to
-//! rest. Without contact, `prbe` is 0 and the place is where the move ended.
+//! The result is the contact ([`seek`](super::seek)), in machine coordinates: `prbe` 1 and `prbx`... The machine stops
+//! beyond the contact and moves back to it, at the feed of the line. So G10 L20 and G92 in the next line refer to the
+//! contact. Then the reporter reports the result. With `pbo` 0 the machine stays where it has stopped. Without contact,
+//! `prbe` is 0 and the result is the end of the move.
 //!
-//! For G38.2 and G38.4, a move without contact is a failure. So is a probe that is already as it is to become: nothing
-//! moves then. A failure is an alarm, because the next lines of a program would go by a place that nobody knows.
+//! For G38.2 and G38.4, a move without contact is a failure. So is a probe that is already in the state that ends the
+//! move: nothing moves then. A failure is an alarm, because the next lines of a program would use a wrong position.
 
 use kerf_macros::small;
 
@@ -57,7 +58,7 @@ impl Planner {
         wait(self.links.thread, Event::BlockDone, || told().then_some(())).await;
     }
 
-    /// Begins the move. Returns false if the probe is already as it is to become.
+    /// Begins the move. Returns false if the probe is already in the state that ends the move.
     #[inline(never)]
     #[small]
     fn begin_probe(&mut self) -> bool {
@@ -98,7 +99,7 @@ impl Planner {
         true
     }
 
-    /// Tells that there was a contact, whatever has become of the way back.
+    /// Reports the contact, whether or not the machine is back at it.
     #[small]
     fn probe_touched(&self) {
         // In a flush, the position is not known yet.

@@ -1,9 +1,9 @@
-//! Moves that end at a switch: what homing and probing are made of.
+//! Moves that end at a switch, for homing and probing.
 //!
 //! A seek begins at a standstill. [`Planner::seek`] arms switches and queues the move. [`Planner::sought`] waits for
-//! the end of the move, or for a switch. At the switch exec comes to rest within the limits, as in a feedhold. The
-//! rest of the move is dropped, and the planner goes on from where the motors are. The contact is known to the step
-//! ([`contact`]). A feedhold on the way holds the move; a queue flush ends it.
+//! the end of the move, or for a switch. At the switch exec decelerates within the limits, as in a feedhold. The
+//! remainder of the move is dropped, and the planner continues from where the motors are. The contact is known to the
+//! step ([`contact`]). A feedhold on the way holds the move; a queue flush ends it.
 //!
 //! Only one line is carried out at a time: lines behind it wait in the pool, and none is lost.
 
@@ -28,25 +28,24 @@ use crate::tasks::links::Changes;
 use crate::tasks::setup::counted;
 use crate::units::{FIRST_ROTARY, Length, PerAxis};
 
-/// How a move that is to end at a switch has ended.
+/// The end of a move that is to end at a switch.
 pub(super) enum Sought {
-    /// A switch has ended the move. The motors were at these steps then; they have come to rest further on.
+    /// A switch has ended the move. The motors were at these steps then; they have stopped further on.
     Contact([i32; MOTORS]),
     /// The move has come to its end without a switch.
     End,
-    /// What is queued is to be dropped.
+    /// The queue is to be dropped.
     Flushed,
 }
 
-/// Has exec drop its blocks as soon as it is at rest, and waits for that.
+/// Makes exec drop its blocks as soon as it is at a standstill, and waits for that.
 pub(super) fn drop_blocks(thread: Thread) -> impl Future<Output = ()> {
     machine::drop_blocks();
     wait(thread, Event::BlockDone, || machine::has_dropped_blocks().then_some(()))
 }
 
 impl Planner {
-    /// Waits until everything queued is done and the steppers stand still. Returns false if what is queued is to be
-    /// dropped.
+    /// Waits until everything queued is done and the steppers stand still. Returns false if the queue is to be dropped.
     pub(super) async fn standstill(&mut self) -> bool {
         self.room().await;
         // Exec releases this block only at a standstill.
@@ -97,7 +96,7 @@ impl Planner {
         steps.map_or(Sought::End, Sought::Contact)
     }
 
-    /// Whether nothing more of the move is to be queued.
+    /// Whether no further part of the move is to be queued.
     fn is_over(&self) -> bool {
         contact::is_noted() || self.is_flushed()
     }

@@ -13,11 +13,11 @@
 //! | `Level` | the second motor | as far off its switch as the first one from its own, and `sqof` farther |
 //! | `Zero` | both motors | as in homing without squaring |
 //!
-//! So while it is homed an axis never stands more askew than before, but for what its switches take to open. A motor
-//! moves alone when the other motors are taken off the axis ([`Dynamics::drives`](crate::motion::dynamics::Dynamics)).
-//! After each such move the steps of all motors are counted anew, from the position of the first motor
-//! ([`Planner::level`]). Without that, the next move would take the second motor along at once. Whoever ends the cycle
-//! in between has the steps counted anew as well.
+//! So homing never makes an axis more askew than before, except by the travel in which its switches open. A motor moves
+//! alone when the other motors are taken off the axis ([`Dynamics::drives`](crate::motion::dynamics::Dynamics)). After
+//! each such move the steps of all motors are computed again from the position of the first motor ([`Planner::level`]).
+//! Otherwise the next move would also correct the second motor. Code that ends the cycle early orders this computation
+//! as well.
 
 use kerf_macros::small;
 
@@ -77,7 +77,7 @@ impl Planner {
             return Ok(None);
         };
         let wired = switches::WIRED >> input & 1 != 0;
-        // A motor that is pushed against a stop would push the other motor, too.
+        // A motor that is driven against a stop would drive the other motor, too.
         let stalls = self.homes_by_stall(axis);
         if stalls || !wired || homing.has_pin(input) || homing.backoff == Length::ZERO {
             return Err(Status::HomingSwitches);
@@ -90,7 +90,7 @@ impl Planner {
         Setting::of(Owner::Squaring, row).map_or(0, |setting| self.links.storage.cold(setting))
     }
 
-    /// Has either the second motor or all other motors of the axis drive it alone. `moves`: the second motor does.
+    /// Makes either the second motor or all other motors of the axis drive it alone. `moves`: the second motor does.
     #[inline(never)]
     #[small]
     pub(super) fn alone(&mut self, axis: u8, second: Second, moves: bool) {

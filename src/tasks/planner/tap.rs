@@ -1,14 +1,14 @@
-//! G33.1, rigid tapping: into the hole in step with the spindle, and back in step when the spindle has turned round.
+//! G33.1, rigid tapping: into the hole in step with the spindle, and back in step when the spindle has reversed.
 //!
-//! G33.1 begins as a pass does ([`thread`](super::thread)). The line leads beyond the bottom of the hole by as much as
-//! the spindle turns in [`OVERRUN_S`]. At the bottom, exec tells the spindle to turn round, and follows it until it
-//! stands, which is somewhere on that overrun. There the axes rest until the first pulse of the way back. What is left
-//! of the line is dropped, and a line back is queued, which leads beyond the start by the same overrun. Exec keeps its
-//! phase on the way back. At the start it tells the spindle to turn as before, and follows until the spindle does. A
-//! move without the spindle then leads to the start. There is an alarm if the spindle has not turned round by the end
-//! of a line, or if no pulse comes for 6 s.
+//! G33.1 begins as a pass does ([`thread`](super::thread)). The line is extended beyond the bottom of the hole by the
+//! travel of [`OVERRUN_S`]. At the bottom, exec commands the spindle to reverse, and follows it until it stops within
+//! that overrun. There the axes stand still until the first pulse in reverse. The remainder of the line is dropped, and
+//! a line back is queued, which is extended beyond the start by an equal overrun. Exec keeps its phase on the way back.
+//! At the start it commands the spindle to turn as before, and follows until the spindle does. A move without the
+//! spindle then leads to the start. There is an alarm if the spindle has not reversed by the end of a line, or if no
+//! pulse comes for 6 s.
 //!
-//! A feedhold waits for the end of all this.
+//! A feedhold waits for the end of the cycle.
 
 use kerf_macros::small;
 
@@ -19,7 +19,7 @@ use crate::gcode::command::{Feed, Motion};
 use crate::motion::block::{Block, QueuedAction};
 use crate::units::{FIRST_ROTARY, Length};
 
-/// The time within which the spindle has to turn round, s: the overrun is as long as the spindle's turns in this time.
+/// The time within which the spindle has to reverse, s: the overrun is the travel in this time.
 const OVERRUN_S: f32 = 1.0;
 
 /// A feed that is faster than any axis, mm/min.
@@ -39,7 +39,7 @@ impl Planner {
         lead * COUNTS_PER_S as f32 * OVERRUN_S / turn as f32
     }
 
-    /// Has exec keep its phase on the way back.
+    /// Makes exec keep its phase on the way back.
     #[small]
     pub(super) fn queue_return(&mut self) {
         if !self.is_flushed() {

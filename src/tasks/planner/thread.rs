@@ -1,12 +1,11 @@
 //! G33, and each pass of G76: a pass in step with the spindle ([`crate::motion::thread`]).
 //!
 //! A pass begins at a standstill. [`Planner::thread`] waits until the encoder tells how fast the spindle turns, and
-//! checks that no axis would have to go faster than it may. Then it queues the pass: what exec is to follow, the lines
-//! of the pass, and its end. A pass of G76 has a line for each taper, and exec is told the lead of each line. Nothing
-//! has moved by then. If something is wrong, nothing moves at all, and an alarm says what is wrong. During the pass
-//! the planner waits. If exec loses the spindle, the axes come to rest and an alarm says so; the position is known to
-//! the step. A feedhold has X leave the cut if the settings say how far, and otherwise waits for the end of the pass.
-//! An alarm does not wait.
+//! checks that no axis would have to go faster than it may. Then it queues the pass: its start, its lines, and its end.
+//! A pass of G76 has a line for each taper, and exec is told the lead of each line. If something is wrong, an alarm
+//! reports it before anything moves. During the pass the planner waits. If exec loses the spindle, the axes stop and an
+//! alarm reports it; the position is known to the step. In a feedhold X leaves the cut if the settings give a distance;
+//! otherwise the hold waits for the end of the pass. An alarm does not wait.
 //!
 //! **Limits.** A pass has the acceleration limits of the axes and no jerk limit, because the axes have to follow the
 //! spindle. An axis with a jerk limit J has at most the acceleration `sqrt(J v) / 2`, where v is its speed in the
@@ -72,14 +71,14 @@ pub(super) struct Piece {
 const BACK_IN: u8 = 3;
 const BACK_OUT: u8 = 5;
 
-/// What has become of the lines of a pass.
+/// The end of the lines of a pass.
 #[derive(Clone, Copy, PartialEq)]
 enum End {
-    /// The lines are done, or what is queued is dropped.
+    /// The lines are done, or the queue is dropped.
     Done,
     /// A feedhold has left the cut.
     Left,
-    /// G33.1: the spindle has turned round.
+    /// G33.1: the spindle has reversed.
     Turned,
 }
 
@@ -172,7 +171,7 @@ impl Planner {
         self.take_up_changes();
     }
 
-    /// Returns what has become of the lines that were queued. Begins an alarm if the pass has failed.
+    /// Returns how the queued lines have ended. Begins an alarm if the pass has failed.
     #[inline(never)]
     #[small]
     fn end(&mut self) -> End {
@@ -211,13 +210,13 @@ impl Planner {
         }
     }
 
-    /// Returns how the pass stands.
+    /// Returns the status of the pass.
     #[small]
     pub(super) fn pass(&self) -> Status {
         common::with(self.links.thread, |common| common.encoder.pass)
     }
 
-    /// Whether nothing more of the pass is to be queued.
+    /// Whether no further part of the pass is to be queued.
     #[small]
     pub(super) fn is_cut_short(&self) -> bool {
         self.is_flushed() || !matches!(self.pass(), Status::Ok | Status::Again)
@@ -419,7 +418,7 @@ impl Planner {
         Ok(true)
     }
 
-    /// Whether the spindle turns as M3 or M4 says, as far as the encoder tells.
+    /// Whether the spindle turns in the direction of M3 or M4, as far as the encoder detects it.
     #[inline(never)]
     #[small]
     fn turns_as_told(&self) -> bool {
@@ -493,7 +492,7 @@ impl Planner {
         true
     }
 
-    /// Sets how the pass stands.
+    /// Sets the status of the pass.
     #[small]
     pub(super) fn set_pass(&self, status: Status) {
         common::with(self.links.thread, |common| common.encoder.pass = status);
