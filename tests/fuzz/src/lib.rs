@@ -9,8 +9,8 @@
 //! | [`lines`] | lines | see the module |
 //! | [`serial`] | how to send, then what to send | see the module |
 //!
-//! A fuzzer also takes files as arguments and runs each once, which is how to look at a finding. `words.dict` has the
-//! words that inputs are composed of. A finding that is understood becomes a test beside the code that was wrong.
+//! A fuzzer also takes files as arguments and runs each once, which reproduces a finding. `words.dict` is the
+//! dictionary of the fuzzers. A finding that is understood becomes a test beside the code that was wrong.
 
 pub mod lines;
 pub mod serial;

@@ -1,9 +1,9 @@
 //! Target `lines`: an input is a sequence of lines, separated by line feeds, for one interpreter.
 //!
-//! Checks after each line: a refused line has left the interpreter as it was and asks for nothing; the fast path for
-//! plain lines has either done nothing or has done what the slow path does; the chords of an arc stay on their circle
-//! and end at its end; the steps of a line lead to the interpreter's position. A second interpreter gets the same
-//! lines for a machine with unusual axes.
+//! Checks after each line: a refused line has changed nothing in the interpreter and makes no commands; the fast path
+//! for plain lines has either done nothing or has done what the slow path does; the chords of an arc stay on their
+//! circle and end at its end; the steps of a line lead to the interpreter's position. A second interpreter gets the
+//! same lines for a machine with unusual axes.
 
 mod chords;
 
@@ -65,7 +65,7 @@ fn fast_path(before: &Interpreter, line: &[u8], after: &Interpreter, outcome: &O
         let (mut fast, mut out) = (*before, Commands::default());
         if !fast.fast_path(line, writer, &Usual, &mut out) {
             assert_eq!(fast, *before, "declined, changed all the same");
-            // The slow path sets the motion anew, so the motion does not count here.
+            // The slow path sets the motion itself, so the motion is not compared here.
             out.motion = Motion::None;
             assert_eq!(out, Commands::default(), "declined");
             continue;
@@ -86,7 +86,7 @@ fn arc(before: &Interpreter, out: &Commands) {
     }
 }
 
-/// Executes a line. A hole drilled in a million pecks is not followed to its end.
+/// Executes the steps of a line. A drilling cycle with a million pecks is not executed to its end.
 fn steps(before: &Interpreter, after: &Interpreter, out: &Commands) {
     let (mut steps, mut at) = (Steps::default(), *before.position());
     for _ in 0..2_000 {
@@ -102,7 +102,7 @@ fn steps(before: &Interpreter, after: &Interpreter, out: &Commands) {
     }
 }
 
-/// Usual axes that have limits beyond all positions. The fast path does not handle axes with limits.
+/// Normal axes with limits beyond all positions, because the fast path does not handle axes with limits.
 struct Endless;
 
 impl Setup for Endless {

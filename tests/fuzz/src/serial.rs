@@ -1,12 +1,12 @@
 //! Target `serial`: an input goes to the serial line of a whole machine on the host.
 //!
-//! The lowest bit of the first byte says how to send. With 0 each line is sent when the line before it has been
-//! answered. With 1 all is sent at once, more than the machine can take. (The characters `0` and `1` have the right
-//! bits.) The rest of the input is sent.
+//! The lowest bit of the first byte selects how to send. With 0 each line is sent when the line before it has been
+//! answered. With 1 everything is sent at once, more than the machine can take. (The characters `0` and `1` have the
+//! right bits.) The rest of the input is sent.
 //!
 //! What must hold: every line is answered once; the machine sends only text; it never stands still with work left to
-//! do; when it has come to rest it still answers. A job that takes too long is not waited for. Each input has a
-//! machine of its own, in a thread, which leaks some memory.
+//! do; at the end it still answers. A job that takes too long is abandoned. Each input has a machine of its own, in a
+//! thread, which leaks some memory.
 
 mod ears;
 mod lines;

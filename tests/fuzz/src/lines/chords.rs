@@ -4,11 +4,11 @@ use kerf::gcode::arc::Chords;
 use kerf::gcode::command::Arc;
 use kerf::units::{Length, PerAxis};
 
-/// Number of chords that are checked: an arc may have thousands of millions.
+/// Most chords that are checked: an arc may have thousands of millions.
 const LOOKED_AT: u32 = 2_000;
 
-/// Walks along an arc. Checks that the ends of its chords lie on the circle or outside it within the allowance, that
-/// their number is the announced one, and that the last chord ends at the end of the arc.
+/// Walks along an arc. Checks that chord ends lie on the circle or outside it within [`outside`], that their number is
+/// that of [`Chords::total`], and that the last chord ends at the end of the arc.
 pub fn check(start: &PerAxis<Length>, target: &PerAxis<Length>, arc: &Arc, tolerance: f32) {
     let chords = Chords::new(start, target, arc, tolerance);
     let total = chords.total();
@@ -30,7 +30,8 @@ pub fn check(start: &PerAxis<Length>, target: &PerAxis<Length>, arc: &Arc, toler
     assert!(last.0 < total || last.1 == *target, "{:?} is not the end {target:?}", last.1);
 }
 
-/// Returns the range of radii in which the points must lie. 2 um, or a millionth, are allowed for errors of floats.
+/// Returns the range of the radius of chord ends, without [`outside`]: 0.1 um units, with 2 um and a millionth allowed
+/// for errors of floats.
 fn radii(start: &PerAxis<Length>, target: &PerAxis<Length>, arc: &Arc) -> (f64, f64) {
     let (from, to) = (radius(start, arc), radius(target, arc));
     let (inner, outer) = (from.min(to), from.max(to));
@@ -38,9 +39,9 @@ fn radii(start: &PerAxis<Length>, target: &PerAxis<Length>, arc: &Arc) -> (f64, 
     (inner - slack, outer + slack)
 }
 
-/// Returns how far the ends of chords may lie outside a circle, so that chords are on both sides of it. The result is
-/// a little more than two thirds of the distance between circle and chord, for chords of this tolerance, or of the
-/// shortest length, 0.05 mm, or of a seventh of a circle.
+/// Returns how far chord ends may lie outside a circle, in 0.1 um. They lie outside so that each chord deviates to both
+/// sides of the circle. The result is a little more than two thirds of the sagitta, for chords of this tolerance (mm),
+/// for the shortest chords of 0.05 mm, or for a seventh of a circle.
 fn outside(radius: f64, tolerance: f32) -> f64 {
     let units = f64::from(tolerance) * f64::from(Length::PER_MM);
     units.max(500.0 * 500.0 / 8.0 / radius).min(0.1 * radius)

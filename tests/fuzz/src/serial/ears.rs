@@ -15,7 +15,7 @@ pub struct Ears {
     pub answers: usize,
     /// The last answer.
     pub last: Vec<u8>,
-    /// Whether bytes need not be text, because the two ends may use different rates.
+    /// Whether bytes need not be text, because the two ends may use different baud rates.
     pub deaf: bool,
     partial: Vec<u8>,
 }

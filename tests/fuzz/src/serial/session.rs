@@ -21,11 +21,10 @@ const LAST_MS: u64 = 300;
 const SPINDLE_MS: u64 = 7_000;
 /// The codes of threads.
 const THREADS: [&[u8]; 3] = [b"g32", b"g33", b"g76"];
-/// Settings after which the machine may send nothing, or send at another rate, or echo what it hears, or present
-/// itself as another machine.
+/// Settings after which the machine may send nothing, send at another rate, echo input, or use another dialect.
 const MUTING: [&[u8]; 7] = [b"jv", b"tv", b"baud", b"ee0", b"ee1", b"eet", b"dia"];
 
-/// The job takes too long to wait for its end.
+/// The job takes too long.
 struct TooLong;
 
 /// A machine, and what it has sent.
@@ -66,11 +65,11 @@ impl Session {
     /// Sends `text` and checks the answers.
     pub fn hold(mut self, text: &[u8], all_at_once: bool) {
         let sent = if all_at_once { self.flood(text) } else { self.converse(text) };
-        // An input that takes too long has been checked for as long as allowed.
+        // An input that takes too long is no failure: it has been checked for the allowed time.
         let _ = sent.and_then(|expected| self.end(expected));
     }
 
-    /// Sends all at once. Returns the least and the most number of answers to expect.
+    /// Sends all at once. Returns the least and the greatest number of answers to expect.
     fn flood(&mut self, text: &[u8]) -> Result<(usize, usize), TooLong> {
         let mut lines = Lines::default();
         let text = [text, b"\n"].concat();
@@ -113,7 +112,7 @@ impl Session {
         Ok(())
     }
 
-    /// Waits for rest. Checks that everything was answered, and that a further line would be.
+    /// Waits until the machine is idle. Checks that everything was answered, and that a further line is.
     fn end(&mut self, (least, most): (usize, usize)) -> Result<(), TooLong> {
         self.rest()?;
         if self.mute {
