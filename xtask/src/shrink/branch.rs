@@ -1,4 +1,4 @@
-//! Lets branches go directly to their destination, instead of around a jump.
+//! Branch shortening: lets branches go directly to their destination, instead of around a jump.
 //!
 //! ```text
 //!   breq .LBB0_1
@@ -6,8 +6,7 @@
 //! .LBB0_1:                    .LBB0_1:
 //! ```
 //!
-//! Where the destination is too far, another jump to the same destination may be near. The branch then goes to that
-//! jump:
+//! Where the destination is too far, another jump to it may be near. The branch then goes to that jump:
 //!
 //! ```text
 //!   breq .LBB0_1                brne .Lway_0_0
@@ -19,8 +18,8 @@
 //!
 //! That costs a cycle on one path, and saves one on the other.
 //!
-//! LLVM writes a branch around a jump before it knows the distance. A branch reaches 63 words back or forth. Code
-//! that is within reach here never lies further apart in the image, because the linker only shortens. If it did, the
+//! LLVM writes a branch around a jump before it knows the distance. A branch reaches 63 words in each direction.
+//! Distances in the image are never longer than those computed here, because the linker only shortens. If one were, the
 //! linker would refuse the branch.
 
 use std::collections::HashMap;
@@ -29,7 +28,7 @@ use anyhow::{Result, bail, ensure};
 
 use super::text::{Function, Insn, Line, Program};
 
-/// How far a branch reaches, bytes, minus the two bytes of the jump that is removed.
+/// The reach of a branch, bytes, less the two bytes of the jump that is removed.
 pub const REACH: usize = 124;
 
 /// Shortens the branches of all functions except interrupts. This costs no cycle.
@@ -38,7 +37,7 @@ pub fn shorten(program: &mut Program) {
     for (number, function) in
         functions.filter(|(_, function)| function.insns().all(|insn| insn.op != "reti"))
     {
-        // Code that has become shorter brings more destinations within reach.
+        // Shorter code brings more destinations within reach.
         loop {
             let before = function.lines.len();
             shorten_in(function);
@@ -50,7 +49,7 @@ pub fn shorten(program: &mut Program) {
     }
 }
 
-/// Beginning of the labels of jumps that branches go by.
+/// Prefix of the labels of jumps to which branches are redirected.
 const WAY: &str = ".Lway_";
 
 /// Lets branches around a jump go to another jump to the same destination.
@@ -80,7 +79,7 @@ fn go_by_others(function: &mut Function, number: usize) {
             let distance = places.lines[*way].abs_diff(places.lines[at[0]]);
             *to == short.args && *way != at[1] && !gone.contains(way) && distance <= REACH
         };
-        // A jump that other branches go by already is preferred.
+        // A jump that other branches already use is preferred.
         let way = jumps.iter().filter(is_way).max_by_key(|(way, _)| ways.contains(way));
         if let Some((way, _)) = way {
             let name = ways.iter().position(|known| known == way).unwrap_or_else(|| {
@@ -194,7 +193,7 @@ impl Places {
             places.lines.push(place);
             match line {
                 Line::Insn(insn) => place += insn.size(),
-                // The size of assembler from the source is unknown, so no branch goes past it.
+                // The size of inline assembler is unknown, so no branch is made across it.
                 Line::Fixed(_) => place += REACH + 1,
                 Line::Label(label) => drop(places.labels.insert(label.clone(), place)),
                 Line::Note(_) => {}

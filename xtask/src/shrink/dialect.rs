@@ -1,4 +1,4 @@
-//! Translates what LLVM writes for AVR but binutils' assembler reads differently.
+//! Translates syntax in which LLVM's AVR assembler differs from that of binutils.
 
 use std::borrow::Cow;
 

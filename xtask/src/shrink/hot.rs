@@ -1,27 +1,26 @@
-//! Which code is hot, and therefore how much of it may be shared.
+//! Hot, warm and cold functions: how much of the code of each may be shared.
 //!
-//! A row is the beginning of names, up to the end of a word: a folder, a module, a type or a function. Of the rows
-//! that match the beginning of a name, the longest decides how hot the function is. A function that no row matches is
-//! cold.
+//! A row is a prefix of names, up to the end of a word: a folder, a module, a type or a function. The longest row that
+//! matches a function's name decides. A function that no row matches is cold.
 //!
-//! The rows are derived from counts: `KERF_COUNTS=FOLDER cargo xtask bench` writes how often each instruction ran.
-//! Sharing all repeated code costs 25 cycles for each call of a function, plus 6 % of its own time. Sharing its end
-//! costs 3 cycles. If that is more than 3 millionths of the time of a job of the bench for each byte that it saves,
-//! the function is warm or hot. In the code that prepares segments the limit is one millionth. The code that computes
-//! keys for the queue is hot. `cargo xtask size` fails when a row no longer matches any function.
+//! The rows are derived from a profile: `KERF_COUNTS=FOLDER cargo xtask bench` writes how often each instruction ran.
+//! Outlining costs 25 cycles for each call of a function, plus 6 % of its own time. Tail merging costs 3 cycles. If
+//! that is more than 3 millionths of the time of a job of the bench for each byte that it saves, the function is warm
+//! or hot. In the code that prepares segments the limit is one millionth. The code that computes keys for the queue is
+//! hot. `cargo xtask size` fails when a row no longer matches any function.
 
 /// How much of a function may be shared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Heat {
-    /// All code that repeats.
+    /// All repeated code.
     Cold,
-    /// Its end only.
+    /// Its tail only.
     Warm,
     /// Nothing.
     Hot,
 }
 
-/// Beginnings of the names of functions that stay unchanged.
+/// Prefixes of the names of functions that stay unchanged.
 const HOT: &[&str] = &[
     // Every interrupt, the executors and their tick.
     "__vector_",
@@ -84,7 +83,7 @@ const HOT: &[&str] = &[
     "kerf::tasks::wake::Wake>::",
 ];
 
-/// Functions that run as often as a segment, a block or a line. Their ends are shared, at a cost of two or three
+/// Functions that run as often as a segment, a block or a line. Their tails are shared, at a cost of two or three
 /// cycles each.
 pub const WARM: &[&str] = &[
     "kerf::gcode::lexer::comment",

@@ -1,23 +1,23 @@
-//! Makes the image smaller: rewrites the compiler's program before it is linked.
+//! Makes the image smaller: a post-compiler optimizer that rewrites LLVM's assembler text before it is linked.
 //!
-//! Fat LTO gives one assembler text for the whole program, so repeated code can be shared wherever it stands. LLVM
-//! does not do that for AVR. Cold functions share all code that repeats, warm functions share their ends, and hot
-//! functions share nothing ([`hot`]). Assembler from the source is never changed.
+//! Fat LTO gives one assembler text for the whole program, so repeated code can be outlined across functions, which
+//! LLVM does not do for AVR. In cold functions all repeated code is outlined, warm functions share only their tails
+//! (tail merging), and hot functions are not changed ([`hot`]). Inline assembler is never changed.
 //!
 //! | module | what it does | flash, bytes |
 //! |---|---|---|
 //! | [`text`], `dialect` | reads LLVM's text, writes it for `avr-as` | |
-//! | [`tidy`] | removes what the compiler need not have written, and runs old and new code to compare them | 18,200 |
-//! | [`prologue`] | shares the beginnings of functions | 5,900 |
-//! | [`repeats`] | shares any other code that repeats, above all ends of functions | 14,500 |
-//! | [`branch`] | lets branches go directly to their destination, not around a jump | 2,700 |
-//! | [`order`] | puts functions near the functions that they call, which shortens calls | 2,100 |
-//! | [`via`] | lets several calls over a long distance go by one jump | 1,200 |
-//! | [`verify`] | puts shared code back, and compares the result with the tidied text | |
+//! | [`tidy`] | peephole and data-flow optimizations; runs old and new code to compare them | 18,200 |
+//! | [`prologue`] | shares function prologues | 5,900 |
+//! | [`repeats`] | outlining and tail merging of other repeated code | 14,500 |
+//! | [`branch`] | branch shortening: branches go directly to their destination, not around a jump | 2,700 |
+//! | [`order`] | function placement: functions near the functions that they call have short calls | 2,100 |
+//! | [`via`] | trampolines: several long calls share one jump | 1,200 |
+//! | [`verify`] | inlines shared code again, and compares the result with the tidied text | |
 //! | [`link`] | assembles and links, as `rustc` did | |
 //!
-//! A shared piece costs its caller 7 to 25 cycles, and three bytes of stack while it runs. `crate::elf` searches the
-//! compiler's own program for the compiler's defects, and analyses the stack of the final image.
+//! Shared code costs its caller 7 to 25 cycles, and three bytes of stack while it runs. `crate::elf` searches LLVM's
+//! unchanged output for known compiler defects, and analyses the stack of the final image.
 
 mod branch;
 mod dialect;
@@ -40,13 +40,13 @@ use text::{Function, Insn, Line, Program};
 
 /// Two texts for the assembler.
 pub struct Texts {
-    /// The program as the compiler wrote it, without debug information.
+    /// The compiler's program, without debug information.
     pub plain: String,
     /// The program that is linked: tidied, with shared code.
     pub small: String,
 }
 
-/// Reads what the compiler wrote, and makes it smaller.
+/// Parses the compiler's text, and optimizes it.
 pub fn shrink(text: &str) -> Result<Texts> {
     let plain = Program::parse(text);
     let mut tidy = plain.clone();
@@ -69,7 +69,7 @@ fn heat(function: &Function) -> Heat {
     hot::heat(&format!("{:#}", rustc_demangle::demangle(&function.name)))
 }
 
-/// Returns the names that assembler from the source contains.
+/// Returns the names that inline assembler contains.
 fn names_in_source(program: &Program) -> HashSet<String> {
     let words = program.functions.iter().flat_map(Function::fixed);
     let words =
@@ -77,7 +77,7 @@ fn names_in_source(program: &Program) -> HashSet<String> {
     words.map(str::to_owned).collect()
 }
 
-/// Returns for each line of a function whether it runs while assembler from the source keeps interrupts off.
+/// Returns for each line of a function whether it runs while inline assembler keeps interrupts off.
 fn quiet(function: &Function) -> Vec<bool> {
     let mut off = false;
     let mut line = |line: &Line| {

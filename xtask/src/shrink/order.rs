@@ -1,11 +1,11 @@
-//! Puts functions near the functions that they call.
+//! Function placement: puts functions near the functions that they call.
 //!
-//! A call or jump takes four bytes, but only two within 4 KB, which the linker finds out (`--relax`). So the order of
-//! functions decides how large the program is: the more calls go to neighbours, the smaller it is.
+//! A call or jump takes four bytes, but only two within 4 KB, where the linker shortens it (`--relax`). So the program
+//! is smaller the more calls go to near functions.
 //!
-//! The best order cannot be computed, but a good one is enough. Functions that call each other most are put together
-//! first. Then each function is tried beside all functions that it calls or is called by, and moved to where most
-//! calls are short. The result depends on the program alone.
+//! The best order is too expensive to compute; a heuristic is enough. Functions that call each other most are grouped
+//! first. Then each function is tried beside all functions that it calls or is called by, and moved to where most calls
+//! are short (local search). The result is deterministic.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -132,8 +132,8 @@ impl Map {
         moved
     }
 
-    /// Returns the cost of the long calls. Each costs the same, plus a little more the longer it is, so that moves in
-    /// the right direction pay off.
+    /// Returns the cost of the long calls. Each has a fixed cost plus a small part that grows with its length, so that
+    /// moves in the right direction pay off.
     fn cost(&self, order: &[usize]) -> usize {
         const LONG: usize = 1_000;
         let mut places = vec![0; order.len()];

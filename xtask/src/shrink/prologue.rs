@@ -1,7 +1,6 @@
-//! Lets cold functions share their beginnings.
+//! Lets cold functions share their prologues.
 //!
-//! A function saves the registers that its caller expects unchanged, two bytes each, and makes a frame in 16 more
-//! bytes:
+//! A prologue saves callee-saved registers, two bytes each, and makes a frame in 16 more bytes:
 //!
 //! ```text
 //!   push r16                            ldi  r26, 5        (frames of more than a byte: r27 as well)
@@ -18,13 +17,13 @@
 //!   out  61, r28                        sub  r28, r26 ...
 //! ```
 //!
-//! The shared code takes its return address off the stack, does the work of the beginning, and puts the address back.
+//! The shared code pops its return address, does the work of the prologue, and pushes the address again.
 //!
 //! It may use r0, r26, r27, r30, r31 and the flags. LLVM's calling convention for AVR passes arguments in r8 to r25
-//! only, and the callee expects nothing in those registers. Functions that assembler from the source calls are not
-//! changed, because the assembler may have a convention of its own.
+//! only, so these registers hold nothing at entry. Functions that inline assembler calls are not changed, because the
+//! assembler may have its own convention.
 //!
-//! Ends of functions need no special treatment: [`super::repeats`] shares them like any other code.
+//! Epilogues need no special treatment: [`super::repeats`] shares them like any other code.
 
 use std::collections::BTreeMap;
 
@@ -32,19 +31,19 @@ use super::hot::Heat;
 use super::text::{Function, Insn, Line, Program};
 use super::{heat, names_in_source};
 
-/// The beginning of a function.
+/// The prologue of a function.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Entry {
     /// The registers that it pushes, in this order.
     saved: Vec<String>,
     /// The size of its frame, if it has one.
     frame: Option<u16>,
-    /// The places of its instructions among the lines.
+    /// The indices of its instructions among the lines.
     lines: Vec<usize>,
 }
 
-/// The kind of a beginning. Functions with the same kind can share: they save the same registers and make a frame of
-/// one byte or two, or none.
+/// The kind of a prologue: the registers that it saves, and whether the size of its frame has one byte or two, or there
+/// is none. Functions with equal kinds share a prologue.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Kind {
     saved: Vec<String>,
@@ -58,10 +57,10 @@ enum Frame {
     Word,
 }
 
-/// Beginning of the names of shared routines.
+/// Prefix of the names of shared prologues.
 pub const NAME: &str = "__enter_";
 
-/// Shares the beginnings of cold functions where that makes the program smaller.
+/// Shares the prologues of cold functions where that makes the program smaller.
 pub fn share(program: &mut Program) {
     let in_source = names_in_source(program);
     let mut groups: BTreeMap<Kind, Vec<(usize, Entry)>> = BTreeMap::new();
@@ -100,7 +99,7 @@ fn kind(entry: &Entry) -> Kind {
     Kind { saved: entry.saved.clone(), frame }
 }
 
-/// Returns the beginning of a function if it is what LLVM usually writes; else `None`.
+/// Returns the prologue of a function if it has LLVM's usual form; else `None`.
 fn entry(function: &Function) -> Option<Entry> {
     let mut code =
         function.lines.iter().enumerate().filter(|(_, line)| !matches!(line, Line::Note(_)));
@@ -150,13 +149,13 @@ fn insns(text: &str) -> Vec<Insn> {
     text.lines().map(Insn::new).collect()
 }
 
-/// Returns the instructions that LLVM writes for a beginning.
+/// Returns the instructions that LLVM writes for a prologue.
 fn written(entry: &Entry) -> Vec<Insn> {
     let pushes = entry.saved.iter().map(|register| Insn::new(&format!("push {register}")));
     pushes.chain(written_frame(entry.frame)).collect()
 }
 
-/// Returns the instructions that replace a beginning.
+/// Returns the instructions that replace a prologue.
 fn call(entry: &Entry, name: &str) -> Vec<Insn> {
     let size = match entry.frame {
         None => String::new(),
@@ -196,7 +195,7 @@ fn replace(function: &mut Function, entry: &Entry, name: &str) {
     function.lines = lines;
 }
 
-/// Returns the instructions that a call of a shared routine stands for; `before` loads the size of the frame.
+/// Returns the instructions that a call of a shared prologue replaces; `before` loads the size of the frame.
 pub fn put_back(routine: &[Insn], before: &[Insn]) -> Option<Vec<Insn>> {
     let saved: Vec<_> = routine.iter().filter(|i| i.op == "push").map(|i| i.args.clone()).collect();
     let saved =
@@ -223,7 +222,7 @@ mod tests {
     const Y: &str = "push r28\npush r29\nin r28, 61\nin r29, 62\n";
     const SET: &str = "in r0, 63\ncli\nout 62, r29\nout 63, r0\nout 61, r28\n";
 
-    /// Returns the functions, each several times, with shared beginnings.
+    /// Returns the functions, each several times, with shared prologues.
     fn shared(functions: &[(&str, String)]) -> Program {
         let copies = (0..8)
             .flat_map(|n| functions.iter().map(move |(name, code)| (format!("{name}{n}"), code)));

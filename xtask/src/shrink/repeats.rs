@@ -1,4 +1,4 @@
-//! Shares cold code that stands in several places.
+//! Outlining: shares code that repeats in cold functions.
 //!
 //! ```text
 //!   movw r24, r28                       call __part_0
@@ -10,20 +10,20 @@
 //!                                       ret
 //! ```
 //!
-//! Code that ends with `ret` is jumped to instead (`__tail_0`). This costs no stack, and the code may take anything
-//! off the stack, so the ends of functions can be shared. It costs two or three cycles, so warm functions share their
-//! ends and nothing else.
+//! Code that ends with `ret` is jumped to instead (`__tail_0`, tail merging). This costs no stack, and the code may pop
+//! anything, so epilogues can be shared. It costs two or three cycles, so warm functions share their tails only.
 //!
-//! `call`, `jmp` and `ret` change no register and no flag, so a part may begin and end anywhere. But:
+//! `call`, `jmp` and `ret` change no register and no flag, so a part may begin and end anywhere, with these exceptions:
 //!
-//! - a part has no branch, no label and no assembler from the source;
+//! - a part has no branch, no label and no inline assembler;
 //! - a part that is called does not touch the stack pointer, because its return address lies on top (it may access the
 //!   frame, through Y), and it does not disable or enable interrupts, so that code with interrupts off stays as short
 //!   as it was;
 //! - nothing is taken from between `cli` and the instruction that enables interrupts again;
-//! - an instruction that another one may skip stays where it is.
+//! - an instruction that a skip instruction may skip is not moved.
 //!
-//! The part that saves most is shared first, until no part saves anything. Parts of parts are found in another round.
+//! The part that saves most is shared first, until no part saves anything. Repeated code within parts is found in
+//! another round.
 
 use std::collections::{BinaryHeap, HashMap};
 
@@ -31,14 +31,14 @@ use super::hot::Heat;
 use super::text::{Function, Insn, Line, Program};
 use super::{heat, prologue, quiet};
 
-/// Beginning of the names of parts with a `ret` of their own.
+/// Prefix of the names of parts that are called.
 pub const PART: &str = "__part_";
-/// Beginning of the names of parts that include the `ret` of the function.
+/// Prefix of the names of parts that are jumped to; they include the `ret` of the function.
 pub const TAIL: &str = "__tail_";
 
 /// Most instructions of a part.
 const LONGEST: usize = 60;
-/// Number of rounds, in which parts of parts are found.
+/// Number of rounds; later ones find repeated code within parts.
 const ROUNDS: usize = 3;
 /// Bytes of a call or jump to a part. The linker makes it two where the distance is short.
 const SITE: usize = 4;
@@ -101,7 +101,7 @@ fn class(insn: &Insn) -> Class {
         "ret" => Class::Ret,
         "cli" | "sei" => Class::Tail,
         "icall" | "eicall" => Class::Barrier,
-        // The prologue returns with more on the stack.
+        // A shared prologue returns with a changed stack pointer.
         "call" if insn.args.starts_with(prologue::NAME) => Class::Barrier,
         _ if insn.is_jump() => Class::Barrier,
         _ if touches_stack || sets_stack => Class::Tail,
@@ -120,7 +120,7 @@ struct Stream {
     insns: Vec<Insn>,
 }
 
-/// Places with the same sequence of instructions.
+/// Places with equal sequences of instructions.
 struct Group {
     length: usize,
     places: Vec<usize>,

@@ -1,10 +1,10 @@
-//! The compiler's assembler text of a whole program: its functions, line by line, and what stands around them.
+//! The parsed assembler text of a whole program: its functions, line by line, and the text around them.
 
 use std::collections::{BTreeSet, HashSet};
 
 use super::dialect;
 
-/// Beginning of the further names of functions whose address is taken.
+/// Prefix of the additional symbols of functions whose address is taken.
 pub const TAKEN: &str = "__taken_";
 
 /// One line of a function.
@@ -14,7 +14,7 @@ pub enum Line {
     Insn(Insn),
     /// A label that branches go to.
     Label(String),
-    /// A line of assembler from the source. No pass changes it.
+    /// A line of inline assembler. No pass changes it.
     Fixed(String),
     /// A line that makes no code: directives, labels and source positions for a debugger.
     Note(String),
@@ -25,7 +25,7 @@ pub enum Line {
 pub struct Insn {
     /// The mnemonic, such as `brne`.
     pub op: String,
-    /// The operands as they stand, such as `r28, 61`.
+    /// The operands as written, such as `r28, 61`.
     pub args: String,
 }
 
@@ -99,7 +99,7 @@ impl Function {
         self.lines.iter().filter(|line| !matches!(line, Line::Note(_)))
     }
 
-    /// The lines of assembler from the source.
+    /// The lines of inline assembler.
     pub fn fixed(&self) -> impl Iterator<Item = &str> {
         self.lines.iter().filter_map(|line| match line {
             Line::Fixed(text) => Some(text.as_str()),
@@ -163,7 +163,7 @@ impl Program {
     }
 
     /// Returns the functions whose address is taken. The image does not show that, so the analysis of the stack finds
-    /// them by further names.
+    /// them by additional symbols.
     pub fn taken(&self) -> BTreeSet<&str> {
         let code = self
             .functions
@@ -211,7 +211,7 @@ struct Reader {
     program: Program,
     /// The function that is being read.
     function: Option<Function>,
-    /// Whether the line is assembler from the source, between `;APP` and `;NO_APP`.
+    /// Whether the line is inline assembler, between `;APP` and `;NO_APP`.
     in_source: bool,
 }
 

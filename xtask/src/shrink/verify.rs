@@ -1,8 +1,8 @@
 //! Compares the program with shared code to the tidied program.
 //!
-//! All shared code is put back where it is called from, using only the text of the routines. The result must be the
-//! tidied text, instruction by instruction. The only allowed difference is a branch that went around a jump and now
-//! goes to its destination, or by another jump. Any other difference fails the build.
+//! All shared code is inlined again at its calls, using only the text of the routines. The result must equal the tidied
+//! text, instruction by instruction. The only allowed difference is a branch that went around a jump and now goes to
+//! the jump's destination, directly or by another jump. Any other difference fails the build.
 
 use std::collections::HashMap;
 
@@ -11,7 +11,7 @@ use anyhow::{Context, Result, bail, ensure};
 use super::text::{Function, Insn, Line, Program};
 use super::{branch, prologue, repeats, via};
 
-/// Most depth of routines that call routines. A greater depth means a routine that calls itself.
+/// Greatest depth of routines that call routines. A greater depth means recursion.
 const DEEPEST: usize = 100;
 
 /// Fails if `after` differs from `before` in more than shared code.
@@ -45,7 +45,7 @@ pub fn check(before: &Program, after: &Program) -> Result<()> {
     Ok(())
 }
 
-/// Whether the code is the same, except for branches that went around a jump.
+/// Whether the code is equal, except for branches that went around a jump.
 fn is_same(before: &[&Line], after: &[Line]) -> bool {
     let mut before = before;
     for line in after {
@@ -69,7 +69,7 @@ fn is_routine(name: &str) -> bool {
         .any(|prefix| name.starts_with(prefix))
 }
 
-/// Returns the code of a function with all shared code put back.
+/// Returns the code of a function with all shared code inlined.
 fn put_back(
     function: &Function,
     routines: &HashMap<&str, &Function>,
@@ -114,7 +114,7 @@ fn straight(site: &Insn, routines: &HashMap<&str, &Function>) -> Result<Insn> {
     }
 }
 
-/// Adds the code that the call of a routine stands for.
+/// Inlines the call of a routine.
 fn take_in(site: &Insn, mut routine: Vec<Line>, whole: &mut Vec<Line>) -> Result<()> {
     let ret = Line::Insn(Insn::new("ret"));
     match site.op.as_str() {

@@ -1,4 +1,4 @@
-//! Lets calls over a long distance share a jump.
+//! Trampolines: lets long calls share a jump.
 //!
 //! ```text
 //!   call __mulsf3                       call __via_0      two bytes each, for it is near
@@ -8,9 +8,9 @@
 //!                                       jmp  __mulsf3
 //! ```
 //!
-//! A call or jump takes two bytes within 4 KB and four elsewhere. Where three or more near each other go to one far
-//! function, they go to a jump that stands between them. This costs two cycles each, and no stack. Calls in hot
-//! functions stay direct. So do calls of shared prologues, because these return with more on the stack.
+//! A call or jump takes two bytes within 4 KB and four elsewhere. Where three or more calls near each other go to one
+//! far function, they go to a jump placed between them. This costs two cycles each, and no stack. Calls in hot
+//! functions stay direct, and so do calls of shared prologues, which return with a changed stack pointer.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -18,10 +18,10 @@ use super::hot::Heat;
 use super::text::{Function, Insn, Line, Program};
 use super::{heat, prologue};
 
-/// Beginning of the names of the jumps.
+/// Prefix of the names of the jumps.
 pub const NAME: &str = "__via_";
 
-/// How far a short call reaches, bytes, minus some room for the jumps themselves.
+/// The reach of a short call, bytes, less some room for the jumps themselves.
 const REACH: usize = 3_900;
 
 /// A call or jump.
@@ -90,7 +90,7 @@ fn far(program: &Program) -> (Vec<usize>, BTreeMap<String, Vec<Site>>) {
                 && !insn.args.starts_with(prologue::NAME)
                 && !is_hot
             {
-                // A function that is not here comes from a library, which stands behind all code.
+                // A function that is not in the map comes from a library, which is placed after all code.
                 let to = places.get(insn.args.as_str()).copied().unwrap_or(end);
                 if to.abs_diff(place) > REACH {
                     let site = Site { function, line, place };

@@ -7,7 +7,7 @@ use super::offsets::subtracted;
 use super::rules::{Edit, Place};
 
 impl Place<'_> {
-    /// Removes a save and restore of flags that nobody needs.
+    /// Removes a save and restore of flags that are dead.
     pub(super) fn kept(&self) -> Option<Edit> {
         let out = self.flow.restores[self.at]?;
         let kept = register(operands(self.insn).0)?;
@@ -81,7 +81,7 @@ impl Place<'_> {
         Some(edit.into_iter().chain(gone(self.at + 2)).collect())
     }
 
-    /// Lets accesses through a pointer do an addition to the pointer.
+    /// Folds an addition to a pointer into the accesses through it.
     ///
     /// ```text
     ///   adiw r30, 6

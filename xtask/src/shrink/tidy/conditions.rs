@@ -1,5 +1,4 @@
-//! Rules for conditions: comparisons that have been made already, and branches on a 0 or 1 that was made from a
-//! condition.
+//! Rules for conditions: redundant comparisons, and branches on a 0 or 1 that was made from a condition.
 
 use super::super::text::Insn;
 use super::super::text::Line;

@@ -1,4 +1,4 @@
-//! Finds which registers hold the same value, wherever control comes from.
+//! Global copy analysis: finds registers with equal values on every path.
 
 use super::super::text::{Insn, Line};
 use super::effect::{Effect, Set, bit, operands, pair, register};
@@ -18,7 +18,7 @@ impl Default for Copies {
 }
 
 impl Copies {
-    /// Returns for each line what is true before it on every path that leads there.
+    /// Returns the facts that hold before each line on every path to it.
     pub fn of(flow: &Flow) -> Vec<Copies> {
         let mut before: Vec<Option<Copies>> = vec![None; flow.lines.len()];
         let mut open = Vec::new();
@@ -48,7 +48,7 @@ impl Copies {
         self.roots[usize::from(register)]
     }
 
-    /// Returns what is true in both.
+    /// Returns the facts that hold in both (the meet of the analysis).
     fn and(&self, other: &Copies) -> Copies {
         let mut both = Copies::default();
         for register in 0..32 {
@@ -84,7 +84,7 @@ impl Copies {
         behind
     }
 
-    /// Takes note that a register gets another value. One of the others now represents the registers that it
+    /// Records that a register gets another value. One of the other registers now represents the group that it
     /// represented.
     fn forget(&mut self, register: u8) {
         self.roots[usize::from(register)] = register;

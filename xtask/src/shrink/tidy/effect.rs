@@ -1,4 +1,4 @@
-//! What each instruction reads and writes.
+//! The effect of each instruction: the registers and flags that it reads and writes.
 
 use super::super::text::{Insn, Line};
 
@@ -23,7 +23,7 @@ pub const FLAGS: Set = SUM | T;
 pub const REGISTERS: Set = u32::MAX as Set;
 pub const ALL: Set = REGISTERS | FLAGS;
 
-/// Registers that a function returns unchanged.
+/// Callee-saved registers.
 pub const KEPT: Set = range(2, 17) | range(28, 29);
 /// Registers of arguments.
 pub const ARGUMENTS: Set = range(8, 25);
@@ -32,7 +32,7 @@ pub const RESULTS: Set = range(18, 25);
 /// Registers and flags that a call leaves undefined.
 const LOST: Set = bit(0) | range(26, 27) | range(30, 31) | FLAGS;
 
-/// What an instruction does to registers and flags.
+/// The effect of an instruction on registers and flags.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Effect {
     /// What the result depends on.
@@ -57,7 +57,7 @@ impl Effect {
         Some(Effect { reads, writes, spoils: 0, acts: true })
     }
 
-    /// Returns all that may have another value afterwards.
+    /// Returns the registers and flags that may have other values afterwards.
     pub fn changes(&self) -> Set {
         self.writes | self.spoils
     }

@@ -1,9 +1,9 @@
-//! Runs two functions side by side, to check that the second does what the first does.
+//! Checks that two versions of a function are equivalent, by running both with random values.
 //!
-//! Both run from each common label to the next, from registers with random values. They must read and write memory
-//! alike, call alike, and arrive at the same label with equal values in all registers that are needed. This also
-//! tests the results of [`super::flow`]: registers that it declares unneeded hold different values in the two, and
-//! the values on arrival must be as it says.
+//! Both run from each common label to the next, from registers with random values. They must make equal memory accesses
+//! and calls, and arrive at one label with equal values in all live registers. This also tests the results of
+//! [`super::flow`]: registers that it finds dead get different values in the two, and the values on arrival must match
+//! its facts.
 
 use std::collections::HashMap;
 
@@ -19,7 +19,7 @@ use super::run::{End, Run};
 /// How often each piece is run.
 const TRIALS: u64 = 12;
 
-/// Fails if the last of several versions of a function does anything else than the first.
+/// Fails if the last of several versions of a function is not equivalent to the first.
 ///
 /// A fact about a version may follow from an earlier change. So where the last version does not match the first, the
 /// versions between them are compared, too.
@@ -69,9 +69,9 @@ struct Pieces<'a> {
     old: Flow<'a>,
     new: Flow<'a>,
     stops: HashMap<&'a str, ()>,
-    /// For each line of the new function: what is needed behind it.
+    /// For each line of the new function: the registers and flags that are live after it.
     needed: Vec<Set>,
-    /// For each line of the old function: what is known before it.
+    /// For each line of the old function: the known bits before it.
     known: Vec<Known>,
     /// For each line of the old function: which registers hold the same value before it.
     copies: Vec<Copies>,

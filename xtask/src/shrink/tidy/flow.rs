@@ -1,4 +1,4 @@
-//! The control flow of a function, the values that are needed at each line, and what is known of them.
+//! Control flow graph, liveness and known bits of a function.
 
 use std::collections::HashMap;
 
@@ -18,14 +18,14 @@ pub struct Flow<'a> {
     /// Whether the instruction before may skip this one.
     pub may_be_skipped: Vec<bool>,
     pub labels: HashMap<&'a str, usize>,
-    /// Instructions in assembler from the source whose effect is known.
+    /// Instructions of inline assembler whose effect is known.
     pub fixed: HashMap<usize, Insn>,
     /// For each line that saves the status register: the line that restores it.
     pub restores: Vec<Option<usize>>,
 }
 
 impl<'a> Flow<'a> {
-    /// Returns the flow of a function; `None` if it has jumps to unknown places. `needs` are the needs of all
+    /// Returns the flow of a function; `None` if it has jumps to unknown destinations. `needs` are the needs of all
     /// functions.
     pub fn of(function: &'a Function, needs: &Needs) -> Option<Flow<'a>> {
         let code =
@@ -64,7 +64,7 @@ impl<'a> Flow<'a> {
         Some(flow)
     }
 
-    /// Returns the instruction of a line, including one in assembler from the source whose effect is known.
+    /// Returns the instruction of a line, including one of inline assembler whose effect is known.
     pub fn insn(&self, at: usize) -> Option<&Insn> {
         match self.lines.get(at)? {
             Line::Insn(insn) => Some(insn),
@@ -92,7 +92,7 @@ impl<'a> Flow<'a> {
         None
     }
 
-    /// Returns what a line reads, given what is needed behind each line.
+    /// Returns the registers and flags that a line reads, given those that are live after each line.
     ///
     /// Flags that are saved and restored are read if they are needed where they are restored.
     fn reads(&self, at: usize, needed: &[Set]) -> Set {
@@ -105,7 +105,7 @@ impl<'a> Flow<'a> {
         reads & !effect::FLAGS | needed[out] & effect::FLAGS
     }
 
-    /// Returns the first line at or behind a line that is no label.
+    /// Returns the first line at or after a line that is no label.
     pub fn skip_labels(&self, at: usize) -> usize {
         self.lines[at..].iter().take_while(|line| matches!(line, Line::Label(_))).count() + at
     }
@@ -124,7 +124,7 @@ impl<'a> Flow<'a> {
         at
     }
 
-    /// Returns for each line what is needed behind it.
+    /// Liveness: returns for each line the registers and flags that are live after it.
     pub fn needed(&self) -> Vec<Set> {
         let mut before = vec![0; self.lines.len()];
         let mut behind = vec![0; self.lines.len()];
@@ -142,14 +142,14 @@ impl<'a> Flow<'a> {
         behind
     }
 
-    /// Returns what is needed before a line, given what is needed behind each line.
+    /// Returns the registers and flags that are live before a line, given those that are live after each line.
     pub fn needed_before(&self, at: usize, needed: &[Set]) -> Set {
         let Some(effect) = self.effects.get(at) else { return 0 };
         let written = if self.may_be_skipped[at] { 0 } else { effect.writes };
         needed[at] & !written | self.reads(at, needed)
     }
 
-    /// Returns for each line what is known of the registers before it.
+    /// Returns for each line the known bits of the registers before it.
     pub fn known(&self) -> Vec<Known> {
         let mut before: Vec<Option<Known>> = vec![None; self.lines.len()];
         let mut open = Vec::new();
@@ -193,7 +193,7 @@ fn kept_status(insn: &Insn) -> Option<u8> {
     if insn.op == "in" && second == "63" { effect::register(first) } else { None }
 }
 
-/// Pieces of assembler from the source whose effect is known.
+/// Pieces of inline assembler whose effect is known.
 #[derive(Default)]
 struct Pieces {
     /// Instructions of pieces that run straight on, by their lines.
@@ -245,7 +245,7 @@ fn is_skip(line: &Line) -> bool {
     matches!(line, Line::Insn(insn) if insn.is_skip())
 }
 
-/// Returns the lines that may run behind a line.
+/// Returns the lines that may run after a line.
 fn next(lines: &[&Line], labels: &HashMap<&str, usize>, at: usize) -> Option<Vec<usize>> {
     let follows = (at + 1 < lines.len()).then_some(at + 1);
     let Line::Insn(insn) = lines[at] else { return Some(follows.into_iter().collect()) };
@@ -310,7 +310,7 @@ impl Known {
         Known { registers: std::array::from_fn(both) }
     }
 
-    /// Returns what is known behind a line.
+    /// Returns the known bits after a line.
     pub fn behind(&self, line: &Line, insn: Option<&Insn>, effect: &Effect) -> Known {
         let mut known = *self;
         for (number, register) in known.registers.iter_mut().enumerate() {
@@ -318,7 +318,7 @@ impl Known {
                 *register = Bits::default();
             }
         }
-        // Assembler from the source leaves register 1 unchanged.
+        // Inline assembler leaves register 1 unchanged.
         if matches!(line, Line::Fixed(_)) && insn.is_none() {
             known.registers[1] = self.registers[1];
         }

@@ -1,4 +1,4 @@
-//! Puts code behind the jump that leads to it.
+//! Block layout: puts code after the jump that leads to it.
 //!
 //! ```text
 //!   rjmp .L2                      .L2:
@@ -10,8 +10,8 @@
 //!   ret
 //! ```
 //!
-//! Code into which no other code falls through may stand anywhere in its function. Behind a jump to it, it makes the
-//! jump unnecessary, which saves flash and time. Every branch must still reach its destination.
+//! Code into which no other code falls through may be placed anywhere in its function. Placed after a jump to it, it
+//! makes the jump unnecessary, which saves flash and time. Every branch must still reach its destination.
 
 use std::collections::HashMap;
 
@@ -19,7 +19,7 @@ use super::super::branch::REACH;
 use super::super::text::{Function, Line};
 use super::effect;
 
-/// Puts code behind the jumps to it. Returns whether any code was moved.
+/// Puts code after the jumps to it. Returns whether any code was moved.
 pub fn arrange(function: &mut Function) -> bool {
     let mut pieces = pieces(&function.lines);
     let mut moved = false;
@@ -81,7 +81,7 @@ fn pieces(lines: &[Line]) -> Vec<Piece> {
     pieces
 }
 
-/// Moves the piece that begins with a label behind another piece, whose jump is removed. Returns the new pieces and
+/// Moves the piece that begins with a label to after another piece, whose jump is removed. Returns the new pieces and
 /// the index of the pair; `None` if a branch would no longer reach.
 fn behind(pieces: &[Piece], at: usize, label: &str) -> Option<(Vec<Piece>, usize)> {
     let to = pieces.iter().position(|piece| piece.begins(label))?;
@@ -115,7 +115,7 @@ fn all_reach(pieces: &[Piece]) -> bool {
                     }
                     place += insn.size();
                 }
-                // The size of assembler from the source is unknown, so no branch goes past it.
+                // The size of inline assembler is unknown, so no branch is made across it.
                 Line::Fixed(_) => place += REACH + 1,
                 Line::Label(label) => drop(labels.insert(label, (number, place))),
                 Line::Note(_) => {}
@@ -153,7 +153,7 @@ mod tests {
     fn what_is_fallen_into_stays() {
         for text in [
             "cpi r24, 1\nbreq .LBB0_1\nret\n.LBB0_1:\nwdr\n.LBB0_2:\nret\n.LBB0_3:\nrjmp .LBB0_2",
-            // The jump may be skipped, so the code behind it is reached by falling through.
+            // The jump may be skipped, so the code after it is reached by falling through.
             "sbrc r24, 0\nrjmp .LBB0_2\n.LBB0_1:\nret\n.LBB0_2:\nwdr\nret\n.LBB0_3:\nret",
             ".LBB0_1:\nwdr\nrjmp .LBB0_1",
             // The last piece may end with a call that never returns.

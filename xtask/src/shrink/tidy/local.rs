@@ -1,4 +1,4 @@
-//! What is known between two labels: which registers hold copies, and which hold values of the frame.
+//! Local data flow between two labels: which registers hold copies, and which hold values of the frame.
 
 use super::super::text::{Insn, Line};
 use super::copies::Copies;
@@ -6,7 +6,7 @@ use super::effect::{self, bit, operands, register};
 use super::flow::Flow;
 use super::offsets::Offsets;
 
-/// What is known before a line.
+/// The facts that hold before a line.
 #[derive(Clone, Default)]
 pub struct Local {
     /// For each register: another register with the same value.
@@ -29,14 +29,14 @@ impl Local {
         Local { has_frame: loads("in", "r28, 61") && loads("in", "r29, 62"), ..Local::default() }
     }
 
-    /// Forgets all, because control may come from elsewhere.
+    /// Drops all facts, because control may come from elsewhere.
     pub fn clear(&mut self) {
         self.copies = [None; 32];
         self.frame.clear();
         self.offsets.clear();
     }
 
-    /// Control comes from elsewhere. Only the copies that are true on every path are known.
+    /// Enters a label: only the copies that hold on every path stay known.
     pub fn enter(&mut self, copies: &Copies) {
         self.clear();
         for register in 0..32 {
@@ -56,7 +56,7 @@ impl Local {
         self.root(a) == self.root(b)
     }
 
-    /// Returns the register that holds the value that this would load.
+    /// Returns the register that already holds the value of a load.
     pub fn held(&self, is_load: bool, place: &str) -> Option<u8> {
         let found = self.frame.iter().find(|(known, _)| known == place);
         found.filter(|_| is_load && self.has_frame).map(|(_, register)| *register)

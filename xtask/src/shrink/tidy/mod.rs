@@ -1,11 +1,11 @@
-//! Removes what the compiler need not have written.
+//! Peephole and data-flow optimizations of LLVM's output.
 //!
-//! LLVM's back end for AVR makes a 0 or 1 from a condition and tests that, copies registers to and fro, loads values
+//! LLVM's back end for AVR makes a 0 or 1 from a condition and tests that, copies registers needlessly, loads values
 //! from the frame that a register still holds, and compares with 0 a value whose computation has set the flags.
 //! Removing that saves flash and time, so it is done in hot functions as well. [`rules`], [`conditions`] and
-//! [`addresses`] have the changes. They depend on what [`flow`] and [`local`] know, and on what [`needs`] knows of
-//! other functions. [`layout`] puts code behind the jumps to it. [`equal`] compares every function with the
-//! compiler's version, by running both.
+//! [`addresses`] contain the rules. They use the data flow of [`flow`] and [`local`], and the interprocedural facts of
+//! [`needs`]. [`layout`] is block layout: it puts code after the jumps to it. [`equal`] compares every function with
+//! the compiler's version, by running both.
 
 mod addresses;
 mod base;
@@ -122,7 +122,7 @@ impl Sweep<'_> {
         let calls = |label: &str| self.uses.get(label).copied().unwrap_or(0);
         let mut local = Local::of(flow);
         let mut edits = Edit::new();
-        // A new search may begin behind the last line that an edit changes.
+        // The next search begins after the last line that an edit changes.
         let mut busy = None;
         let mut waits = false;
         for (at, line) in flow.lines.iter().enumerate() {

@@ -1,8 +1,8 @@
-//! Which arguments functions read, and which results their callers read.
+//! Interprocedural liveness: which arguments functions read, and which results their callers read.
 //!
-//! The convention lets a function read 18 registers of arguments and return 8. Most functions read and return a few.
-//! An argument that the function does not read need not be computed, nor a result that no caller reads. Both are
-//! found together: each function is examined again until nothing changes.
+//! The calling convention has 18 registers for arguments and 8 for results. Most functions use only a few of them. An
+//! argument that the function does not read need not be computed, nor a result that no caller reads. Both are found by
+//! a fixpoint iteration over all functions.
 
 use std::collections::{HashMap, HashSet};
 
@@ -13,7 +13,7 @@ use super::flow::Flow;
 /// The name for all functions that are called through a pointer.
 pub const ANY: &str = "";
 
-/// The needs of functions, by name. A function that is not listed needs all that the convention allows.
+/// The needs of functions, by name. A function that is not listed uses all registers of the convention.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Needs {
     arguments: HashMap<String, Set>,

@@ -1,4 +1,4 @@
-//! Finds which pairs of registers hold the same address, and what is added to it.
+//! Finds pairs of registers that differ by a constant: one address plus an offset.
 
 use super::super::text::Insn;
 use super::effect::{Set, operands, pair, register};
@@ -46,7 +46,7 @@ impl Offsets {
         self.sums[usize::from(low / 2)]
     }
 
-    /// Forgets all.
+    /// Drops all facts.
     pub fn clear(&mut self) {
         (0..16).for_each(|at| self.renew(at));
     }

@@ -1,7 +1,7 @@
-//! Rules for code that can be removed or written differently.
+//! Peephole rules: code that can be removed or replaced.
 //!
-//! A rule looks at one line, with what is known there, and returns the lines to change. Each rule is valid on its
-//! own: only one is applied between two labels before everything is computed again.
+//! A rule examines one line with the facts that hold there, and returns the lines to change. Each rule is valid
+//! independently: only one is applied between two labels before all facts are computed again.
 
 use super::super::text::{Insn, Line};
 use super::effect::{self, Set, bit, operands, pair, register};
@@ -11,10 +11,10 @@ use super::local::Local;
 /// Lines of a [`Flow`], and their replacements; `None` removes a line.
 pub type Edit = Vec<(usize, Option<Insn>)>;
 
-/// A place in a function, and all that is known of it.
+/// A line of a function, and the facts that hold there.
 pub struct Place<'a> {
     pub flow: &'a Flow<'a>,
-    /// What is needed behind each line.
+    /// The registers and flags that are live after each line.
     pub needed: &'a [Set],
     pub known: &'a [Known],
     pub local: &'a Local,
@@ -67,7 +67,7 @@ impl Place<'_> {
         &self.known[self.at]
     }
 
-    /// Removes an instruction whose result nobody needs.
+    /// Dead code elimination: removes an instruction whose result is not read.
     fn dead(&self) -> Option<Edit> {
         let effect = &self.flow.effects[self.at];
         let is_dead = !effect.acts && effect.changes() & self.needed[self.at] == 0;
@@ -90,7 +90,7 @@ impl Place<'_> {
         (self.known().bits(register(first)?).zeros | mask == u8::MAX).then(|| self.gone())?
     }
 
-    /// Removes a copy that has been made already.
+    /// Removes a redundant copy.
     fn again(&self) -> Option<Edit> {
         let (first, second) = operands(self.insn);
         let (d, s) = (register(first)?, register(second)?);
@@ -104,8 +104,8 @@ impl Place<'_> {
 
     /// Removes an instruction that gives a register the value that it has.
     ///
-    /// The code that gave it the value may stand anywhere before, and may be needed only for this. So nothing else
-    /// may be removed in the same step.
+    /// The code that gave it the value may be anywhere before, and may be live only because of this instruction. So
+    /// nothing else may be removed in one step with it.
     pub fn constant(&self) -> Option<Edit> {
         let (first, second) = operands(self.insn);
         let d = register(first)?;
@@ -147,10 +147,10 @@ impl Place<'_> {
         Some(vec![(self.at, Some(copy)), (self.at + 1, None)])
     }
 
-    /// Removes a copy that has been made already, or reads the original, by what is true on every path that leads
-    /// here.
+    /// Copy propagation: removes a redundant copy, or reads the original, by the facts that hold on every path to this
+    /// line.
     ///
-    /// As with a [`constant`](Self::constant), nothing else may be removed in the same step.
+    /// As with a [`constant`](Self::constant), nothing else may be removed in one step with it.
     pub fn copy(&self) -> Option<Edit> {
         self.again().or_else(|| self.copies())
     }
@@ -248,7 +248,7 @@ impl Place<'_> {
         self.becomes(Insn::new(&format!("mov r{d}, r{held}")))
     }
 
-    /// Computes a value in the register where it is wanted.
+    /// Copy coalescing: computes a value directly in the register to which it is copied.
     fn origin(&self) -> Option<Edit> {
         let (first, second) = operands(self.insn);
         let (d, s) = (register(first)?, register(second)?);
@@ -287,7 +287,7 @@ impl Place<'_> {
         None
     }
 
-    /// Replaces a jump to a jump.
+    /// Jump threading: replaces a jump to a jump.
     fn thread(&self) -> Option<Edit> {
         if self.insn.op != "rjmp" {
             return None;

@@ -1,4 +1,4 @@
-//! A model of the CPU: runs a piece of a function and records what it does.
+//! A CPU model: runs a piece of a function and records its visible actions.
 
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -411,7 +411,7 @@ fn hash(what: &impl Hash) -> u8 {
     hasher.finish() as u8
 }
 
-/// Returns a value for a run: as often near the ends of the range as elsewhere, or 0 or 1, or one of two.
+/// Returns a test value for a run: as often near the ends of the range as elsewhere, or 0 or 1, or one of two.
 fn usual(random: u8, seed: u64) -> u8 {
     const ENDS: [u8; 8] = [0, 1, 2, 0x7F, 0x80, 0x81, 0xFE, 0xFF];
     match seed % 3 {

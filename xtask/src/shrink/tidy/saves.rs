@@ -1,19 +1,18 @@
-//! Lets functions not save registers that nobody needs when they return.
+//! Interprocedural register allocation: removes saves of callee-saved registers that are dead in all callers.
 //!
-//! By the convention a function returns 18 registers unchanged: it pushes each one that it uses and pops it at its
-//! end, which takes four cycles and four bytes. Most callers have no value in most of these registers, nor have their
-//! own callers. Which of them hold a value that is read after a call is found for all functions together. A function
-//! must return unchanged what is needed after some call of it, and what its callers must return unchanged themselves.
-//! Any other register need not be saved.
+//! By the convention a function preserves 18 registers: it pushes each one that it uses and pops it at its end, which
+//! takes four cycles and four bytes. Most callers have no value in most of these registers, nor have their own callers.
+//! Which of them are live after a call is found for all functions together. A function must preserve the registers that
+//! are live after some call of it, and those that its callers must preserve themselves. Any other register need not be
+//! saved.
 //!
-//! A function that is called from outside, from assembler from the source or from start-up code, follows the
-//! convention. A function that is called through a pointer returns unchanged what is needed after any call through a
-//! pointer.
+//! A function that is called from inline assembler or from start-up code follows the convention. A function that is
+//! called through a pointer preserves the registers that are live after any call through a pointer.
 //!
-//! Cold functions keep their saves: many of them have the same saves, and share them.
+//! Cold functions keep their saves, because many of them share equal prologues.
 //!
-//! [`check`] tests the result from the other side: it computes which registers a call has changed when it returns.
-//! None of them may be needed after the call.
+//! [`check`] tests the result independently: it computes which registers each call changes. None of them may be live
+//! after the call.
 
 use std::collections::{HashMap, HashSet};
 
@@ -115,7 +114,7 @@ fn is_end(line: &Line) -> bool {
     matches!(line, Line::Insn(insn) if insn.op == "ret" || insn.op == "jmp")
 }
 
-/// What each function must return unchanged.
+/// The registers that each function must preserve.
 struct Handed {
     back: HashMap<String, Set>,
     /// Functions that are called through a pointer.
@@ -240,7 +239,7 @@ impl Calls<'_> {
     }
 }
 
-/// Returns the registers that assembler from the source names in a function, with the other halves of their pairs.
+/// Returns the registers that inline assembler names in a function, with the other halves of their pairs.
 fn named(function: &Function) -> Set {
     let words = function.fixed().flat_map(|line| line.split(|c: char| !c.is_alphanumeric()));
     let registers = words.filter_map(effect::register);
