@@ -1,4 +1,4 @@
-//! Checks where a job that another program has sent must have brought the machine.
+//! Checks the final position after a job that another program has sent.
 
 use std::fmt::{self, Display, Formatter};
 use std::path::Path;

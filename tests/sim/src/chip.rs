@@ -1,7 +1,7 @@
 //! The chips that can be simulated, as data. All differences between them are here (data sheets: register summary,
 //! interrupt vectors).
 //!
-//! simavr supplies the instructions, the ports and the watchdog of each chip. A further chip is one more [`Chip`].
+//! simavr supplies the instructions, the ports and the watchdog of each chip. To add a chip, add a [`Chip`].
 
 use std::ffi::CStr;
 

@@ -1,4 +1,4 @@
-//! A debugger's end of the board: GDB's remote protocol over TCP, for `kerf-sim serve --gdb PORT`.
+//! A GDB stub: GDB's remote protocol over TCP, for `kerf-sim serve --gdb PORT`.
 //!
 //! While the debugger has the machine halted, simulated time stands still. Breakpoints are checked after each
 //! instruction. Addresses are those of avr-gdb: flash from 0, data from 0x800000.
@@ -38,12 +38,12 @@ impl Gdb {
         Ok(Gdb { listener, client, heard, breakpoints: HashSet::new(), halted: false })
     }
 
-    /// Returns the port that is listened at. If port 0 was asked for, it is the one that the system chose.
+    /// Returns the TCP port. If port 0 was requested, it is the one that the system has chosen.
     pub fn port(&self) -> Result<u16> {
         Ok(self.listener.local_addr()?.port())
     }
 
-    /// Takes a connection and handles what the debugger has asked for.
+    /// Accepts a connection and handles requests of the debugger.
     pub fn turn(&mut self, machine: &mut Machine) -> Result<()> {
         if let Ok((client, _)) = self.listener.accept() {
             client.set_nonblocking(true)?;
@@ -119,7 +119,7 @@ impl Gdb {
 
     fn write(&mut self, bytes: &[u8]) {
         if let Some(client) = &mut self.client {
-            // A write error is ignored. A debugger that has gone is noticed at the next read.
+            // A write error is ignored. A closed connection is detected at the next read.
             let _ = client.write_all(bytes);
         }
     }

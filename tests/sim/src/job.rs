@@ -1,4 +1,4 @@
-//! A job from boot to rest, watched all the way.
+//! Runs a job from boot to standstill, and checks it.
 
 mod setup;
 mod watch;
@@ -31,7 +31,7 @@ const PUT_AWAY_MS: u64 = 100;
 /// The lines of a job, each with its number in the file.
 pub type Lines = Vec<(usize, String)>;
 
-/// How to run a job.
+/// The options of a run.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// Speed of the serial line that the firmware is told to change to after boot, before the settings.
@@ -107,9 +107,9 @@ struct Run<'a> {
     progress_at: u64,
 }
 
-/// Waits until the settings are in the EEPROM, so that all jobs begin alike. While the settings are being written, a
-/// motor that is not the dominant one may step 0.7 us off its usual place, because each read of the EEPROM halts the
-/// CPU.
+/// Waits until the settings are in the EEPROM, so that all jobs begin under equal conditions. While the settings are
+/// being written, a motor that is not the dominant one may step 0.7 us off its usual time, because each read of the
+/// EEPROM halts the CPU.
 pub(crate) fn put_away(machine: &mut Machine, host: &mut Host) -> Result<()> {
     let mut writes = None;
     while writes.replace(machine.eeprom_writes()) != Some(machine.eeprom_writes()) {
@@ -118,7 +118,7 @@ pub(crate) fn put_away(machine: &mut Machine, host: &mut Host) -> Result<()> {
     Ok(())
 }
 
-/// Looks for pauses from now on. The machine must be at rest where `lines` begin.
+/// Detects pauses from now on. The machine must stand still at the start of `lines`.
 pub fn meter_pauses(machine: &mut Machine, lines: &Lines, setup: &Setup) {
     let ends = oracle::ends(lines.iter().map(|(n, l)| (*n, l.as_str())), setup);
     let at_pins = |steps: Vec<i64>| -> [i64; MOTORS] {
@@ -132,7 +132,7 @@ pub fn meter_pauses(machine: &mut Machine, lines: &Lines, setup: &Setup) {
     machine.recorder_mut().meter_pauses(scale);
 }
 
-/// Setting for programs that wait for an operator: the simulator has none, so the firmware goes on by itself.
+/// Setting for programs that wait for an operator: the simulator has none, so the firmware resumes by itself.
 const GO_ON: &str = "{psw:0}";
 
 /// Whether a line has a code that may wait for an operator.
@@ -163,8 +163,8 @@ pub(crate) fn ask_settings(
     Ok(())
 }
 
-/// Boots the machine, runs a job on it and says how it went. An error means that the job could not begin; the report
-/// has all that goes wrong later. `progress` gets the number of lines answered so far.
+/// Boots the machine, runs a job on it and returns the report. An error means that the job could not begin; later
+/// problems are in the report. `progress` gets the number of lines answered so far.
 pub fn run(
     machine: &mut Machine,
     lines: &Lines,

@@ -34,7 +34,7 @@ pub const USB: usize = 0;
 /// See [`USB`].
 pub const AUX: usize = 1;
 
-/// Why a machine cannot go on.
+/// A fault that ends the simulation.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Fault {
     /// An instruction that does not exist, or a jump out of the program.

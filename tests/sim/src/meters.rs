@@ -1,4 +1,4 @@
-//! What an observer outside the chip can measure: time in interrupts, time with interrupts off, stack depth.
+//! Measurements of the running firmware: time in interrupts, time with interrupts off, stack depth.
 
 use std::collections::BTreeMap;
 

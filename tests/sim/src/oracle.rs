@@ -1,4 +1,4 @@
-//! Where a job must end: a second reading of the same G-code.
+//! The oracle: computes the end position of a job by an independent G-code interpreter.
 //!
 //! It shares no code with the firmware, and reads only positions, not motion. All arithmetic is in whole numbers. A
 //! position is in units of 0.1 um (0.0001 degree), and each axis word is rounded to that. The steps follow from the
@@ -172,13 +172,13 @@ pub fn longest_dwell_ms<'a>(
 ) -> u64 {
     let mut reader = Reader::new(setup);
     for (_, text) in lines {
-        // Errors do not matter here.
+        // Errors are ignored here.
         let _ = reader.line(text);
     }
     reader.longest_dwell_ms
 }
 
-/// What a line does once, named by its G code times ten.
+/// Non-modal actions of a line, named by the G code times ten.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Once {
     Dwell,

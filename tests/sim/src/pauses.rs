@@ -1,11 +1,11 @@
-//! Finds pauses: places where the step stream runs dry in mid-motion and starts again at speed.
+//! Finds pauses: gaps in the step stream in mid-motion, after which steps start again at speed.
 //!
-//! The meter sees what a motor sees: the steps, and the times when the step timer stands still. A pause is an
-//! interval between two steps of the leading motor that is longer than [`RATIO`] times the interval before it and the
-//! one after it, while the path moves at [`SLOWEST`] or more on both sides. The leading motor is the one that steps
-//! most: during the interval no other motor steps twice. Two cases are no pauses. A motor that reverses stands still
-//! on purpose. So does a motor whose velocity falls before the interval and rises after it at rates that lead through
-//! zero within the interval.
+//! The meter reads only the steps, and the times when the step timer stands still. A pause is an interval between two
+//! steps of the leading motor that is longer than [`RATIO`] times the interval before it and the one after it, while
+//! the path moves at [`SLOWEST`] or more on both sides. The leading motor is the one that steps most: during the
+//! interval no other motor steps twice. Two cases are no pauses. A motor that reverses stands still on purpose. So does
+//! a motor whose velocity falls before the interval and rises after it at rates that give a standstill within the
+//! interval.
 
 use std::collections::VecDeque;
 
@@ -21,12 +21,12 @@ use side::Side;
 pub const RATIO: f64 = 2.5;
 /// Velocity of the path from which pauses count, mm/s.
 pub const SLOWEST: f64 = 8.0;
-/// The time on each side of a pause that is looked at, s.
+/// The time on each side of a pause that is evaluated, s.
 const SIGHT_S: f64 = 0.010;
-/// Number of steps kept: more than four motors make in the time that is looked at.
+/// Number of steps kept: more than four motors make in the time that is evaluated.
 const KEPT: usize = 1 << 14;
 
-/// What the meter needs to know of the machine and of its job.
+/// The parameters of the machine and of its job.
 #[derive(Clone, Default, Debug)]
 pub struct Scale {
     /// CPU cycles in a second.
@@ -37,7 +37,7 @@ pub struct Scale {
     pub ends: Vec<(usize, [i64; MOTORS])>,
 }
 
-/// What a motor moves.
+/// The axis of a motor.
 #[derive(Clone, Copy, Default, Debug)]
 pub struct Travel {
     /// Its axis, counted from 0.
@@ -61,7 +61,7 @@ pub struct Pause {
     pub line: Option<usize>,
 }
 
-/// What the meter has found.
+/// The findings of the meter.
 #[derive(Clone, Default, PartialEq, Debug)]
 pub struct Found {
     /// Intervals of the leading motor that are too long.
@@ -87,7 +87,7 @@ enum Kind {
     Stop,
 }
 
-/// Looks for pauses in steps as they come.
+/// Detects pauses in a stream of steps.
 pub struct Meter {
     scale: Scale,
     recent: VecDeque<Step>,
@@ -222,7 +222,7 @@ fn judge(scale: &Scale, recent: &VecDeque<Step>, candidate: Candidate, found: &m
     }
     let pause = Pause { cycle: from, cycles: to - from, velocity, line };
     let list = if kind == Kind::Stop { &mut found.starved } else { &mut found.pauses };
-    // Several motors may lead alike and show the same pause. It counts once.
+    // Several motors may lead equally and show one pause. It counts once.
     if list.last().is_none_or(|last| pause.cycle >= last.cycle + last.cycles) {
         list.push(pause);
     }
@@ -243,8 +243,7 @@ fn leads(recent: &VecDeque<Step>, motor: u8, begin: usize, end: usize) -> bool {
     others.iter().all(|n| *n <= 1) && before == after
 }
 
-/// Whether motion comes to rest within a gap of so many seconds and starts from rest again, as the velocities beside
-/// it show.
+/// Whether motion stops and starts again within a gap of so many seconds, as the velocities beside it show.
 fn planned(gap: f64, before: &Side, after: &Side) -> bool {
     /// Segments have constant velocity and take 2 ms; two of them hide how velocity changes.
     const SLICES_S: f64 = 0.004;

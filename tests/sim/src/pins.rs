@@ -12,7 +12,7 @@ const PCICR: u16 = 0x68;
 const EICRA: u16 = 0x69;
 const EICRB: u16 = 0x6A;
 
-/// Which pins have which interrupts. All else is alike on all chips.
+/// The interrupts of each pin. All else is equal on all chips.
 pub struct PinLayout {
     /// The vector of INT0; the others follow.
     pub external_vector: u8,

@@ -24,7 +24,7 @@ pub struct Response {
     pub raw: String,
     /// The value under `r`.
     pub body: Value,
-    /// Status code; 0 is good.
+    /// Status code; 0 means success.
     pub status: i64,
     /// Free line slots.
     pub free: i64,
@@ -33,7 +33,7 @@ pub struct Response {
 /// The greetings in grbl's dialect and in that of printing hosts.
 const OTHER_GREETINGS: [&str; 2] = ["Grbl 1.1h ['$' for help]", "start"];
 
-/// Status of a line that asked for nothing, such as a deleted block.
+/// Status of a line without effect, such as a deleted block.
 pub const STATUS_NOOP: i64 = 3;
 
 impl Response {

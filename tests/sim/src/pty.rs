@@ -101,7 +101,7 @@ impl Pty {
         Ok(())
     }
 
-    /// Forgets what the other side has not read.
+    /// Discards bytes that the other side has not read.
     pub fn discard(&mut self) {
         self.unwritten.clear();
     }

@@ -1,4 +1,4 @@
-//! Records what the step and direction pins do.
+//! Records the step and direction pins.
 
 use std::ffi::c_void;
 use std::ptr::NonNull;
@@ -32,7 +32,7 @@ pub struct Sums {
     pub in_interrupts: u64,
 }
 
-/// What is known of one motor. Times are in cycles.
+/// The record of one motor. Times are in cycles.
 #[derive(Clone, Debug)]
 pub struct Motor {
     /// Steps up minus steps down; a low direction pin is up.
@@ -153,7 +153,7 @@ impl Recorder {
         self.log().iter().filter(|s| s.motor == motor).map(|s| s.cycle).collect()
     }
 
-    /// Looks for pauses from now on. The motors must be at rest.
+    /// Detects pauses from now on. The motors must stand still.
     pub fn meter_pauses(&mut self, scale: Scale) {
         self.pauses = Some(Meter::new(scale));
     }
@@ -185,7 +185,7 @@ impl Recorder {
         std::mem::replace(&mut self.trace, trace)
     }
 
-    /// Forgets everything except the levels of the pins.
+    /// Clears everything except the levels of the pins.
     pub fn clear(&mut self) {
         for m in &mut self.motors {
             let Motor { active_low, step_high, dir_high, .. } = *m;
@@ -260,7 +260,7 @@ pub(crate) struct Probe {
     what: What,
 }
 
-/// What an output is for.
+/// The function of an output.
 #[derive(Clone, Copy)]
 enum What {
     Step(usize),

@@ -1,4 +1,4 @@
-//! How a job went, as data.
+//! The report of a job, as data.
 
 use std::fmt::{self, Display, Formatter};
 
@@ -25,7 +25,7 @@ pub struct Rejected {
     pub status: i64,
 }
 
-/// What the runner of the job knows when the job ends.
+/// The results of the job's runner.
 pub struct Measured {
     /// Lines in the job.
     pub lines: usize,
@@ -41,7 +41,7 @@ pub struct Measured {
     pub late_segments: Option<u64>,
     /// Lines that came from the firmware and should not have come.
     pub strays: Vec<String>,
-    /// Time from the first line to rest, s.
+    /// Time from the first line to the standstill, s.
     pub seconds_to_idle: f64,
     /// Time from the first line to the last answer, s.
     pub seconds_to_answer: f64,
@@ -126,15 +126,15 @@ pub struct VectorReport {
     pub latency_max: u64,
 }
 
-/// How a job went.
+/// The report of a job.
 #[derive(Clone, Serialize, Debug)]
 pub struct Report {
-    /// Whether everything is as it should be.
+    /// Whether there is no problem.
     pub ok: bool,
-    /// What is wrong.
+    /// The problems found.
     pub problems: Vec<String>,
-    /// The line from which on the oracle cannot tell where the job should end, and why. The ends are then not
-    /// checked; all else is.
+    /// The line from which on the oracle cannot compute the end of the job, and why. The ends are then not checked; all
+    /// else is.
     pub unchecked: Option<String>,
     /// The board.
     pub board: &'static str,
@@ -148,7 +148,7 @@ pub struct Report {
     pub rejected: Vec<Rejected>,
     /// From the first step to the last.
     pub seconds_moving: f64,
-    /// From the first line to rest.
+    /// From the first line to the standstill.
     pub seconds_to_idle: f64,
     /// From the first line to the last answer.
     pub seconds_to_answer: f64,
@@ -192,7 +192,7 @@ pub struct Report {
 }
 
 impl Report {
-    /// Puts together what the runner of the job and the meters know.
+    /// Combines the results of the job's runner and of the meters.
     pub fn new(machine: &Machine, measured: Measured) -> Self {
         let expected = measured.expected.as_ref().ok();
         let recorder = machine.recorder();
@@ -308,7 +308,7 @@ impl Report {
     }
 }
 
-/// Says how many pauses there are and which is the longest; `None` if there are none.
+/// Describes the number of pauses and the longest one; `None` if there are none.
 fn worst(what: &str, pauses: &[PauseReport]) -> Option<String> {
     let longest = pauses.iter().max_by(|a, b| a.ms.total_cmp(&b.ms))?;
     Some(format!("{} {what}, the longest {longest}", pauses.len()))

@@ -1,4 +1,4 @@
-//! What a sender needs of a board, simulated or emulated.
+//! The interface of a board, simulated or emulated, to a sender.
 
 use anyhow::Result;
 

@@ -24,8 +24,8 @@ use crate::run::board;
 const TICK: Duration = Duration::from_millis(2);
 /// AVR time between two checks at full speed.
 const SLICE_MS: u64 = 2;
-/// At full speed, how long a sender is waited for after a slice in which nothing has happened. The wait keeps a
-/// machine at rest from using up the computer, while its time still passes ten times as fast as real time.
+/// At full speed, the wait for a sender after a slice in which nothing has happened. It keeps an idle machine from
+/// using all of the computer's CPU time, while simulated time still passes ten times as fast as real time.
 const REST: Duration = Duration::from_micros(100);
 /// Cycles that are added to each slice until the firmware listens. If slices took whole milliseconds, each of them
 /// might end within the tick's interrupt, in which the firmware does not listen.
@@ -33,7 +33,7 @@ const STRIDE: u64 = 1_009;
 /// Time from opening the port to the reset, as on a board that DTR resets. Senders flush their input during this
 /// time.
 const RESET_DELAY: Duration = Duration::from_millis(100);
-/// Most lag behind real time. A machine that is further behind does not try to catch up.
+/// Greatest lag behind real time. A machine that is further behind does not catch up.
 const MAX_LAG: Duration = Duration::from_millis(200);
 
 /// The message when a sender opens the port.
@@ -103,7 +103,7 @@ fn around(board: &Board) -> Build {
     Build { plate: Some(PLATE_MM), ..Build::of(board) }
 }
 
-/// Stops when the standard input ends. Then the program that started this one wants the verdict, or has ended.
+/// Stops when the standard input ends. Then the program that started this one waits for the result, or has ended.
 fn stop_with_input(stop: Arc<AtomicBool>) {
     std::thread::spawn(move || {
         let _ = std::io::copy(&mut std::io::stdin(), &mut std::io::sink());
@@ -243,7 +243,7 @@ impl Server {
         }
     }
 
-    /// Prints where the last sender's job has brought the motors. Returns whether that is exact.
+    /// Prints the final positions of the last sender's job. Returns whether they are exact.
     fn has_arrived(&mut self, job: &Path) -> Result<bool> {
         let mut twin = self.fresh()?;
         twin.set_eeprom(self.machine.eeprom());

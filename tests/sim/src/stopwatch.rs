@@ -1,5 +1,5 @@
-//! Measures what functions of the firmware cost, without the interrupts nested in them. Functions are found by their
-//! names.
+//! Measures the CPU time of functions of the firmware, without the interrupts nested in them. Functions are found by
+//! name.
 //!
 //! The image needs no preparation, but the function must not be inlined.
 
@@ -9,11 +9,11 @@ use crate::meters::Meters;
 /// Cycles of something that has happened several times.
 #[derive(Clone, Copy, Default, PartialEq, Eq, Debug)]
 pub struct Cost {
-    /// How often it happened.
+    /// Number of occurrences.
     pub count: u64,
     /// Sum of all cycles.
     pub sum: u64,
-    /// The most cycles of one time.
+    /// Most cycles of one occurrence.
     pub max: u64,
 }
 

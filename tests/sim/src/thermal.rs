@@ -1,8 +1,8 @@
 //! The heaters of a printer around the chip. The chip's pins heat them, and its converter reads their sensors.
 //!
-//! [`Plant`] models where the heat goes. Every [`EVERY_MS`] the levels of the pins are read, the temperatures
-//! computed, and the voltages of the sensors, with noise, put at the converter's channels. A sensor can be broken
-//! while the machine runs.
+//! [`Plant`] is the thermal model. Every [`EVERY_MS`] the levels of the pins are read, the temperatures computed, and
+//! the voltages of the sensors, with noise, put at the converter's channels. A sensor can be broken while the machine
+//! runs.
 
 use kerf::boards::Heaters;
 use kerf::heat::sensor::{Kind, share};
@@ -33,7 +33,7 @@ pub const BED: usize = 1;
 pub struct Sample {
     /// The cycle.
     pub cycle: u64,
-    /// The temperatures that the sensors of the hot end and the bed feel.
+    /// The temperatures of the sensors of the hot end and the bed.
     pub degrees: [f64; 2],
 }
 
@@ -74,7 +74,7 @@ impl Thermal {
         &mut self.plants[heater]
     }
 
-    /// Sets the voltage on the wire of a sensor from now on, mV, whatever the sensor feels; `None` mends the wire.
+    /// Forces the voltage on the wire of a sensor from now on, mV; `None` restores the sensor.
     pub fn break_wire(&mut self, heater: usize, millivolts: Option<u32>) {
         self.broken[heater] = millivolts;
     }

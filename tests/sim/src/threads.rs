@@ -1,9 +1,9 @@
-//! Checks whether the threads of a job are threads: where Z is at the index pulses of the spindle, turn by turn.
+//! Checks the threads of a job: the position of Z at each index pulse of the spindle.
 //!
 //! The leads are read from the job's own lines (G33 and G32: K, G76: P), and everything else from the pins. A turn in
 //! which Z moves by a lead, and X not at all, is a turn of a thread. The position of Z at the index pulse, modulo the
-//! lead, is the *phase*. It must be alike in all turns of all passes. A compound slide (Q of G76) shifts a pass by
-//! its depth, which is read from X. Lengths are in millimetres; a job in inches is not checked.
+//! lead, is the *phase*. It must be equal in all turns of all passes. A compound slide (Q of G76) shifts a pass by its
+//! depth, which is read from X. Lengths are in millimetres; a job in inches is not checked.
 
 use serde::Serialize;
 
@@ -15,10 +15,10 @@ use crate::plot::{Position, SAMPLE_S, positions};
 const X: usize = 0;
 const Z: usize = 2;
 
-/// Share of the lead by which the distance in a turn may differ from it. This is far more than a phase may be off.
+/// Share of the lead by which the distance in a turn may differ from it, far more than the error allowed for a phase.
 const ALIKE: f64 = 0.02;
 
-/// What a job asks for.
+/// The thread that a line commands.
 #[derive(Clone, Copy, Debug)]
 struct Asked {
     lead: f64,

@@ -1,4 +1,4 @@
-//! What happens beyond the limit: one motor is asked for twice the rate that it aims at.
+//! Behaviour beyond the limit: one motor is commanded at twice the target rate.
 
 use anyhow::Result;
 use serde_json::Value;
@@ -9,7 +9,7 @@ use super::workload::{Bed, How, PER_MM};
 use crate::host::{Host, LINES_IN_FLIGHT};
 use crate::machine::Machine;
 
-/// The step rate that is asked for, steps/s.
+/// The commanded step rate, steps/s.
 const ASKED: f64 = 200_000.0;
 /// Time allowed for the move, s: enough for a rate well below [`ASKED`].
 const PATIENCE_S: f64 = 120.0;

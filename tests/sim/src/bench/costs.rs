@@ -1,4 +1,4 @@
-//! What the firmware's parts cost in CPU time.
+//! CPU time of parts of the firmware.
 
 use anyhow::{Result, ensure};
 
@@ -14,7 +14,7 @@ use crate::stopwatch::{Cost, Stopwatch};
 const EXEC_VECTOR: u8 = 52;
 /// Called once for each segment that exec has prepared.
 const SEGMENT_READY: &str = "kerf::hal::imp::stepper::go";
-/// Queues a block and plans the queue again.
+/// Queues a block, and updates the speed constraints.
 const QUEUE_PUSH: &str = "<kerf::motion::queue::BlockQueue>::push_line";
 
 /// The short moves: their number, their length (mm) and their feed (mm/min). At that feed motion uses up 4,000 moves
@@ -92,10 +92,10 @@ fn jerk_costs(bed: &Bed, jerks: &[f64], jobs: &[String]) -> Result<Vec<Cost>> {
     .collect()
 }
 
-/// Cycles of queuing a block with all replanning: the worst case.
+/// Cycles of queuing a block, at worst: with the update of the speed constraints.
 pub fn replan(bed: &Bed) -> Result<Figure> {
     let (curve, _) = spiral_on_fast_line(bed, vec![bed.calls(QUEUE_PUSH)?])?;
-    // With a low jerk limit the whole queue is needed to stop, so that each new block changes every other block.
+    // With a low jerk limit the whole queue is needed to stop, the worst case of a firmware that replans its queue.
     let how = How { baud: FAST_BAUD, jerk: Some(LOW_JERK), ..How::default() };
     let (line, _) =
         bed.try_run(&straight(1_000, 0.1, 6_000.0), how, vec![bed.calls(QUEUE_PUSH)?])?;

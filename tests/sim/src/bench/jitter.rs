@@ -1,4 +1,4 @@
-//! How evenly the steps come at cruise, when X makes 20,000 steps/s and Y 7,400 in one move.
+//! Step jitter at cruise, when X makes 20,000 steps/s and Y 7,400 in one move.
 
 use std::fmt::Write;
 

@@ -1,4 +1,4 @@
-//! How near motion comes to its limits: lone moves, holds, and the acceleration of axes on arcs.
+//! Motion compared with its limits: single moves, holds, and the acceleration of axes on arcs.
 
 use anyhow::{Context, Result, ensure};
 
@@ -44,7 +44,7 @@ pub fn lone_hundred(bed: &Bed) -> Result<Figure> {
     lone(bed, 100.0)
 }
 
-/// Takes the time of the move from the step timer, which runs from rest to rest.
+/// Takes the time of the move from the step timer, which runs from standstill to standstill.
 fn lone(bed: &Bed, mm: f64) -> Result<Figure> {
     let how = How { log: true, jerk: Some(USUAL_JERK), ..How::default() };
     let (machine, _) = bed.run(&format!("G1 X{mm} F{FEED}\n"), how)?;
@@ -63,12 +63,12 @@ pub fn hold_begins(bed: &Bed) -> Result<Figure> {
     Ok(Figure { value, note })
 }
 
-/// Time from the first step of a slower segment to rest, over the shortest time within the limits; the longest of all
-/// holds.
+/// Time from the first step of a slower segment to the standstill, over the shortest time within the limits; the
+/// longest of all holds.
 pub fn hold_stops(bed: &Bed) -> Result<Figure> {
     let all = holds(bed)?;
     let seconds = all.iter().map(|h| h.stops).fold(0.0, f64::max);
-    // Two ramps lead from rest to `HELD` and back to rest without a cruise.
+    // Two ramps: from a standstill to `HELD` and back to a standstill without a cruise.
     let jerk = USUAL_JERK * PER_JERK;
     let ramp = HELD / ACCELERATION + ACCELERATION / jerk;
     Ok(Figure { value: seconds / ramp, note: format!("{:.1} ms", seconds * 1e3) })

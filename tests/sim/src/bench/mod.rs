@@ -1,8 +1,8 @@
-//! What the firmware achieves, as one table beside other firmwares' figures.
+//! The benchmark: figures of Kerf in one table with those of other firmwares.
 //!
-//! [`ROWS`] says what is measured, what others reach, what Kerf aims at and what Kerf must not fall below. [`Bed`] is
-//! the firmware on its board, with settings like those of the other firmwares. `kerf-sim bench` prints the table, and
-//! the tests hold every row to its floor. All figures are counted in cycles and exactly repeatable.
+//! [`ROWS`] lists the measurements, with the figures of others, Kerf's target, and Kerf's floor. [`Bed`] is the
+//! firmware on its board, with settings like those of the other firmwares. `kerf-sim bench` prints the table, and the
+//! tests hold every row to its floor. All figures are counted in cycles and exactly repeatable.
 
 mod beyond;
 mod costs;
@@ -74,7 +74,7 @@ pub struct Row<B = Bed> {
     pub decimals: usize,
     /// Which direction is better.
     pub better: Better,
-    /// What grbl-Mega, TinyG and Teacup reach.
+    /// The figures of grbl-Mega, TinyG and Teacup.
     pub peers: [&'static str; 3],
     /// The value that Kerf aims at.
     pub target: Option<f64>,

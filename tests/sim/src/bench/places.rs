@@ -1,4 +1,4 @@
-//! Where a motor was at any time, computed from its steps.
+//! The position of a motor over time, computed from its steps.
 
 use crate::machine::Machine;
 

@@ -16,7 +16,7 @@ const COUNTED_S: f64 = 0.3;
 const FIRST: f64 = 20_000.0;
 const UP: f64 = 1.15;
 const LAST: f64 = 300_000.0;
-/// How often the gap between a rate that is held and one that is not is halved.
+/// Number of bisections between a rate that is held and one that is not.
 const REFINEMENTS: u32 = 5;
 
 /// One motor.

@@ -1,4 +1,4 @@
-//! The rows of the table: what others reach, what Kerf aims at, and the floor of each row.
+//! The rows of the table: figures of other firmwares, target and floor of each row.
 //!
 //! The figures of the others were measured on the same simulated CPU. They were built from their published sources,
 //! with the same settings and job geometry: 80 steps/mm (Z 400), 500 mm/s2, junction deviation 0.01 mm, rate limits
@@ -108,7 +108,8 @@ pub const ROWS: [Row; 49] = [
         better: Lower,
         peers: ["52", "-", "63"],
         target: Some(13.0),
-        // A tick, plus the longest time with interrupts off, which now and then meets the tick behind a new segment.
+        // A tick, plus the longest time with interrupts off, which sometimes coincides with the tick after a new
+        // segment.
         floor: Some(13.0),
         measure: jitter::minor,
     },
@@ -377,7 +378,7 @@ pub const ROWS: [Row; 49] = [
         better: Lower,
         peers: NONE,
         target: Some(24_000.0),
-        // The worst case is a scan that tries three velocities, and the layout of a ramp.
+        // The worst case is a scan of three constraints, and the layout of a ramp.
         floor: Some(24_000.0),
         measure: costs::segment_jerk_worst,
     },

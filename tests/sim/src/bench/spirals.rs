@@ -158,8 +158,8 @@ pub fn curve_lines(bed: &Bed) -> Result<Figure> {
     Ok(lines_per_second(&report).into())
 }
 
-/// How far the queue reaches over moves of 0.1 mm, mm. The moves that are answered while a slow move before them runs
-/// are counted.
+/// Look-ahead of the queue in moves of 0.1 mm, mm: counts the moves that are answered while a slow move before them
+/// runs.
 pub fn look_ahead(bed: &Bed) -> Result<Figure> {
     let mut machine = bed.machine()?;
     let mut host = Host::new(LINES_IN_FLIGHT);

@@ -68,7 +68,7 @@ pub struct Bed {
     has_acceleration: bool,
 }
 
-/// What differs from one job to another.
+/// Parameters of a job.
 #[derive(Clone, Copy)]
 pub struct How {
     /// Speed of the serial line, baud.

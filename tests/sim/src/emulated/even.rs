@@ -1,7 +1,7 @@
-//! How evenly motors step at a million steps a second.
+//! Step jitter at a million steps a second.
 
-/// Returns how a motor steps: its rate in steps/s, the longest gap between steps minus the shortest in cycles, and
-/// the largest deviation of a step from an even sequence, us.
+/// Returns the rate of a motor in steps/s, its peak-to-peak jitter (the longest interval between steps less the
+/// shortest) in cycles, and the largest deviation of a step from an even sequence, us.
 pub fn evenness(times: &[u64]) -> (f64, u64, f64) {
     let gaps = || times.windows(2).map(|pair| pair[1] - pair[0]);
     let spread = gaps().max().unwrap_or(0) - gaps().min().unwrap_or(0);

@@ -1,4 +1,4 @@
-//! A job on an emulated board, from boot to rest, held against the G-code.
+//! A job on an emulated board, from boot to standstill, compared with the G-code.
 
 use std::fmt::{self, Display, Formatter};
 
@@ -11,9 +11,9 @@ use crate::oracle::{self, MotorSetup, Outcome, Unclear};
 use crate::protocol::STATUS_NOOP;
 use crate::runs::Runs;
 
-/// How a job went.
+/// The result of a job.
 pub struct Report {
-    /// What is wrong.
+    /// The problems found.
     pub problems: Vec<String>,
     /// Segments that came late, as the firmware itself counts them.
     pub late: u64,
@@ -31,7 +31,7 @@ struct Motor {
     highest_hz: Option<f64>,
 }
 
-/// Boots the board, sends settings and a job, and says how it went. `progress` gets the number of lines answered so
+/// Boots the board, sends settings and a job, and returns the result. `progress` gets the number of lines answered so
 /// far. USB has no line speed to change, and no waveforms are written.
 pub fn run(
     board: &mut Emulated,

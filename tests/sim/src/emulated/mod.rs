@@ -1,8 +1,8 @@
 //! A board whose chip is emulated by a program in JavaScript: the RP2040, by rp2040js with additions
 //! (`tests/rp2040/emulator`).
 //!
-//! The program answers each request, a line of JSON, with a line of JSON: see its `bridge.mjs`. What is sent and
-//! driven here is collected, and goes out with the next request to run.
+//! The program answers each request, a line of JSON, with a line of JSON: see its `bridge.mjs`. Bytes sent and pins
+//! driven here are collected, and passed with the next request to run.
 
 pub mod even;
 pub mod job;

@@ -1,4 +1,4 @@
-//! The processes that boards are emulated in.
+//! The processes of emulated boards.
 //!
 //! Node compiles the emulator while it runs, so the first second of a board takes three times as long as later
 //! seconds. Therefore a process is kept when its board is no longer wanted, and serves the next board.

@@ -1,4 +1,4 @@
-//! Watches a job: whether the firmware is alive, whether it makes progress, and whether the machine is at rest.
+//! Supervises a job: whether the firmware is alive, makes progress, and has stopped the machine.
 
 use anyhow::{Result, bail};
 
@@ -9,7 +9,7 @@ use crate::runs::Runs;
 /// Number of the lines that only ask for the machine state.
 pub const POLL: usize = usize::MAX - 1;
 
-/// Silence after which the firmware is asked for a sign of life.
+/// Silence after which the firmware is queried.
 const SILENCE_MS: u64 = 2_000;
 /// Silence after which the firmware is considered dead.
 const DEAD_MS: u64 = 30_000;

@@ -1,4 +1,4 @@
-//! How a machine is built: plain data, with defaults for each board.
+//! The description of a machine: plain data, with defaults for each board.
 
 use kerf::boards::{Board, MOTORS, Pin};
 

@@ -1,4 +1,4 @@
-//! The sensors of a spindle: they turn its angle into edges on pins, and can be made to fail.
+//! The sensors of a spindle: edges on pins from its angle, with fault injection.
 //!
 //! Each sensor pulls its pin low while a mark passes it. Marks are evenly spaced, and the spindle may turn either
 //! way.

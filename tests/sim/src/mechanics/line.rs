@@ -1,4 +1,4 @@
-//! A wire from contacts to a pin, which can be made to fail.
+//! A wire from contacts to a pin, with fault injection.
 
 use std::collections::VecDeque;
 

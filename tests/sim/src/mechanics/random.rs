@@ -1,4 +1,4 @@
-//! Pseudo-random numbers, the same in each run.
+//! Deterministic pseudo-random numbers.
 
 /// A generator (splitmix64).
 pub struct Random(u64);

@@ -1,4 +1,4 @@
-//! What the steps tell about motion on one side of a gap.
+//! Motion on one side of a gap, evaluated from steps.
 
 use kerf::boards::MOTORS;
 
@@ -18,7 +18,7 @@ const FAR_S: f64 = 0.002;
 pub struct Side {
     /// Velocity of the path, mm/s.
     pub velocity: f64,
-    /// Time towards the gap after which the velocity would be zero if it went on changing at its present rate, s.
+    /// Time towards the gap after which the velocity would be zero at its present rate of change, s.
     pub rest: f64,
 }
 

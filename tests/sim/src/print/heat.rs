@@ -1,4 +1,4 @@
-//! How hot a print was, and how well its temperatures were held.
+//! Temperatures of a print: peaks, and how well they were held.
 
 use std::fmt::{self, Display, Formatter};
 
@@ -12,20 +12,20 @@ use crate::thermal::{BED, HOT_END};
 pub struct Heat {
     /// The name of the heater.
     pub heater: &'static str,
-    /// The highest temperature that was asked for, degrees.
+    /// The highest target, degrees.
     pub asked: f64,
-    /// The highest temperature that its sensor has felt.
+    /// The highest temperature of its sensor.
     pub peak: f64,
     /// Time from the first line until the sensor was within a degree of `asked`, s; `None` if it never was.
     pub seconds_to_reach: Option<f64>,
     /// The lowest and the highest temperature that its sensor felt, from the first step behind homing until the
     /// heater was switched off.
     pub held: Option<(f64, f64)>,
-    /// The temperature that its sensor feels at the end.
+    /// The temperature of its sensor at the end.
     pub last: f64,
 }
 
-/// What is measured of one heater.
+/// The measurements of one heater.
 #[derive(Clone, Copy, Default)]
 struct One {
     asked: f64,
@@ -39,11 +39,11 @@ pub struct Meter {
     heaters: [One; 2],
 }
 
-/// A temperature that is this near to the one asked for counts as reached, degrees.
+/// A temperature that is this near to the target counts as reached, degrees.
 const NEAR: f64 = 1.0;
 
 impl Meter {
-    /// Takes note that a line, sent at `cycle`, asks for so many degrees.
+    /// Records that a line, sent at `cycle`, sets a target.
     pub fn asked(&mut self, heater: usize, degrees: i64, cycle: u64) {
         let one = &mut self.heaters[heater];
         one.asked = one.asked.max(degrees as f64);

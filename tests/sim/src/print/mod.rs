@@ -1,11 +1,11 @@
-//! A print from boot to rest: a file of a slicer, sent as printing hosts send it, to a printer that heats.
+//! Runs a print from boot to standstill: a file of a slicer, sent as printing hosts send it, to a printer with heaters.
 //!
 //! | module | contents |
 //! |---|---|
-//! | [`reading`] | where each line must end, and what it asks of heaters |
-//! | [`path`] | whether every step is on the way from line to line |
+//! | [`reading`] | the end of each line, and its heater commands |
+//! | [`path`] | whether every step is on the path from line to line |
 //! | [`session`] | a printing host: line numbers, checksums, one line in flight |
-//! | [`heat`] | how hot the print was, and how well its temperatures were held |
+//! | [`heat`] | the temperatures of the print, and how well they were held |
 //!
 //! Settings are asked of a twin, a second machine, in TinyG's dialect, because the port that prints speaks the
 //! dialect of printing hosts from its first line on. Steps count from the last G28.
@@ -57,7 +57,8 @@ fn twin(machine: &Machine, lines: &Lines, settings: &[String]) -> Result<(Machin
     let careful = machine.body["mch"].as_i64() == Some(0);
     let all: Vec<_> =
         careful.then(|| PRINTER.to_owned()).into_iter().chain(settings.iter().cloned()).collect();
-    // Lines such as M0 may wait for an operator in a print, too: this also sends the setting that makes them go on.
+    // Lines such as M0 may wait for an operator in a print, too: this also sends the setting that makes the firmware
+    // resume.
     job::ask_settings(&mut twin, &mut host, lines, &all)?;
     job::put_away(&mut twin, &mut host)?;
     let setup = job::read_setup(&mut twin, &mut host)?;
@@ -77,8 +78,8 @@ struct Run<'a> {
     progress_at: u64,
 }
 
-/// Boots the machine, prints and says how it went. An error means that the print could not begin; the report has all
-/// that goes wrong later. `progress` gets the number of lines answered so far.
+/// Boots the machine, prints and returns the report. An error means that the print could not begin; later problems are
+/// in the report. `progress` gets the number of lines answered so far.
 pub fn run(
     machine: &mut Machine,
     lines: &Lines,

@@ -1,4 +1,4 @@
-//! Checks whether every step of a print is on the path from one line's end to the next.
+//! Checks that every step of a print is on the path from one line's end to the next.
 //!
 //! The steps are followed in the order in which the pins made them. After each step the motors must be on a line:
 //! each motor within [`MOST`] steps of its ideal place on the stretch between two ends of lines. Lines must follow in
@@ -14,7 +14,7 @@ use crate::recorder::Step;
 /// How far a motor may be off a line, steps. The ends of lines are rounded to steps here, by half a step at most.
 /// Motors that do not lead are up to two steps behind or ahead where short lines join.
 const MOST: f64 = 2.5;
-/// Number of lines within which the motors' place is looked for: a line shorter than a step may be left out.
+/// Number of lines within which the motors' position is searched: a line shorter than a step may be left out.
 const AHEAD: usize = 12;
 
 /// Positions of the motors, in steps.

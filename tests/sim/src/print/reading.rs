@@ -1,4 +1,4 @@
-//! Where each line of a print must end: a second reading of the file, independent of the firmware.
+//! The oracle of prints: computes the end of each line, independently of the firmware.
 //!
 //! It shares no code with the firmware. A position is in units of 0.1 um, and each word is rounded to that. E is the
 //! fourth axis.
@@ -25,14 +25,14 @@ pub struct Corner {
     pub homes: bool,
 }
 
-/// What a line asks of a heater.
+/// The heater command of a line.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Asked {
     /// Nothing.
     Nothing,
-    /// So many degrees of the hot end.
+    /// Target of the hot end, degrees.
     HotEnd(i64),
-    /// So many degrees of the bed.
+    /// Target of the bed, degrees.
     Bed(i64),
 }
 
@@ -69,7 +69,7 @@ pub fn is_printing(line: &str) -> bool {
     }
 }
 
-/// Returns what a line asks of a heater.
+/// Returns the heater command of a line.
 pub fn asked(line: &str) -> Asked {
     let Some((code, words)) = parts(line) else { return Asked::Nothing };
     let degrees = words.iter().find(|(letter, _)| matches!(letter, 'S' | 'R'));
@@ -142,7 +142,7 @@ impl Reader {
         }
     }
 
-    /// G92: gives the position these coordinates; without words all are 0.
+    /// G92: sets the coordinates of the position; without words all are 0.
     fn call(&mut self, words: &[(char, Decimal)]) {
         let mut values = self.axes(words);
         if values == [None; LETTERS.len()] {

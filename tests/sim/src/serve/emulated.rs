@@ -138,7 +138,7 @@ impl Server {
         target.min(most)
     }
 
-    /// Prints where the last sender's job has brought the motors. Returns whether that is exact.
+    /// Prints the final positions of the last sender's job. Returns whether they are exact.
     fn has_arrived(&mut self, job: &Path) -> Result<bool> {
         let arrival = Arrival::of_emulated(&mut self.board, &self.opened, job)?;
         print!("{arrival}");
