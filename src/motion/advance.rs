@@ -261,7 +261,7 @@ impl Advance {
         let gain = accel * time;
         let (slow, fast) = (speed - gain, speed + gain);
         let next = if less(fast * time, far) {
-            // From this speed the lead has to lose at most `gain` in each segment behind this one.
+            // The speed from which the lead can stop at its goal by losing at most `gain` in each later segment.
             lesser(sqrt(gain * gain + 2.0 * accel * far) - gain, fast)
         } else {
             ratio(far, time)

@@ -102,22 +102,23 @@ pub enum QueuedAction {
     /// M3 to M9, S, under G96: sets the outputs. From here on the speed of the spindle follows X by this surface
     /// speed; [`Surface::NONE`] ends that.
     Surface(Outputs, Surface),
-    /// G33: from here on lines follow the spindle. Done at rest.
+    /// G33: from here on lines follow the spindle. Done at a standstill.
     Thread(Pass),
     /// From here on lines do not follow the spindle any more.
     EndThread,
-    /// G33.1, at rest: the spindle has turned round, and lines follow it back. It is to turn round again at the same
-    /// distance before the end of the line ([`Pass::turn_at`]).
+    /// G33.1, at a standstill: the spindle has reversed, and lines follow it back. It is to reverse again at the
+    /// distance [`Pass::turn_at`] before the end of the line.
     Return,
-    /// In the midst of a pass of G33 or G76: sets the lead of the lines from here on, mm a turn. The machine goes on.
+    /// Within a pass of G33 or G76: sets the lead of the lines from here on, mm a turn. Does not stop the machine.
     Lead(f32),
-    /// G95, or its end: sets whether feeds go by the measured speed of the spindle from here on. The machine goes on.
+    /// G95, or its end: sets whether feeds are scaled to the measured speed of the spindle from here on. Does not stop
+    /// the machine.
     PerTurn(bool),
-    /// M48 to M51. The machine goes on.
+    /// M48 to M51. Does not stop the machine.
     Override(Change),
-    /// M104 to M190: sets heaters and the fan. The machine goes on.
+    /// M104 to M190: sets heaters and the fan. Does not stop the machine.
     Heat(Heat),
-    /// M900: sets the extruder's lead. The machine goes on.
+    /// M900: sets the extruder's lead. Does not stop the machine.
     Advance(Lead),
     /// M0, M1, M60.
     ProgramStop,
@@ -128,13 +129,13 @@ pub enum QueuedAction {
 /// A pass in step with the spindle.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Pass {
-    /// How far the first line of the pass goes in a turn, along its path, mm.
+    /// The lead of the first line of the pass along its path, mm a turn.
     pub lead: f32,
-    /// How far the axes may be off, once they have been in step, mm; 0 for no limit.
+    /// Limit of the error of the axes, once they have been in step, mm; 0 for no limit.
     pub limit: Short,
     /// How the pass is left before its end.
     pub retract: Retract,
-    /// G33.1: how many mm before the end of the line the spindle is to turn round; 0 for a pass that does not return.
+    /// G33.1: how many mm before the end of the line the spindle is to reverse; 0 for a pass that does not return.
     pub turn_at: f32,
 }
 

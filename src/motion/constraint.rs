@@ -1,4 +1,4 @@
-//! What it takes to slow down under a jerk limit, and which constraint ahead is the first to require it.
+//! The distance to slow down under a jerk limit, and the scan for the constraint ahead that requires it first.
 //!
 //! Called by the [`Governor`] at exec level, once for a stretch (`rise`).
 //!
@@ -144,8 +144,8 @@ pub(super) struct Ask {
     pub taken: bool,
 }
 
-/// Returns the distance it takes to slow down from `u` to `w`, which is not above it. Cost: 700, 1,000 if the
-/// deceleration does not reach A.
+/// Returns the distance to slow down from `u` to `w`, which is not above `u`. Cost: 700, 1,000 if the deceleration does
+/// not reach A.
 #[inline(never)]
 pub(super) fn needed(u: f32, w: f32, kappa: f32) -> f32 {
     let (drop, sum) = (u - w, u + w);

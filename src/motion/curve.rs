@@ -188,7 +188,7 @@ impl Bend {
             self.corners = 0;
             return false;
         }
-        // On a curve both corners turn the same way, and neither turns more than three times as much as the other.
+        // On a curve both corners turn in one direction, and neither turns more than three times as much as the other.
         if difference > sum / 2 {
             self.corners = 0;
             return false;

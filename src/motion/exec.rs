@@ -196,7 +196,7 @@ impl Ahead for QueueView<'_> {
 }
 
 impl Exec {
-    /// Exec at rest, without a line.
+    /// Exec at a standstill, without a line.
     pub const fn new() -> Self {
         let running = Running {
             active: false,

@@ -122,9 +122,9 @@ pub struct Governor {
     pub(super) wait: u8,
     /// Slices until going faster by little is worthwhile.
     pub(super) calm: u8,
-    /// By how many slices the next scan looks further than it has to.
+    /// By how many slices the next scan looks further ahead than it has to.
     pub(super) margin: u8,
-    /// Whether a scan has refused the velocity that it was asked for: the acceleration is about to end.
+    /// Whether a scan has found a velocity unsafe: the acceleration is about to end.
     pub(super) closing: bool,
     /// Counts slices of a ramp.
     pub(super) turn: u8,
@@ -251,7 +251,7 @@ impl Governor {
         self.far
     }
 
-    /// Takes into account that what is ahead has changed.
+    /// Takes into account that the constraints ahead have changed.
     pub fn look_again(&mut self) {
         self.changed = true;
     }

@@ -391,8 +391,8 @@ fn shifted(n: u32, bits: u8) -> u32 {
     if bits < 24 { n >> bits } else { 0 }
 }
 
-/// Returns the power of two that is not below `x`: blocks of nearly the same velocity are to have the same limits.
-/// Cost: 20.
+/// Returns the power of two that is not below `x`, so that blocks of nearly equal velocities have equal limits. Cost:
+/// 20.
 fn power_of_two_above(x: f32) -> f32 {
     let bits = x.to_bits();
     f32::from_bits((bits + 0x007F_FFFF) & 0xFF80_0000)

@@ -244,7 +244,7 @@ impl Builder {
         self.stopped();
     }
 
-    /// Returns the block for something that is done at rest.
+    /// Returns the block for an action that is done at a standstill.
     pub fn pause(&mut self, action: QueuedAction, line: u32) -> Block {
         self.stopped();
         Block::action(action, line)

@@ -162,7 +162,7 @@ impl BlockQueue {
         self.ring.free()
     }
 
-    /// Notes that exec has dropped all blocks: the next block begins at rest.
+    /// Notes that exec has dropped all blocks: the next block begins at a standstill.
     pub fn restart(&mut self) {
         self.tail.last = None;
     }

@@ -41,10 +41,10 @@ const WAIT: u8 = 8;
 /// Slices at a steady velocity before a small gain in velocity is tried.
 const CALM: u8 = 32;
 
-/// Slices by which the first scan of an acceleration looks further than it has to.
+/// Slices by which the first scan of an acceleration looks further ahead than it has to.
 pub(super) const MARGIN_FIRST: u8 = 4;
 
-/// Most slices by which a scan looks further than it has to.
+/// Most slices by which a scan looks further ahead than it has to.
 const MARGIN: u8 = 15;
 
 /// How much longer than a usual slice the slice of [`Governor::creep`] may be, as a power of two: see

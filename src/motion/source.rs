@@ -182,7 +182,7 @@ impl BlockSource {
 
     /// Returns the potential at the end of the queue, counted as at the oldest block.
     fn queue_end(&self) -> f32 {
-        // The place behind all blocks has the number before the oldest one.
+        // The end of the queue has the sequence number before the oldest block.
         self.lifted(
             self.oldest.wrapping_sub(1),
             self.constraints.look(|constraints| constraints.end),

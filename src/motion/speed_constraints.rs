@@ -192,7 +192,7 @@ impl SpeedConstraints {
         if passed < before_end || before_end == left {
             return n + passed;
         }
-        // The list goes on at the beginning of the ring.
+        // The list continues at the beginning of the ring.
         n + passed + self.passed_over(0, left - before_end, velocity)
     }
 

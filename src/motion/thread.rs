@@ -80,7 +80,7 @@ enum Stage {
     Off,
     /// Waits for an index.
     Armed,
-    /// Waits for the first pulse of sync behind the index.
+    /// Waits for the first pulse of sync after the index.
     Indexed,
     /// The phase line is known, but the axes stand still.
     Known,
@@ -545,10 +545,11 @@ mod tests {
     const ACCEL: f32 = 500.0;
     /// A stretch, counts and s.
     const STRETCH: u32 = COUNTS_PER_S / 500;
-    /// How far what is queued is ahead of now, counts.
+    /// How far the queued segments are ahead of the present, counts.
     const AHEAD: u32 = 2_000;
 
-    /// Simulates a spindle at a steady speed, and axes that are as fast as they are told within their acceleration.
+    /// Simulates a spindle at a steady speed, and axes that follow the commanded velocity within their acceleration
+    /// limit.
     struct Pass {
         thread: Thread,
         per_turn: u16,
@@ -585,7 +586,7 @@ mod tests {
         fn pulses(&self) -> Pulses {
             let (time, turn, n) = (self.time, u64::from(self.turn), u64::from(self.per_turn));
             let index = time / turn;
-            // The first pulse of sync is half of the way from pulse to pulse behind the index.
+            // The first pulse of sync is half of a pulse interval after the index.
             let half = turn / n / 2;
             let sync_by = |time: u64| (time + half) * n / turn;
             let bent = |count: u64| {
@@ -630,7 +631,7 @@ mod tests {
             self.time += u64::from(STRETCH);
         }
 
-        /// Where the axes are against the line when what is queued ends, in turns.
+        /// The position of the axes relative to the line at the end of the queued segments, in turns.
         fn phase(&self) -> f64 {
             let angle = (self.time + u64::from(AHEAD)) as f64 / f64::from(self.turn);
             let phase = self.way - angle;
@@ -695,13 +696,13 @@ mod tests {
         }
     }
 
-    /// Whether a spindle is lost while it turns round, or its way back does not match its pulses. The spindle has 300
-    /// turns a minute. It is told to turn round the part `phase` of the way between two pulses behind a mark, and
-    /// does so within a second.
+    /// Whether a spindle is lost while it reverses, or its way back does not match its pulses. The spindle has 300
+    /// turns a minute. It is commanded to reverse at the fraction `phase` of a pulse interval after a mark, and does so
+    /// within a second.
     fn loses_what_turns_round(per_turn: u16, tells: bool, phase: f64) -> bool {
         let per_second = f64::from(COUNTS_PER_S);
         let rate = 5.0 * f64::from(per_turn);
-        // The spindle is told at this time, s, and slows down by twice its speed in a second.
+        // The spindle is commanded at this time, s, and slows down by twice its speed in a second.
         let told = (4.0 + phase) / rate;
         // The place of the spindle, in pulses.
         let place = |at: u64| {
@@ -747,7 +748,7 @@ mod tests {
             }
         }
         let way = -thread.ahead * f32::from(per_turn);
-        // Measured from behind the mark over which it has come back.
+        // Measured from beyond the mark over which it has come back.
         let off = way - (last + 1.0) as f32;
         thread.fault().is_some() || off.abs() > if tells { 0.01 } else { 1.01 }
     }

@@ -132,7 +132,8 @@ impl Governor {
                 seconds = (peak + peak - sum) / self.limits.accel;
             } else {
                 let ramps = (cruise + cruise - sum) / self.limits.accel;
-                // How far the ramps fall behind the cruise velocity, times the acceleration. Each goes at the mean of its ends.
+                // The distance that the ramps lose against the cruise velocity, times the acceleration. The mean
+                // velocity of a ramp is that of its ends.
                 let slower =
                     0.5 * ((cruise - v) * (cruise - v) + (cruise - next) * (cruise - next));
                 seconds = (left + slower / self.limits.accel) / cruise;

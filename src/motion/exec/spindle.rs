@@ -29,8 +29,8 @@ pub(super) enum Follows {
     Speed(f32),
     /// G33, G33.1, or a pass of G76: lines follow the angle of the spindle.
     Angle(Thread),
-    /// A pass of G33 or G76 has ended before its time: X leaves the cut while the axes come to rest. Then what is
-    /// queued waits to be dropped.
+    /// A pass of G33 or G76 has ended early: X leaves the cut while the axes decelerate to a standstill. Then the queue
+    /// waits to be dropped.
     Retreats(Retreat),
 }
 
