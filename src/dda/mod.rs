@@ -5,8 +5,8 @@
 //! at most once a tick: on every tick if its increment is `STEP`, and exactly on every `2^k`th tick if its increment is
 //! `STEP / 2^k`.
 //!
-//! On AVR the whole of [`Dda::tick`] has a twin in assembly (`hal/avr/step_isr.rs`), which works on the same [`Dda`]
-//! and [`Segment`], field by field. The host runs the Rust version.
+//! On AVR [`Dda::tick`] is replaced by an equivalent in assembly (`hal/avr/step_isr.rs`), which uses the fields of
+//! [`Dda`] and [`Segment`]. The host runs the Rust version.
 //!
 //! ```text
 //!   tick   n-1          n           n+1
@@ -22,8 +22,8 @@
 //! is as wide as the computation takes. Directions change after the last pulse of the old segment and a whole tick
 //! before the first pulse of the new one.
 //!
-//! The interrupt may start late, behind another one. If the tick period leaves time for it, a segment gives the cycle
-//! of the tick at which its pulses rise (`settle`). This cycle is so late that no other interrupt can delay the pulses,
+//! The interrupt may start late, after another one. If the tick period leaves time for it, a segment gives the cycle of
+//! the tick at which its pulses rise (`settle`). This cycle is so late that no other interrupt can delay the pulses,
 //! which makes them exact to the cycle.
 //!
 //! In *lockstep* all motors that move step on every tick: phases do not change, and the interrupt has nothing to add.

@@ -1,4 +1,4 @@
-//! The handlers of edges, INT0 to INT7 and PCINT0 to PCINT2. Each vector is made from the same text.
+//! The handlers of edges, INT0 to INT7 and PCINT0 to PCINT2. One macro makes the code of each vector.
 //!
 //! | handler of | does | cycles |
 //! |---|---|---|
@@ -248,7 +248,7 @@ macro_rules! edges {
                     "sts  {start}, r24",
                     "pop  r24",
                     "reti",
-                    // Exec has been asked for meanwhile: pend it.
+                    // Exec has been requested meanwhile: pend it.
                     "8:",
                     "cbi  {flags}, {held}",
                     "ldi  r24, {pended}",

@@ -7,9 +7,9 @@
 //! one pulse; the end of a pulse, and noise right after another edge, make none. Times of edges have 16 bits as well,
 //! so the reader marks a pin that has been still for longer than it bounces as `quiet`.
 //!
-//! With a second sync sensor an edge of the first one counts while the pin of the second one is high: a falling edge
-//! is a pulse, a rising one takes a pulse back. Both edges are at the same place of the mark, so a spindle that
-//! swings about that place counts nothing.
+//! With a second sync sensor an edge of the first one counts while the pin of the second one is high: a falling edge is
+//! a pulse, a rising one takes a pulse back. Both edges are at one place of the mark, so a spindle that swings about
+//! that place counts nothing.
 //!
 //! Each read costs 300 cycles, interrupts off for 20 of them. RAM: 20 bytes.
 

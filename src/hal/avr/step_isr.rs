@@ -14,8 +14,8 @@
 //! of the pins while nothing moves.
 //!
 //! Pulses rise when the timer's count reaches `settle`. If the interrupt has time before that, as it mostly has, it
-//! counts the tick and advances the first motor before the pulses rise; in a segment's last tick it only counts. This
-//! work is done before or after the pulses, but the times of the pulses are the same.
+//! counts the tick and advances the first motor before the pulses rise; in a segment's last tick it only counts. The
+//! times of the pulses do not depend on whether this work is done before or after them.
 //!
 //! The interrupts of serial ports call this handler when a tick is due ([`uart`](super::uart)). It expects interrupts
 //! off, and its return address on the stack.

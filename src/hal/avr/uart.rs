@@ -1,7 +1,7 @@
 //! The serial ports: they move bytes between their lines and two rings each.
 //!
-//! USB is USART0. The second port, on boards that have one, is USART1 or USART3, as the board says. Its receive ring
-//! is shorter; everything else is the same. The interrupts are in `interrupts`.
+//! USB is USART0. The second port, on boards that have one, is USART1 or USART3, as the board says. Its receive ring is
+//! shorter; everything else is equal. The interrupts are in `interrupts`.
 //!
 //! Where bytes are lost, because a ring was full or the hardware overran, a mark tells the reader: see
 //! [`serial`](crate::hal::serial).

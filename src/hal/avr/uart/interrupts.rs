@@ -1,4 +1,4 @@
-//! The interrupts of a serial port, in assembly. Each port has its own copies, made from the same text.
+//! The interrupts of a serial port, in assembly. Each port has its own copies, made by one macro.
 //!
 //! The receive interrupt takes real-time characters out of the stream wherever they stand, and never queues them.
 //!
