@@ -131,7 +131,7 @@ impl Feed {
                 links.card.borrow_mut().release();
                 links.except(Status::CardError);
             }
-            // The file ends when everything that it has asked for is done.
+            // The file ends when all its lines have been carried out.
             Line::End if View::of(links, links.told()).value(Value::Working) != 0 => {
                 self.waits = true;
                 return Read::Nothing;

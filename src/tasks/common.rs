@@ -31,7 +31,7 @@ pub struct State {
 avr_embassy::shared_static! {
     /// Where the state is.
     ///
-    /// Nobody looks at the state without the lock:
+    /// The state cannot be accessed without the lock:
     ///
     /// ```compile_fail,E0061
     /// use kerf::tasks::common::Common;

@@ -271,7 +271,7 @@ impl Runner<'_> {
         step
     }
 
-    /// Handles the standstill in a hold: switches the outputs, and drops what is queued if the planner wants that.
+    /// Handles the standstill in a hold: switches the outputs, and drops the queue if the planner has requested that.
     #[inline(never)]
     #[small]
     fn held(&mut self, out: &mut Snapshot, spindle: &mut Spindle) {
@@ -437,7 +437,7 @@ struct Waiting {
     /// How many segments wait, as of the last `update`; in `sum`, how long they take together.
     used: u8,
     sum: u16,
-    /// For how many more segments [`PRESSED`] is in force.
+    /// For how many more segments [`PRESSED`] applies.
     pressed: u8,
     /// Segments since the machine stood still.
     moved: u8,
@@ -483,7 +483,7 @@ const USUAL: Amount = Amount { most: units(88), least: units(42) };
 /// 10 ms.
 const PRESSED: Amount = Amount { most: units(94), least: units(65) };
 
-/// How long [`PRESSED`] is in force, in segments.
+/// For how many segments [`PRESSED`] applies.
 const PRESSED_FOR: u8 = 100;
 
 /// With less than this waiting, exec is late, and makes longer stretches.

@@ -139,8 +139,8 @@ pub fn door(links: &Links, open: bool) {
     });
 }
 
-/// Holds the machine as if the door were opened and shut at once: nothing moves until a tilde, at rest too. Does
-/// nothing while the door is open, in an alarm, and in check mode.
+/// Holds the machine as if the door were opened and shut at once: nothing moves until a tilde. Also holds a machine at
+/// a standstill. Does nothing while the door is open, in an alarm, and in check mode.
 #[inline(never)]
 #[small]
 pub fn knock(links: &Links) {
@@ -151,14 +151,14 @@ pub fn knock(links: &Links) {
     }
 }
 
-/// Whether a machine at rest may be held: not in an alarm, and not in check mode.
+/// Whether a machine at a standstill may be held: not in an alarm, and not in check mode.
 fn may_hold_at_rest() -> bool {
     !machine::is_alarmed() && !machine::is_checking()
 }
 
 /// Acts on the real-time characters received on any port.
 pub fn serve(links: &Links) {
-    // Before the character is taken: exec has begun the hold because the character waits, and must not go on in
+    // Before the character is taken: exec has begun the hold because the character waits, and must not resume in
     // between.
     if uart::asks_hold() && is_busy(links) {
         // A `%` of an earlier hold is ignored.
@@ -281,14 +281,14 @@ fn start_over(links: &Links, port: &Port, slot: Option<u8>, works: bool) {
     links.reporter_wake.notify_now();
 }
 
-/// Drops what is queued, as a `%` in a hold does: for `{qf:1}`, and for the end of a jog. The caller has refused
-/// `{qf:1}` if the machine is busy without a hold.
+/// Drops the queue, as a `%` in a hold does: for `{qf:1}`, and for the end of a jog. The caller has refused `{qf:1}` if
+/// the machine is busy without a hold.
 pub fn flush_here() {
     machine::take(machine::Event::Flush);
     flags::set(Event::Received);
 }
 
-/// Drops all lines that have come, if [`flush_here`] has asked for it. Called by the reader.
+/// Drops all lines received, if [`flush_here`] has requested it. Called by the reader.
 #[inline(always)]
 pub fn here(links: &Links) {
     if machine::is_to_cut() {

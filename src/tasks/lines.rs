@@ -102,7 +102,7 @@ pub struct LinePool {
     besides: u16,
     /// Why the line that is coming in cannot be kept.
     fault: Option<Status>,
-    /// The last byte was a carriage return: a line feed right behind it ends the same line.
+    /// The last byte was a carriage return: a line feed directly after it belongs to that line end.
     returned: bool,
     /// Empty lines are kept: in text mode they are answered by a prompt.
     keep_empty: bool,
@@ -115,7 +115,7 @@ pub struct LinePool {
     longest: u8,
     /// Bytes that are left free for control lines that overtake: the greatest length of such a line.
     reserve: u8,
-    /// The worst alarm that complete lines have asked for since the last [`take_stop`](Self::take_stop).
+    /// The most severe alarm of complete lines since the last [`take_stop`](Self::take_stop).
     stop: Alarm,
     /// Complete lines, in order; their bytes lie end to end.
     entries: Entries,
@@ -286,13 +286,13 @@ impl LinePool {
         }
     }
 
-    /// Returns the worst alarm that lines have asked for since the last call ([`stop`](super::stop)).
+    /// Returns the most severe alarm of lines since the last call ([`stop`](super::stop)).
     #[inline(always)]
     pub fn take_stop(&mut self) -> Alarm {
         core::mem::replace(&mut self.stop, Alarm::None)
     }
 
-    /// Counts a new control line, and notes the alarm that it asks for.
+    /// Counts a new control line, and records its alarm, if any.
     #[inline(never)]
     #[small]
     fn note_control(&mut self, start: usize, len: u8) {

@@ -16,7 +16,7 @@
 //! | [`Links::notices`], [`Links::probe`] | what is to be told: an exception, the end of a jog or of a flush, a probing | 1 each | 4 B, 26 B | all | reporter | overwritten: the newest counts, but in an alarm its reason |
 //! | [`Links::job`] | the built-in job, and how far it has come | 1 | 4 B | parser | parser, reporter, planner in a flush | a second one is refused |
 //! | [`Links::cleared_by`] | the port that has ended an alarm last | 1 | 1 B | parser | parser | overwritten |
-//! | [`Links::feeder`] | which port's lines are carried out | 1 | 1 B | parser | all | never: it changes at rest |
+//! | [`Links::feeder`] | which port's lines are carried out | 1 | 1 B | parser | all | never: it changes at a standstill |
 //!
 //! What the machine is doing is no link: that is in [`machine`](crate::machine). [`Links::signs`] belong to the
 //! control task and the reader.

@@ -63,7 +63,7 @@ impl Scan {
         }
     }
 
-    /// Whether alarms have been looked for in the next line.
+    /// Whether the next line has been searched for alarms.
     #[inline(always)]
     pub fn has_looked(&self) -> bool {
         self.stops != 0

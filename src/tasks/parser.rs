@@ -284,7 +284,7 @@ impl Parser {
             return told;
         }
         if port.number == USB && links.rate.get().is_some() {
-            // The other port has asked for the new rate.
+            // The other port has requested the new rate.
             leave(port.tx.try_lock().ok(), session);
         }
         false
@@ -334,7 +334,7 @@ impl Parser {
         }
     }
 
-    /// Whether a report on the port whose turn it is goes on first. It ends its line early for the control line that
+    /// Whether a report on the port whose turn it is continues first. It ends its line early for the control line that
     /// waits there.
     #[inline(never)]
     fn leaves_to_report(&mut self) -> bool {
@@ -384,7 +384,7 @@ impl Parser {
         let flushes = machine::is_flushing();
         let any = data || flushes || port.number != links.feeder.get();
         let (id, class) = port.lines.borrow().next(any)?;
-        // A line that follows a reset waits for the greeting, and then for the start-up lines that are told there.
+        // A line that follows a reset waits for the greeting, and then for the start-up lines that are reported there.
         let starts = || {
             port.speech.get().is_in_order()
                 && links.job.get().starts_up()

@@ -103,7 +103,7 @@ enum Begun {
     Parts(Parts),
     /// Nothing is left. Lines are only checked, and these are the modes from before the check.
     Check(Modes),
-    /// A chain: the line and lines before it, from `position` on. The next line may go on with it.
+    /// A chain: the line and lines before it, from `position` on. The next line may join it.
     Chain(Chain),
 }
 
@@ -212,7 +212,7 @@ pub fn run(links: &'static Links, shared: &'static Shared) -> impl Future<Output
 /// Carries out the move in `Links::commands` while the planner's task waits for a line, if there is room. Neither a
 /// wake-up of that task nor a turn of the executor comes between. Returns false if the task has to carry the move out;
 /// nothing has been done then that the task would not do. Thread mode, in the parser's turn. Cost: 9,000 cycles if a
-/// block is planned; 1,400 for a move that goes on with those before it.
+/// block is planned; 1,400 for a move that joins a chain.
 pub fn take_at_once(planner: &mut Planner) -> bool {
     if planner.is_flushed() || planner.owes_answers() {
         return false;
@@ -455,7 +455,7 @@ impl Planner {
     }
 
     /// Whether the feed of this motion is per turn of the spindle (G95) while exec takes feeds as per minute, or the
-    /// other way round. The G-code model has interpreted this line and none behind it.
+    /// other way round. The G-code model has interpreted this line and no later one.
     #[inline(never)]
     #[small]
     fn turns_otherwise(&self, motion: &Motion) -> bool {
@@ -529,7 +529,7 @@ impl Planner {
         built
     }
 
-    /// Notes that the move of the line has been queued. After an exact stop the next move begins at rest.
+    /// Notes that the move of the line has been queued. After an exact stop the next move begins at a standstill.
     fn moved(&mut self, commands: &Commands) {
         if commands.exact_stop {
             self.builder.stopped();
@@ -682,7 +682,7 @@ impl Planner {
             Cycle::Check if !self.checks() => machine::carry_out(machine::Event::Done),
             Cycle::Lines | Cycle::Stopped | Cycle::Check => {}
         }
-        // If a sender begins with a reset, nobody is told: there was no job.
+        // If a sender begins with a reset, nothing is reported, because there was no job.
         let ended = !links.ports.iter().any(|port| port.asked.get() & OTHERS != 0);
         if killed && ended {
             links.except(Status::KillJob);

@@ -98,7 +98,7 @@ pub struct Port {
     pub cut: Cell<Option<u8>>,
     /// The line that is being answered has begun its alarm when it arrived ([`stop`](super::stop)).
     pub has_stopped: Cell<bool>,
-    /// The alarm that is to be ended by a line that waits for the machine to come to rest.
+    /// The alarm that a line is to end once the machine has stopped.
     pub clears: Cell<Alarm>,
     /// Received lines.
     pub lines: RefCell<LinePool>,
@@ -137,7 +137,7 @@ impl Port {
         }
     }
 
-    /// Notes that the sender asks for these bits of [`Port::asked`].
+    /// Records that the sender requests these bits of [`Port::asked`].
     pub fn ask(&self, bits: u8) {
         self.asked.set(self.asked.get() | bits);
     }
@@ -167,7 +167,7 @@ impl Port {
         self.choice.get() == Choice::Open
     }
 
-    /// Whether `?` and bytes above 0x7F are looked for within lines.
+    /// Whether `?` and bytes above 0x7F are recognised within lines.
     pub fn is_eager(&self) -> bool {
         self.waits_for_question() || self.speech.get().is_in_order()
     }
@@ -225,7 +225,7 @@ impl Port {
         self.enquiry.get() || self.lost.get() || self.asks_report()
     }
 
-    /// Whether a status report is asked for by a byte.
+    /// Whether a byte has requested a status report.
     #[inline(always)]
     pub fn asks_report(&self) -> bool {
         self.asked.get() & REPORT != 0
@@ -290,8 +290,8 @@ impl Links {
     }
 
     /// Handles a program that has opened the first port. While nothing runs, the program is greeted as at the start,
-    /// and what it says first decides the dialect anew. Otherwise it is told nothing, because many senders take a
-    /// greeting for a reset.
+    /// and its first line decides the dialect again. Otherwise nothing is sent, because many senders take a greeting
+    /// for a reset.
     #[inline(never)]
     #[small]
     pub fn open_anew(&self) {

@@ -68,7 +68,7 @@ pub fn run(
                 }
                 Left::Bytes | Left::Placed(_) | Left::Aside => yield_now().await,
                 Left::Full => {
-                    // The ring goes on filling.
+                    // The ring continues to fill.
                     select(links.pool_space.wait(), next(links.thread, Event::Received)).await;
                 }
             }
@@ -76,13 +76,13 @@ pub fn run(
     }
 }
 
-/// How many bytes may wait in a ring before its sender is stopped, and when the sender may go on.
+/// Levels of a receive ring at which its sender is stopped, and at which the sender may resume.
 struct Levels {
     /// With more bytes than this, XOFF stops the sender.
     characters: u8,
     /// With more bytes than this, a pin stops the sender.
     pins: u8,
-    /// With fewer bytes than this, the sender goes on.
+    /// With fewer bytes than this, the sender may resume.
     low: u8,
 }
 
@@ -241,8 +241,7 @@ impl Intake {
         Left::Bytes
     }
 
-    /// Acts on a line that has come whole. `looked`: alarms have been looked for in that line while it was in the
-    /// ring.
+    /// Acts on a line that has come whole. `looked`: the line has been searched for alarms while it was in the ring.
     #[inline(always)]
     fn ended(&mut self, pool: &mut LinePool, looked: bool, links: &Links) {
         self.scan.serve(links, pool, looked);
@@ -302,7 +301,7 @@ impl Intake {
         cuts
     }
 
-    /// Stops the sender, or lets it go on, with this many bytes waiting.
+    /// Stops the sender, or lets it resume, with this many bytes waiting.
     #[inline(never)]
     fn control_flow(&mut self, waiting: u8, links: &Links) {
         let levels =
@@ -373,7 +372,7 @@ impl Intake {
         self.refused == 0
     }
 
-    /// Decides, behind lost bytes, whether what follows is a line of its own or the rest of a damaged line.
+    /// Decides after lost bytes whether the next bytes are a new line or the remainder of a damaged one.
     fn after(&mut self, pool: &mut LinePool) {
         if self.then & CLEAN == 0 {
             pool.spoil(Status::BufferFull);

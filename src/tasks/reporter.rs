@@ -40,7 +40,7 @@ const LOOK_MS: u64 = 100;
 #[cfg(feature = "dialect-reprap")]
 /// Period of the busy messages to a printing host while a line takes long, ms.
 const BUSY_MS: u32 = 2_000;
-/// How often room is looked for on a port that is told besides the usual one.
+/// Number of attempts to get room on another port than the usual one.
 const PATIENCE: u8 = 20;
 /// How many times a report ends its line early for an answer. Each line of a report costs the serial line some time
 /// for its frame.
@@ -90,16 +90,16 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
             tell(links, port, notice).await;
             // In one turn: no line comes between the greeting and the start-up lines.
             if greets_anew() && port.take_asked(GREETS) && !opened {
-                // If it may feed the machine, start-up lines are told there.
+                // If it may feed the machine, start-up lines are reported there.
                 links.may_feed(port);
                 start_up(links);
             }
         }
-        // All of them in one turn: a probing is told behind the alarm that it has raised.
+        // All of them in one turn: a probing is reported after the alarm that it has raised.
         while let Some(status) = links.notices.exception.take() {
             let notice = Notice::Exception(status);
             tell(links, links.told(), notice).await;
-            // Whoever is at the machine may have it go on.
+            // The program may be resumed on any port.
             if status == Status::ProgramStopped {
                 tell_others(links, notice).await;
             }
@@ -217,12 +217,12 @@ impl Clock {
 struct State {
     doing: Doing,
     hold: Hold,
-    /// The state of the program, while the machine rests.
+    /// The state of the program, while the machine stands still.
     rest: Program,
 }
 
 impl State {
-    /// A state that never occurs, so that the first look at the machine finds a change.
+    /// A state that never occurs, so that the first check finds a change.
     const FIRST: Self = Self { doing: Doing::Rests, hold: Hold::Slows, rest: Program::Ready };
 
     #[inline(never)]
@@ -269,7 +269,7 @@ fn split(telling: &mut Telling, port: &Port, tx: &mut Tx) -> bool {
 /// Tells `notice` on a port, a part at a time: for a millisecond in one turn, if there is room. For a queue report,
 /// returns how many blocks the report says are free; that may have changed while the transmitter was waited for.
 async fn tell(links: &Links, port: &Port, notice: Notice) -> usize {
-    // What changes meanwhile is looked at afterwards, also if the machine has come to rest by then.
+    // Changes in the meantime are checked afterwards, also if the machine has stopped by then.
     links.reporter_wake.set_polling(false);
     let mut tx = match notice {
         Notice::Status | Notice::Exception(_) => port.tx_behind_answers().await,
@@ -329,7 +329,7 @@ fn asked_on(port: &Port) -> Option<Notice> {
     Some(Notice::Greeting(Occasion::Ready))
 }
 
-/// Whether a reset that a sender has asked for is over: everything that had come has been dropped.
+/// Whether a sender's reset is complete: everything received before it has been dropped.
 #[inline(never)]
 #[small]
 fn is_over(port: &Port) -> bool {

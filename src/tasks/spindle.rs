@@ -142,7 +142,7 @@ pub fn flip(links: &Links, output: u8) {
     links.model.borrow_mut().set_coolant(coolant(now));
 }
 
-/// Stops the spindle while the machine rests in a hold, or lets it turn again.
+/// Stops the spindle while the machine stands still in a hold, or starts it again.
 #[inline(never)]
 #[small]
 pub fn pause(links: &Links) {

@@ -23,8 +23,8 @@ use crate::machine::Alarm;
 use crate::protocol::{STOP_MAX, asks_alarm};
 
 impl Scan {
-    /// Begins the alarms that lines in the pool ask for, unless they have already begun while the lines were in the
-    /// ring, where alarms have been `looked` for.
+    /// Begins the alarms of lines in the pool, unless they have already begun while the lines were in the ring, which
+    /// has been searched for alarms if `looked`.
     #[inline(never)]
     #[small]
     pub fn serve(&mut self, links: &Links, pool: &mut LinePool, looked: bool) {
@@ -38,8 +38,7 @@ impl Scan {
         }
     }
 
-    /// Looks on behind a line that waits for room, through lines that have come whole, and begins the alarms that
-    /// these ask for. Cost: 40 cycles a byte.
+    /// Scans complete lines after a line that waits for room, and begins their alarms. Cost: 40 cycles a byte.
     #[inline(never)]
     #[small]
     pub fn look_for_stops(
@@ -53,7 +52,7 @@ impl Scan {
             self.begun = 0;
         }
         let from = self.stops.max(self.looked);
-        // A line whose beginning has been looked at does not overtake, and asks for no alarm.
+        // A line whose beginning has been scanned does not overtake, and begins no alarm.
         let mut whole = from == self.stops || !self.within;
         let mut at = if whole { from } else { self.stops };
         let mut line = Vec::<u8, STOP_MAX>::new();

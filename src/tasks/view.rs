@@ -1,6 +1,6 @@
 //! The machine as the protocol sees it: access to the links, with one borrow at a time.
 //!
-//! A view is made anew for each step of a response or report, and never kept across an `.await`. Positions and speed
+//! A new view is made for each step of a response or report, and never kept across an `.await`. Positions and speed
 //! come from exec's snapshot while something runs, and from the G-code model otherwise. All steps of one report or
 //! group share the [`Seen`] state of the first of them that read motion ([`Port::seen`]).
 
@@ -96,7 +96,7 @@ pub struct Seen {
 impl Seen {
     /// Returns the present state of the machine. Thread mode.
     fn now(links: &Links) -> Self {
-        // In this order, because exec may take up what is queued in between.
+        // In this order, because exec may begin a queued block in between.
         let queued = is_queued(links);
         let motion = snapshot(links.thread).moment();
         Self { motion, carries_out: queued || motion.running }
@@ -201,7 +201,7 @@ impl<'a> View<'a> {
         (axes != 0 && homed).into()
     }
 
-    /// Whether the machine is at rest, so that something may begin that no line asks for. If not, the error says why.
+    /// Whether the machine is idle, so that an action other than a line may begin. If not, the error is the reason.
     fn may_begin(&self) -> Result<(), Status> {
         let alarm = machine::alarm();
         if alarm != Alarm::None {
@@ -241,7 +241,7 @@ impl<'a> View<'a> {
         if machine::is_checking() { Err(Status::NotAccepted) } else { Ok(()) }
     }
 
-    /// Hands the planner something that no line asks for. The port that asked becomes the feeder.
+    /// Hands the planner an action other than a line. The port that requested it becomes the feeder.
     #[inline(never)]
     fn begin(&mut self, motion: Motion, cycle: machine::Event) -> Status {
         let links = self.links;
@@ -542,7 +542,7 @@ impl Machine for View<'_> {
     }
 }
 
-/// Returns how many blocks of the planner are free, as senders are told.
+/// Returns how many blocks of the planner are free, as reported to senders.
 #[small]
 pub fn queue_free() -> usize {
     queue::free().max(QUEUE_FREE_MIN)

@@ -25,7 +25,7 @@ impl Wake {
         }
     }
 
-    /// Forgets a signal that nobody has waited for.
+    /// Clears a signal that no task has waited for.
     pub fn take(&self) {
         self.signalled.set(false);
     }
@@ -46,7 +46,7 @@ impl Wake {
     }
 }
 
-/// Wakes the reporter, unless the reporter polls anyway and nobody asks for more.
+/// Wakes the reporter, unless it has declared by [`Self::set_polling`] that it polls.
 #[derive(Default)]
 pub struct ReporterWake {
     wake: Wake,

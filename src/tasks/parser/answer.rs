@@ -51,7 +51,7 @@ pub(super) struct Answer {
 enum Progress {
     /// The answer is at its end.
     Done,
-    /// The answer goes on later.
+    /// The answer continues later.
     Waits,
 }
 

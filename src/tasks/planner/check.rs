@@ -8,7 +8,7 @@
 //! It was idle when check mode began, has nothing to do meanwhile, and its position does not change.
 //!
 //! Only `{chk:0}` and a reset end check mode. Otherwise an alarm or a `^d` in the middle of a file would have the rest
-//! of the file carried out. An alarm and `^d` only drop the lines that have come, and check mode goes on.
+//! of the file carried out. An alarm and `^d` only drop the lines received, and check mode stays on.
 
 use kerf_macros::small;
 

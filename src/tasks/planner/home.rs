@@ -19,7 +19,7 @@
 //! While an axis is homed its own limit switches are ignored; those of other axes act. The settings of all axes are
 //! checked before anything moves. A failure ends the cycle: an exception gives the axis and the reason, the axis is not
 //! homed, and its position is where it has stopped. A feedhold holds the cycle; a flush ends it as a failure. Lines
-//! that wait behind the homing line are carried out after it.
+//! after the homing line wait for its end.
 //!
 //! Several motors of an axis move together. A second motor that has a switch of its own squares the axis
 //! ([`square`](super::square)).
@@ -130,7 +130,7 @@ impl Progress {
 }
 
 impl Planner {
-    /// Carries out the homing that the line asks for.
+    /// Carries out the homing of the line.
     pub(super) async fn home(&mut self) {
         self.enter(Event::Homing);
         let mut at = Progress::default();
@@ -161,7 +161,7 @@ impl Planner {
         Capability::Drivers.is_built_in() && self.links.settings.borrow().homes_by_stall(axis)
     }
 
-    /// Returns what the line asks for: the axes as bits, and whether their positions are set.
+    /// Returns the parameters of the line: the axes as bits, and whether their positions are set.
     fn homed_by_line(&self) -> (u8, bool) {
         match self.links.commands.borrow().motion {
             Motion::Home { axes, set } => (axes, set),

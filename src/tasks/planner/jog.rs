@@ -1,8 +1,8 @@
 //! Jogging, `{jogx:..}`: moves one axis by hand, as fast as its traverse limit lets it, under its jerk limit.
 //!
-//! A jog has begun at rest ([`View`](crate::tasks::view)). At its end, whether the target is reached or not, the
+//! A jog begins at a standstill ([`View`](crate::tasks::view)). At its end, whether the target is reached or not, the
 //! reporter says `{"jog":0}`. A sender ends a jog when a button is let go ([`jog`](crate::tasks::jog)). An exclamation
-//! mark holds the jog, and a `%` behind the exclamation mark ends it.
+//! mark holds the jog, and a `%` after the exclamation mark ends it.
 
 use kerf_macros::small;
 

@@ -50,8 +50,8 @@ impl Planner {
         !matches!(self.begun, Begun::Nothing)
     }
 
-    /// Whether a line is to begin a chain, which costs 1,500 cycles. On a curve, where no line goes on with a chain,
-    /// only every eighth line begins one, and on a long curve every 32nd.
+    /// Whether a line is to begin a chain, which costs 1,500 cycles. On a curve, where no line joins a chain, only
+    /// every eighth line begins one, and on a long curve every 32nd.
     #[inline(always)]
     pub(super) fn is_worth_a_chain(&mut self) -> bool {
         self.alone = self.alone.checked_add(1).unwrap_or(LONG);

@@ -27,7 +27,7 @@ use crate::tasks::alarm;
 const SWITCH: u16 = 1 << PROBE;
 
 impl Planner {
-    /// Carries out the probing that the line asks for.
+    /// Carries out the probing of the line.
     pub(super) async fn probe(&mut self) {
         self.enter(machine::Event::Probe);
         if self.standstill().await && self.begin_probe() {

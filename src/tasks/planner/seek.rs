@@ -5,7 +5,7 @@
 //! remainder of the move is dropped, and the planner continues from where the motors are. The contact is known to the
 //! step ([`contact`]). A feedhold on the way holds the move; a queue flush ends it.
 //!
-//! Only one line is carried out at a time: lines behind it wait in the pool, and none is lost.
+//! Only one line is carried out at a time: later lines wait in the pool, and none is lost.
 
 use embassy_futures::yield_now;
 use kerf_macros::small;
@@ -111,7 +111,7 @@ impl Planner {
     #[inline(never)]
     #[small]
     pub(super) fn relocate(&mut self, motion: &Snapshot) {
-        // Until steps have been counted anew, they do not fit the settings. The position stays: nothing has moved
+        // Until steps have been computed again, they do not fit the settings. The position stays: nothing has moved
         // since.
         if !self.links.changes.has(Changes::STEPS) {
             self.position = self.located(&motion.target);

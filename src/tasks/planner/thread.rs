@@ -1,6 +1,6 @@
 //! G33, and each pass of G76: a pass in step with the spindle ([`crate::motion::thread`]).
 //!
-//! A pass begins at a standstill. [`Planner::thread`] waits until the encoder tells how fast the spindle turns, and
+//! A pass begins at a standstill. [`Planner::thread`] waits until the encoder gives the speed of the spindle, and
 //! checks that no axis would have to go faster than it may. Then it queues the pass: its start, its lines, and its end.
 //! A pass of G76 has a line for each taper, and exec is told the lead of each line. If something is wrong, an alarm
 //! reports it before anything moves. During the pass the planner waits. If exec loses the spindle, the axes stop and an
@@ -11,7 +11,7 @@
 //! spindle. An axis with a jerk limit J has at most the acceleration `sqrt(J v) / 2`, where v is its speed in the
 //! thread: this is the mean acceleration of a ramp under the jerk limit.
 //!
-//! Only one line is carried out at a time: lines behind it wait in the pool.
+//! Only one line is carried out at a time: later lines wait in the pool.
 
 use embassy_futures::yield_now;
 use kerf_macros::small;
@@ -98,9 +98,9 @@ fn mean_accel(accel: f32, jerk: f32, speed: f32) -> f32 {
 }
 
 impl Planner {
-    /// Waits until the encoder says how fast the spindle turns. Then makes the pass of the line if it `cuts`, or
-    /// begins an alarm that says why it cannot be made. A pass that a feedhold has left is made once more from its
-    /// beginning when the hold is over.
+    /// Waits until the encoder gives the speed of the spindle. Then makes the pass of the line if it `cuts`, or begins
+    /// an alarm that says why it cannot be made. A pass that a feedhold has left is made once more from its beginning
+    /// when the hold is over.
     pub(super) async fn thread(&mut self, cuts: bool) {
         loop {
             self.walk = Ongoing::None;
@@ -199,7 +199,7 @@ impl Planner {
         }
     }
 
-    /// Queues the rest of a line that takes several blocks.
+    /// Queues the remainder of a line that takes several blocks.
     pub(super) async fn finish_parts(&mut self) {
         while self.has_begun() && !self.is_flushed() {
             self.pass_room().await;
@@ -304,7 +304,7 @@ impl Planner {
         for motor in (0..MOTORS).filter(|motor| moved_by(&settings, *motor) == X) {
             let ratio = settings.step_ratio(motor);
             let way = ratio.steps(Length(end)).wrapping_sub(ratio.steps(x));
-            // Either all motors of the axis make the same steps, or the axis stays.
+            // All motors of the axis must make equal steps, or the axis stays.
             if way == 0 || retract.is_some() && whole != way {
                 return Retract::NONE;
             }
@@ -325,11 +325,11 @@ impl Planner {
         retract
     }
 
-    /// Waits until the encoder tells how long a turn takes, in counts. Returns `None` if what is queued is to be
-    /// dropped, and an error if the spindle gives no pulse for too long.
+    /// Waits until the encoder gives the time of a turn, in counts. Returns `None` if the queue is to be dropped, and
+    /// an error if the spindle gives no pulse for too long.
     async fn spindle_turns(&self) -> Result<Option<u32>, Status> {
         let (mut since, mut last) = (millis(), 0);
-        // The power task looks at the encoder, and then raises this event.
+        // The power task reads the encoder, and then raises this event.
         wait(self.links.thread, Event::BlockDone, || {
             if self.is_flushed() {
                 return Some(Ok(None));

@@ -1,4 +1,4 @@
-//! What begins that no line of G-code asks for: a built-in job, homing, check mode, a jog.
+//! Actions that begin without a line of G-code: a built-in job, homing, check mode, a jog.
 
 use kerf_macros::small;
 
