@@ -136,7 +136,7 @@ pub(super) struct Ask {
     pub at: f32,
     /// The highest velocity until then.
     pub fastest: f32,
-    /// Constraints at this velocity or below must lie behind the place where the top is reached.
+    /// No constraint at this velocity or below may lie before the place where the top is reached.
     pub level: f32,
     /// Distance from the present state to the end of the block.
     pub here: f32,

@@ -29,7 +29,7 @@
 //! 1/16 steps: such blocks are a whole number of steps long, and keep the fraction with which they begin.
 //!
 //! **Ends of segments.** A segment with one or two ticks a step ends on a step of the dominant motor if possible. So
-//! the next step is in time even if the next segment has one tick a step. A segment with more ticks a step ends in the
+//! the next step is in time even if a later segment has one tick a step. A segment with more ticks a step ends in the
 //! middle between two steps, because in a tick without a pulse the interrupt has time to load the next segment.
 //!
 //! **Pressure advance.** An extruder is ahead of its line by its lead ([`advance`](super::advance)). The lead is added
