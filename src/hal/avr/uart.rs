@@ -174,7 +174,7 @@ pub fn set_rate(port: u8, rate: u32) {
     }
 }
 
-/// Completes lines that have been sent in part. The remaining contents of the rings are never sent.
+/// Ends lines that have been sent in part by a line feed. The remaining contents of the rings are never sent.
 ///
 /// # Safety
 /// Thread mode; interrupts are off, and stay so.

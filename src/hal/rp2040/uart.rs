@@ -691,8 +691,8 @@ pub fn take_realtime(port: u8) -> u8 {
     with(port, |line| core::mem::take(&mut line.realtime))
 }
 
-/// Completes lines that have been sent in part. The remaining contents of the rings are never sent. Interrupts are off,
-/// and stay so.
+/// Ends lines that have been sent in part by a line feed. The remaining contents of the rings are never sent.
+/// Interrupts are off, and stay so.
 pub(super) fn end_lines() {
     for port in 0..PORTS as u8 {
         let Some(uart) = registers(port) else { continue };
