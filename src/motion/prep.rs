@@ -247,14 +247,8 @@ impl Prep {
         // In 16 bits: no tick is longer than a step.
         let at = (self.left as u16)
             .wrapping_sub((u16::from(self.past) << PART_LOG2).wrapping_add(middle));
-        let mut step = bit(shift);
-        if at & (step - 1) != 0 {
-            let fits = self.fitting(shift, at.trailing_zeros() as u8, cycles, travel);
-            if fits != shift {
-                (fine, shift) = (finer(travel, fits), fits);
-                step = bit(shift);
-            }
-        }
+        (fine, shift) = self.aligned(at, (fine, shift), cycles, travel);
+        let step = bit(shift);
         let rest = step - 1;
         let mut ticks = whole_ticks(fine, shift);
         let grain = grain(ticks, shift);
@@ -274,6 +268,20 @@ impl Prep {
         }
         self.emit(ticks, shift, step, period as u16, cycles, out);
         true
+    }
+
+    /// Returns shorter ticks, and the `travel` in them ([`finer`]), if a step at the distance `at` does not lie on a tick
+    /// and there is time for such ticks; else the ticks as they are.
+    #[inline(always)]
+    fn aligned(&self, at: u16, ticks: (u32, u8), cycles: u32, travel: u32) -> (u32, u8) {
+        let (fine, shift) = ticks;
+        if at & (bit(shift) - 1) == 0 {
+            return (fine, shift);
+        }
+        match self.fitting(shift, at.trailing_zeros() as u8, cycles, travel) {
+            fits if fits == shift => (fine, shift),
+            fits => (finer(travel, fits), fits),
+        }
     }
 
     /// Returns the exponent of ticks that end on the steps of the dominant motor: `fits` if that is less than `shift`
@@ -410,6 +418,10 @@ impl Prep {
                 // The remainder, in no more ticks than necessary.
                 (fine, shift) = (finer(left, fits), fits);
             }
+        } else {
+            // The end is not aligned, but the beginning is: otherwise the first step would be late.
+            let at = (left as u16).wrapping_sub(u16::from(self.past) << PART_LOG2);
+            (fine, shift) = self.aligned(at, (fine, shift), cycles, left);
         }
         let mut ticks = whole_ticks(fine, shift);
         let period = self.period(cycles, fine, shift).min(PERIOD_MAX);

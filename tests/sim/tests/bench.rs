@@ -26,6 +26,7 @@ rows! {
     jitter_on_a_busy_line = "jitter-busy";
     jitter_of_a_minor_motor = "jitter-minor";
     jitter_over_ends_of_blocks = "jitter-blocks";
+    jitter_over_ends_of_slow_blocks = "jitter-slow";
     moves_of_a_tenth = "spiral-0.1";
     moves_of_a_tenth_in_grbls_dialect = "spiral-0.1-grbl";
     moves_of_a_fifth = "spiral-0.2";

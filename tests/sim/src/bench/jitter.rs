@@ -1,4 +1,4 @@
-//! Step jitter at cruise, when X makes 20,000 steps/s and Y 7,400 in one move.
+//! Step jitter at cruise, when X makes 20,000 steps/s and Y 7,400 in one move, and of slow lines in a row.
 
 use std::fmt::Write;
 
@@ -17,6 +17,12 @@ const WAY: f64 = 650.0;
 const BLOCK: f64 = 5.0;
 /// The middle part of the move that counts, s. All of it is cruise.
 const COUNTED_S: f64 = 1.0;
+/// Steps a second of slow lines, at which there is more than one tick a step.
+const SLOW: f64 = 2_900.0;
+/// Length of a slow line in the mean, mm. Lines differ by up to half of it, so that they end at all parts of a step.
+const SLOW_BLOCK: f64 = 0.8007;
+/// Number of slow lines: more than a second of cruise.
+const SLOW_LINES: u32 = 100;
 /// Number of lines behind the move, which take longer to send than the move lasts.
 const LINES: u32 = 3_000;
 
@@ -53,6 +59,17 @@ pub fn boundaries(bed: &Bed) -> Result<Figure> {
         worst = worst.max(cycles);
     }
     Ok(Figure { value: worst as f64, note: note.join(", ") })
+}
+
+/// Jitter across the ends of slow lines of X, which are not merged.
+pub fn slow_boundaries(bed: &Bed) -> Result<Figure> {
+    let mut job = format!("G61\nG1 F{:.3}\n", SLOW / PER_MM * 60.0);
+    for n in 1..=SLOW_LINES {
+        let x = f64::from(n) + 0.5 * (f64::from(n) * 0.618_034).fract();
+        let _ = writeln!(job, "G1X{:.4}", x * SLOW_BLOCK);
+    }
+    let machine = bed.run(&job, How { log: true, ..How::default() })?.0;
+    Ok(in_cycles(&machine, peak_to_peak(&machine, 0)))
 }
 
 fn in_cycles(machine: &Machine, cycles: u64) -> Figure {

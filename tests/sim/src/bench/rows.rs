@@ -11,7 +11,7 @@ use super::{Row, beyond, costs, jitter, limits, pauses, printing, rates, spirals
 const NONE: [&str; 3] = ["-"; 3];
 
 /// The table.
-pub const ROWS: [Row; 49] = [
+pub const ROWS: [Row; 50] = [
     Row {
         name: "rate-1",
         what: "highest rate held, 1 motor",
@@ -123,6 +123,17 @@ pub const ROWS: [Row; 49] = [
         target: Some(2.0),
         floor: Some(2.0),
         measure: jitter::boundaries,
+    },
+    Row {
+        name: "jitter-slow",
+        what: "jitter at 2,900 steps/s over ends of blocks",
+        unit: "cycles",
+        decimals: 0,
+        better: Lower,
+        peers: NONE,
+        target: None,
+        floor: Some(60.0),
+        measure: jitter::slow_boundaries,
     },
     Row {
         name: "spiral-0.1",
