@@ -111,7 +111,7 @@ proptest! {
             let (_, angle) = case.polar(&point, begin);
             let turned = angle - last.0;
             prop_assert!(turned > 0.0, "chord {i} goes backwards");
-            let short = radius * turned <= 505.0;
+            let short = radius * turned <= 205.0;
             let most = f64::from(tolerance) * 10_000.0 * 1.01 + 1.5;
             let offsets = case.offsets(&last.1, &point, radius);
             let worst = offsets.iter().map(|d| d.abs()).fold(0.0, f64::max);

@@ -24,8 +24,8 @@ use super::command::Arc;
 use crate::math;
 use crate::units::{Length, PerAxis};
 
-/// The least length of a chord: 0.05 mm, in units.
-const MIN_CHORD: f32 = 500.0;
+/// The least length of a chord: 0.02 mm, in units.
+const MIN_CHORD: f32 = 200.0;
 /// A change of radius up to this (0.2 um) is left to the last chord.
 const SAME_RADIUS: f32 = 2.0;
 /// The number of binary fractions in a turn, 2^32.

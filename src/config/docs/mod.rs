@@ -29,7 +29,8 @@ Requests, in JSON and in text mode:
 | write | `{xvm:1200}` | `$xvm=1200` |
 | restore all defaults | `{defa:1}` | `$defa=1` |
 
-A setting takes effect before its response is sent. It survives a power cut, unless its description says otherwise. After G20,
+A setting takes effect before its response is sent, for the lines behind it. Moves that are under way or queued keep the limits
+with which they were planned. A setting survives a power cut, unless its description says otherwise. After G20,
 lengths are read and written in inches; values of rotary axes stay in degrees. A write is refused with one of these statuses:
 
 | status | reason |

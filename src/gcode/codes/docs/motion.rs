@@ -182,7 +182,7 @@ pub const PROBES: Section = Section {
     ],
 };
 
-const PROBE: &str = "Straight towards the axis words at the feed rate, until the probe says stop. X, Y and Z \
-only, at least 0.254 mm. The machine comes to rest beyond the contact and goes back to it at the same feed, unless `pbo` is 0: G10 L20 \
-and G92 of the next line take the contact (`prb`) for the position. To come to the end without a contact is an alarm. Refused on machines without a probe.";
-const QUIET: &str = "The same, but to come to the end without a contact is none.";
+const PROBE: &str = "Moves straight towards the axis words at the feed rate until the probe changes. X, Y and Z \
+only, at least 0.254 mm. The machine stops beyond the contact point (`prb`) and returns to it at the same feed, so that G10 L20 and G92 in \
+the next line apply to the contact point. With `pbo` 0 it stays where it has stopped. A move that ends without a contact raises an alarm. Refused on machines without a probe.";
+const QUIET: &str = "As the code above, but a move that ends without a contact raises no alarm.";
