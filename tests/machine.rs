@@ -563,3 +563,30 @@ fn a_percent_sign_in_a_comment_of_an_earlier_hold_flushes_nothing() {
     sender.ask("~", 3_000);
     assert_eq!(sender.machine.emitted().position[0], 25_600);
 }
+
+/// A report on one port tells of one moment, though a move begins on the other port while it is sent.
+#[test]
+fn a_report_does_not_mix_rest_with_the_target_of_a_move() {
+    for n in 0..60u64 {
+        // Blanks shift the report by less than a millisecond.
+        let (delay, blanks) = (n / 12, n as usize % 12);
+        let one = std::thread::spawn(move || {
+            let machine = Machine::boot(115_200).expect("one machine for each thread");
+            machine.run_ms(200);
+            let list = "line:t,stat:t,mpox:t,mpoy:t,mpoz:t,posx:t,posy:t,posz:t,n:t,vel:t,feed:t";
+            machine.send(format!("{{sv:0}}\n{{sr:{{{list}}}}}\n").as_bytes());
+            machine.run_ms(200);
+            machine.received_aux();
+            machine.send_aux(format!("{}{{sr:n}}\n", " ".repeat(blanks)).as_bytes());
+            machine.run_ms(delay);
+            machine.send(b"n5 g0 x10 y10 z10\n");
+            machine.run_ms(200);
+            let heard = String::from_utf8(machine.received_aux()).expect("text");
+            if heard.contains("\"vel\":0.00") {
+                assert_eq!(heard.matches(":0.000").count(), 6, "{heard}");
+                assert!(heard.contains("\"n\":0"), "{heard}");
+            }
+        });
+        assert!(one.join().is_ok(), "a delay of {delay} ms, {blanks} blanks");
+    }
+}

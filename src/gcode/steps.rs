@@ -55,6 +55,20 @@ pub enum Step {
     Stop(Stop),
 }
 
+impl Step {
+    /// Whether the step comes before the move of its line. Steps within a cycle count as well.
+    pub fn precedes_motion(&self) -> bool {
+        matches!(
+            self,
+            Step::Tool(_)
+                | Step::Spindle(_)
+                | Step::Coolant(_)
+                | Step::Override(_)
+                | Step::Dwell(_)
+        )
+    }
+}
+
 /// How far a line has been carried out.
 #[derive(Clone, Copy, Default, Debug)]
 pub struct Steps {

@@ -63,7 +63,7 @@ use crate::units::{AXES, Length, PerAxis};
 #[repr(C)]
 pub struct Planner {
     links: &'static Links,
-    /// The N word of the line that is being carried out.
+    /// The N word of the line that is being carried out; before its move, that of the line before.
     line: u32,
     /// When the chain that waits got its last line, ms.
     waits_since: u16,
@@ -324,9 +324,6 @@ impl Planner {
     /// Begins with the line in `Links::commands`.
     #[inline(never)]
     fn begin(&mut self) {
-        if !self.has_chain() {
-            self.line = self.links.commands.borrow().line;
-        }
         self.steps = Steps::default();
         self.take_up_changes();
     }
@@ -389,7 +386,14 @@ impl Planner {
             return Turn::More;
         }
         match self.steps.next(&commands, &self.position) {
-            Some(step) => self.step(&step, &commands),
+            Some(step) => {
+                // What precedes the move has the N word of the line before. The machine may stand still in between, and
+                // then exec takes the line of its last block for finished.
+                if !(step.precedes_motion() && commands.moves()) {
+                    self.line = commands.line;
+                }
+                self.step(&step, &commands)
+            }
             None => Turn::Done,
         }
     }

@@ -146,6 +146,12 @@ impl<'a> View<'a> {
         machine::is_held() || machine::is_checking() || self.has_work()
     }
 
+    /// Whether the machine stood still when a report began, and no line has been taken since: another port may feed it.
+    fn stands(&self) -> bool {
+        let has_begun = || self.seen.get().is_some() && self.works_now();
+        !self.is_busy() && !has_begun()
+    }
+
     /// Whether anything is queued or runs.
     pub fn has_work(&self) -> bool {
         self.carries_out() || !self.links.job.get().is_none()
@@ -180,7 +186,7 @@ impl<'a> View<'a> {
         let programmed = self.links.model.borrow().position().get(axis).copied();
         let programmed = programmed.unwrap_or(Length::ZERO);
         // Until the planner has computed steps again, they are those of the settings before the change.
-        if !self.is_busy() || self.links.changes.has(Changes::STEPS) {
+        if self.stands() || self.links.changes.has(Changes::STEPS) {
             return programmed;
         }
         // The position of an axis without a motor is that of the last line.

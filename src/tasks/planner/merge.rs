@@ -131,7 +131,6 @@ impl Planner {
             return Turn::Done;
         }
         self.build_chain(false);
-        self.line = commands.line;
         Turn::More
     }
 

@@ -23,7 +23,7 @@ pub(super) fn value(view: &mut View<'_>, value: Value) -> i32 {
         Value::MovesLast => view.links.moves_last.get().into(),
         Value::Running => view.motion().running.into(),
         // Lines that move nothing are finished when all lines before them are.
-        Value::FinishedLine if !view.is_busy() => modal(view, Value::BlockLine),
+        Value::FinishedLine if view.stands() => modal(view, Value::BlockLine),
         Value::Flow => view.links.model.borrow().flow().into(),
         Value::FinishedLine => view.motion().finished as i32,
         Value::MotionLine => view.motion().line as i32,
