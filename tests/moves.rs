@@ -93,6 +93,30 @@ fn cruises_at_the_commanded_rate() {
     }
 }
 
+/// What is left of a long line has 24 bits, of which a slow stretch is a few. The feed is exact all the same.
+#[test]
+fn long_slow_lines_keep_their_feed() {
+    for jerk in [0.0, 1e6] {
+        for (mm, velocity) in [
+            (400.0, 0.13f32),
+            (400.0, 0.61),
+            (400.0, 0.021),
+            (400.0, 0.05),
+            (400.0, 2.03),
+            (120.0, 0.012),
+        ] {
+            let mut rig = Rig::new(Config::new(300.0, 5_000.0, jerk));
+            rig.pins.keep_edges = true;
+            rig.line(at([mm]), velocity, 1);
+            while rig.pins.edges[0].len() < 24 {
+                rig.turn();
+            }
+            let (got, wanted) = (rate(&rig).0, f64::from(velocity) * 80.0);
+            assert!((got / wanted - 1.0).abs() < 1e-3, "{got} steps/s, not {wanted}: {mm} mm");
+        }
+    }
+}
+
 #[test]
 fn one_step_in_ten_seconds_takes_ten_seconds() {
     let mut rig = Rig::new(Config::new(100.0, 500.0, 1e5));

@@ -88,7 +88,10 @@ asked for as well: [settings.md](settings.md). Names that do something: [protoco
 
 /// Values of the machine: the name, or the name within its group with `x`, `1` or `e` for the group; and the meaning.
 const VALUES: [(&str, &str); 62] = [
-    ("n", "number (N) of the line that was finished last; in motion, of those that move or switch something"),
+    (
+        "n",
+        "number (N) of the line that was finished last; in motion, of those that move or switch something",
+    ),
     ("line", "number (N) of the line that moves"),
     ("vel", "speed now, units/min"),
     ("feed", "feed rate F, units/min"),
