@@ -10,14 +10,14 @@ use crate::status::Status::{
 
 pub const BORES: Section = Section {
     title: "Canned cycles: tapping and boring",
-    intro: "Words and levels are those of the drilling cycles.",
+    intro: "Words and levels are as in the drilling cycles.",
     docs: &[
         g(
             840,
-            "Tap",
-            "Feeds to Z, turns the spindle the other way round, dwells for P if there is one, feeds up, and turns it \
-as before. The spindle has to turn clockwise. Feed and spindle are not synchronised: the tap needs a floating holder, and F is S times the \
-pitch (or with G95 the pitch).",
+            "Tapping cycle",
+            "Feeds to Z, reverses the spindle, dwells for P if given, feeds up, and reverses the spindle again. The spindle \
+must turn clockwise. Feed and spindle are not synchronized: use a floating tap holder. F must be S times the \
+pitch, with G95 the pitch.",
             cycle!(
                 "G84",
                 "M3",
@@ -30,15 +30,14 @@ pitch (or with G95 the pitch).",
         ),
         g(
             850,
-            "Bore",
+            "Boring cycle",
             "Feeds to Z and feeds up.",
             cycle!("G85", "", "", per_turn!("G85", ""), speed!("G85", "")),
         ),
         g(
             860,
-            "Bore, spindle stop, up by traverse",
-            "Feeds to Z, dwells for P, stops the spindle, goes up by traverse, and turns it as before. The spindle \
-has to turn.",
+            "Boring cycle, spindle stop, rapid out",
+            "Feeds to Z, dwells for P, stops the spindle, retracts by rapid, and restarts the spindle. The spindle must turn.",
             cycle!(
                 "G86",
                 "M3",
@@ -51,10 +50,10 @@ has to turn.",
         ),
         g(
             870,
-            "Back bore",
-            "With the spindle still, goes aside by I and J, down to Z and back under the hole; with it on, feeds up \
-to K and down to Z; with it still again, goes aside, up and back, and turns it as before. With G91 K is measured \
-from Z. The spindle has to turn.",
+            "Back boring cycle",
+            "Moves aside by I and J, stops the spindle, moves down to Z and back under the hole. Then starts the spindle, \
+feeds up to K and down to Z. Then stops the spindle, moves aside, up and back, and restarts the spindle. With \
+G91 K is relative to Z. The spindle must turn.",
             cycle!(
                 "G87",
                 "M3",
@@ -67,9 +66,9 @@ from Z. The spindle has to turn.",
         ),
         g(
             880,
-            "Bore, spindle stop, up by hand",
-            "Feeds to Z, dwells for P, stops the spindle, and stops as M0 does, for a hand to take the tool out \
-(unless `psw` is 0); then goes up by traverse, and turns it as before. The spindle has to turn.",
+            "Boring cycle, spindle stop, program stop",
+            "Feeds to Z, dwells for P, stops the spindle, and stops as M0 does, so that you can take the tool out by hand. \
+With `psw` 0 it does not wait. Retracts by rapid and restarts the spindle. The spindle must turn.",
             cycle!(
                 "G88",
                 "M3",
@@ -82,7 +81,7 @@ from Z. The spindle has to turn.",
         ),
         g(
             890,
-            "Bore with dwell",
+            "Boring cycle with dwell",
             "Feeds to Z, dwells for P, and feeds up.",
             cycle!(
                 "G89",

@@ -45,18 +45,18 @@ pub(super) use speed;
 
 pub const CYCLES: Section = Section {
     title: "Canned cycles: drilling",
-    intro: "One or more holes along the axis across the plane in force; what follows calls it Z, and the others X \
-and Y. Up to R if the tool is below, over the hole, down to R, then what the cycle does, and last up: with \
-G98 to where the tool was before the series if that is above R, else to R. R, Z, P, Q and I J K stay in force \
-from line to line for as long as the same cycle goes on, so that a line with X or Y alone makes another hole. L \
-holes: with G91 each X and Y further on, with G90 all at one place. With G91 R is measured from the present \
-height, and Z from R. P is in seconds. At least one of X, Y and Z has to be on the line. A cycle stays in force \
-until another code of the group of motions.",
+    intro: "A canned cycle makes one or more holes along the axis perpendicular to the active plane. This axis is called Z \
+below, the others X and Y. The tool moves by rapids: up to R if it is below, over the hole, down to R. Then the \
+moves of the cycle follow. Last the tool retracts: with G98 to the initial level if that is above R, else to R. \
+R, Z, P, Q, I, J and K stay active as long as the same cycle continues, so that a line with only X or Y makes \
+another hole. L is the number of holes: with G91 X and Y advance at each hole, with G90 all holes are at one \
+place. With G91 R is relative to the present height, and Z to R. P is in seconds. The line needs at least one of \
+X, Y and Z. Modal.",
     docs: &[
         g(
             730,
-            "Break chips",
-            "Feeds by Q, backs up by 0.254 mm to break the chip, and so on to Z; up by traverse.",
+            "Drilling cycle with chip breaking",
+            "Feeds down by Q, retracts by 0.254 mm to break the chip, and repeats this to Z. Retracts by rapid.",
             cycle!(
                 "G73",
                 "",
@@ -69,14 +69,14 @@ until another code of the group of motions.",
         ),
         g(
             810,
-            "Drill",
-            "Feeds to Z; up by traverse.",
+            "Drilling cycle",
+            "Feeds to Z. Retracts by rapid.",
             cycle!("G81", "", "", per_turn!("G81", ""), speed!("G81", "")),
         ),
         g(
             820,
-            "Drill with dwell",
-            "Feeds to Z, dwells for P; up by traverse.",
+            "Drilling cycle with dwell",
+            "Feeds to Z and dwells for P. Retracts by rapid.",
             cycle!(
                 "G82",
                 "",
@@ -89,9 +89,9 @@ until another code of the group of motions.",
         ),
         g(
             830,
-            "Drill in pecks",
-            "Feeds by Q, traverses up to R and down again to 0.254 mm above the bottom so far, and so on to Z; up \
-by traverse.",
+            "Peck drilling cycle",
+            "Feeds down by Q, retracts to R by rapid, returns by rapid to 0.254 mm above the last depth, and repeats this to \
+Z. Retracts by rapid.",
             cycle!(
                 "G83",
                 "",
@@ -104,11 +104,11 @@ by traverse.",
         ),
         g(
             980,
-            "Cycles end where they began",
-            "At the height before the first cycle of a series, if that is above R. Stays in force; in force at \
-power-up and after M2.",
+            "Canned cycles retract to initial level",
+            "The initial level is the height before the first cycle of a series. If it is below R, cycles retract to R. \
+Modal. Active at power-up and after M2.",
             &[],
         ),
-        g(990, "Cycles end at R", "Stays in force.", &[]),
+        g(990, "Canned cycles retract to R", "Modal.", &[]),
     ],
 };

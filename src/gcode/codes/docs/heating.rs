@@ -8,14 +8,15 @@ use crate::status::Status::{
 
 pub const HEATING: Section = Section {
     title: "Heaters and fan",
-    intro: "Of printers ([printing.md](printing.md)). Each has a line without moves. Switched in turn with the moves, which go on over it; \
-a wait begins when the moves before it have been made, and keeps the lines behind it back. Stops and questions act meanwhile. Temperatures are in degrees \
-Celsius, of which eighths are kept.",
+    intro: "For printers ([printing.md](printing.md)). Each code needs a line without moves. It acts in sequence with the \
+moves and does not stop them. A wait begins after the earlier moves and holds back the later lines. Stops and \
+queries act during a wait. Temperatures are in degrees Celsius and stored in eighths.",
     docs: &[
         m(
             1_040,
-            "Heat the hot end",
-            "To S degrees; S0: off. T0 may name it. Refused above the maximum of its settings, and while a fault has locked the heaters (54).",
+            "Set hot end temperature",
+            "Sets the target to S degrees; S0 is off. T0 is allowed. Refused above the maximum of the settings, and while a \
+fault has locked the heaters (54).",
             &[
                 no(SWordMissing, &["M104"]),
                 no(OutOfRange, &["M104 S-1"]),
@@ -26,28 +27,33 @@ Celsius, of which eighths are kept.",
         ),
         m(
             1_090,
-            "Heat the hot end and wait",
-            "To S degrees, until it is as hot or hotter; or to R degrees, until it has come to it from either side. Without both it waits for what has been set. \
-0 waits for nothing.",
+            "Set hot end temperature and wait",
+            "With S, sets the target and waits until the temperature reaches or exceeds it. With R, sets the target and waits \
+for heating or cooling to it. Without both, waits for the present target. With a target of 0 there is no wait.",
             &[no(WordConflict, &["M109 S200 R200"]), no(AboveMaximum, &["M109 S300"])],
         ),
         m(
             1_400,
-            "Heat the bed",
+            "Set bed temperature",
             "As M104.",
             &[no(SWordMissing, &["M140"]), no(AboveMaximum, &["M140 S300"])],
         ),
         m(
             1_900,
-            "Heat the bed and wait",
+            "Set bed temperature and wait",
             "As M109.",
             &[no(WordConflict, &["M190 S60 R60"]), no(AboveMaximum, &["M190 S300"])],
         ),
-        m(1_160, "Wait for all heaters", "Until each that is on has come to its temperature.", &[]),
+        m(
+            1_160,
+            "Wait for all heaters",
+            "Waits until each heater that is on has reached its target.",
+            &[],
+        ),
         m(
             1_060,
-            "Fan",
-            "As fast as S says, 0 to 255 for all it can, which it is without S and above 255. P0 may name it.",
+            "Fan speed",
+            "S is the speed, 0 to 255. The fan runs at full speed without S and with S above 255. P0 is allowed.",
             &[no(PWordInvalid, &["M106 P1"]), no(SWordInvalid, &["M106 S-1"])],
         ),
         m(1_070, "Fan off", "As M106 S0.", &[no(PWordInvalid, &["M107 P1"])]),

@@ -10,16 +10,16 @@ use crate::status::Status::{
 pub const RULES: &[Rule] = &[
     Rule {
         title: "Lines",
-        text: "A line is words and comments, at most 254 bytes, 79 on the second port. Upper and lower case are the same, blanks may stand \
-anywhere, inside numbers too, and words in any order. An empty line does nothing, and so does `%` alone. The \
-bytes `!`, 4, 5 and 24 act wherever they stand, in comments too, and `%` and `~` anywhere but in comments; none of \
-them is part of any line.",
+        text: "A line consists of words and comments. It has at most 254 bytes, on the second port 79. Upper and lower case \
+mean the same. Blanks may stand anywhere, even inside numbers. Words may stand in any order. An empty line has \
+no effect, nor has a line with only `%`. The bytes `!`, 4 (`^d`), 5 and 24 (`^x`) act anywhere in a line, even \
+in comments. `%` and `~` act anywhere except in comments. None of these bytes is part of a line.",
         refusals: &[no(InputTooLong, &[LONG]), no(MalformedCommand, &["G0 *X1"])],
     },
     Rule {
         title: "Words",
-        text: "A letter and a number: sign, digits, point, digits. No exponents, expressions or parameters. Lengths \
-are exact to a ten-thousandth of a millimetre or degree.",
+        text: "A word is a letter and a decimal number, such as `X-1.5`. Exponents, expressions and parameters are not \
+supported. Lengths are exact to 0.0001 mm or degree.",
         refusals: &[
             no(MalformedCommand, &["G0 X1.2.3"]),
             no(BadNumber, &["G0 X"]),
@@ -30,8 +30,8 @@ are exact to a ten-thousandth of a millimetre or degree.",
     },
     Rule {
         title: "Codes",
-        text: "A line may have one code of each modal group. Each word has to belong to a code of the line, or to the \
-motion mode in force; two codes cannot use the same one.",
+        text: "A line may have one code of each modal group. A modal code stays active until another code of its group comes. \
+Each word must belong to a code of the line or to the active motion mode. No word may belong to two codes.",
         refusals: &[
             no(GcodeUnsupported, &["G5"]),
             no(McodeUnsupported, &["M77"]),
@@ -44,8 +44,8 @@ motion mode in force; two codes cannot use the same one.",
     },
     Rule {
         title: "Moves",
-        text: "A move has to end within the range of a position, 214 m. With `{sl:1}` it has to stay within the travel \
-of homed axes; an axis that is outside may come back in.",
+        text: "A move must end within 214 m of machine zero. With `{sl:1}` a move must stay within the travel of each homed \
+axis that it moves. An axis outside its travel may move back in.",
         refusals: &[
             no(OutOfRange, &["G0 X200000", "G91 X200000"]),
             no_on(On::SoftLimits, SoftLimit, &["G28.3 X0", "G0 X-1"]),
@@ -53,19 +53,19 @@ of homed axes; an axis that is outside may come back in.",
     },
     Rule {
         title: "F",
-        text: "The feed rate, in the units in force on its own line; see G93, G94 and G95. Stays in force until another \
-F, a change of the feed mode, or M2; with G93 it is for its line alone. F0 is none. Axes that cannot \
-follow lower it.",
+        text: "The feed rate, in the active units of its own line; see G93, G94 and G95. F stays active until another F, a \
+change of the feed mode, or M2. With G93 F applies to its own line only. F0 means no feed rate. A move is slower \
+than F if an axis cannot follow.",
         refusals: &[no(OutOfRange, &["F-1"])],
     },
     Rule {
         title: "S",
-        text: "The speed of the spindle, turns a minute. Does not turn it on. Stays in force.",
+        text: "The spindle speed in RPM. S does not switch the spindle on. S stays active.",
         refusals: &[no(SWordInvalid, &["S-1"])],
     },
     Rule {
         title: "T",
-        text: "The tool that the next M6 changes to, 0 to 255. Does nothing by itself.",
+        text: "The tool for the next M6, 0 to 255. T has no other effect.",
         refusals: &[
             no(TWordInvalid, &["T256"]),
             no(TWordInvalid, &["T1.5"]),
@@ -74,7 +74,7 @@ follow lower it.",
     },
     Rule {
         title: "N",
-        text: "The number of the line, a whole one, for reports. Lines are carried out in the order they come.",
+        text: "The line number for reports, a whole number. Lines run in the order of arrival, whatever their numbers.",
         refusals: &[
             no(BadNumber, &["N1.5"]),
             no(OutOfRange, &["N-1"]),
@@ -83,14 +83,14 @@ follow lower it.",
     },
     Rule {
         title: "Comments",
-        text: "From `(` to `)`, and from `;` to the end of the line. The text behind `MSG` at the beginning of one \
-comes back with the response.",
+        text: "A comment goes from `(` to `)`, or from `;` to the end of the line. If a comment begins with `MSG`, the response \
+contains the text after it.",
         refusals: &[no(MalformedCommand, &["G0 X1)"])],
     },
     Rule {
         title: "Block delete",
-        text: "A line that begins with `/` is not carried out, nor looked at, and answered with status 3. With `{bd:0}` the \
-slash means nothing.",
+        text: "A line that begins with `/` is skipped without a check and answered with status 3. With `{bd:0}` the slash has \
+no effect.",
         refusals: &[],
     },
 ];

@@ -8,55 +8,57 @@ use crate::status::Status::{
 /// M6. It is documented in the section of the tools.
 pub const CHANGE: Doc = m(
     60,
-    "Change the tool",
-    "Stops the spindle; from here on the tool of the last T is in it. The machine then waits for `~`, as with M0. \
-With `{psw:0}` nothing waits. Tool lengths stay as they are until G43.",
+    "Tool change",
+    "Stops the spindle. The tool of the last T becomes the tool in the spindle. The machine waits for `~`, as with \
+M0. With `{psw:0}` it does not wait. Tool lengths do not change until G43.",
     &[],
 );
 
 pub const PROGRAM: Section = Section {
     title: "Program",
-    intro: "These come last on their line, behind its moves.",
+    intro: "These codes act last on their line, after its moves.",
     docs: &[
         m(
             0,
-            "Stop",
-            "The machine comes to rest and says so (`stat` 3, and an exception 38). It waits for `~` and then goes on. \
-Lines of G-code that come meanwhile wait as well. The spindle goes on turning. With `{psw:0}` the machine goes on at once.",
+            "Program stop",
+            "The machine stops and reports it (`stat` 3, exception 38). It waits for `~`, then continues. Lines of G-code \
+that arrive meanwhile wait as well. The spindle keeps turning. With `{psw:0}` the machine continues at once.",
             &[],
         ),
-        m(10, "Stop if wanted", "The same as M0 with `{ost:1}`; without, nothing.", &[]),
+        m(10, "Optional stop", "With `{ost:1}` as M0. With `{ost:0}` no effect.", &[]),
         m(
             20,
-            "End",
-            "The machine comes to rest and says so (`stat` 4). Spindle and coolant are off, overrides on with the factors \
-they had. In force: G1 with no feed, G91.1, G94, G98, no G92; plane, units, coordinate system, path and distance mode \
-as the settings `gpl`, `gun`, `gco`, `gpa` and `gdi` say. Tool, tool length, tables and position stay.",
+            "Program end",
+            "The machine stops and reports it (`stat` 4). Spindle and coolant are off, on a printer also heaters and fan. \
+Overrides are on and keep their factors. G1 without a feed, G91.1, G94 and G98 become active, and G92 is reset. The settings \
+`gpl`, `gun`, `gco`, `gpa` and `gdi` give plane, units, coordinate system, path and distance mode. Tool, tool \
+length, tables and position do not change.",
             &[],
         ),
-        m(300, "End", "The same as M2.", &[]),
-        m(600, "Stop", "The same as M0.", &[]),
+        m(300, "Program end", "As M2.", &[]),
+        m(600, "Program stop (pallet change)", "As M0.", &[]),
     ],
 };
 
 pub const SPINDLE: Section = Section {
     title: "Spindle and coolant",
-    intro: "Switched in turn with the moves, before a move on the same line.",
+    intro: "Spindle and coolant switch in sequence with the moves, before a move on the same line.",
     docs: &[
         m(
             30,
             "Spindle clockwise",
-            "Turns until M4, M5, M6 or the end of the program. Sets the enable and direction pins, and the PWM for S (settings `p1`); \
-the speed S is reported, and G95 goes by it.",
+            "The spindle turns until M4, M5, M6 or the end of the program. Sets the enable and direction pins, and the PWM \
+for S (settings `p1`). Reports show S, and G95 uses it.",
             &[],
         ),
-        m(40, "Spindle counter-clockwise", "The same the other way round.", &[]),
+        m(40, "Spindle counter-clockwise", "As M3, but counter-clockwise.", &[]),
         g(
             960,
             "Constant surface speed",
-            "S is the speed of the surface that is cut: m/min, or feet a minute with G20. The spindle turns as fast as that asks for at the radius \
-where X is, and follows X each 20 ms while it moves. X 0 of the coordinates in force, with their offsets, is the axis of rotation. D is the most turns a minute, \
-whatever the override; without D it is 65,535. S is needed on the line; a later S alone is a surface speed, too. The range of `p1` counts as ever.",
+            "S is the surface speed at the tool in m/min, with G20 in feet per minute. The distance of X from 0 is the \
+radius. The spindle speed follows from both, and is updated every 20 ms while X moves. X 0 in the active \
+coordinates, with all offsets, must be the spindle axis. D is the maximum RPM, also under an override; without D \
+it is 65,535. The line needs S. A later S alone is a surface speed, too. The range of `p1` still applies.",
             &[
                 no(SWordMissing, &["G96 D2000"]),
                 no(OutOfRange, &["G96 S100 D0"]),
@@ -68,38 +70,37 @@ whatever the override; without D it is 65,535. S is needed on the line; a later 
         ),
         g(
             970,
-            "Turns a minute",
-            "S is turns a minute. Without S the spindle goes on as fast as G96 asks for where the program is. In force at power-up and after M2.",
+            "RPM mode",
+            "S is in RPM. Without S the spindle keeps the speed of G96 at the programmed X. Active at power-up and after M2.",
             &[],
         ),
-        m(50, "Spindle off", "S is remembered. In force at power-up and after M2.", &[]),
+        m(50, "Spindle off", "Keeps S. Active at power-up and after M2.", &[]),
         m(
             70,
-            "Mist",
-            "Mist runs, until M9 or the end of the program. Flood stays what it is.",
+            "Mist coolant",
+            "Mist is on until M9 or the end of the program. Flood does not change.",
             &[],
         ),
         m(
             80,
-            "Flood",
-            "Flood runs, until M9 or the end of the program. Mist stays what it is.",
+            "Flood coolant",
+            "Flood is on until M9 or the end of the program. Mist does not change.",
             &[],
         ),
-        m(90, "No coolant", "Mist and flood are off. In force at power-up and after M2.", &[]),
+        m(90, "Coolant off", "Mist and flood are off. Active at power-up and after M2.", &[]),
     ],
 };
 
 pub const OVERRIDES: Section = Section {
     title: "Overrides",
-    intro: "Factors by which rates and speeds are multiplied from here on: 1 is as programmed. Each \
-has a factor and is on or off; off, it keeps its factor. At power-up and after M2 all are on; at power-up all \
-factors are 1.",
+    intro: "An override multiplies rates or speeds by a factor; 1 is as programmed. Each override is on or off, and keeps \
+its factor while it is off. At power-up and after M2 all overrides are on. At power-up all factors are 1.",
     docs: &[
-        m(480, "Overrides on", "All three.", &[]),
+        m(480, "Overrides on", "Switches all three overrides on.", &[]),
         m(
             481,
-            "Feed override to",
-            "Feed rates are multiplied by P, 0 to 2. 0 is carried out as 0.001.",
+            "Set feed override",
+            "Multiplies feed rates by P, 0 to 2. P0 acts as 0.001.",
             &[
                 no(PWordMissing, &["M48.1"]),
                 no(PWordInvalid, &["M48.1 P-1"]),
@@ -108,33 +109,33 @@ factors are 1.",
         ),
         m(
             482,
-            "Traverse override to",
-            "Traverse rates are multiplied by P, 0 to 1. 0 is carried out as 0.001.",
+            "Set rapid override",
+            "Multiplies rapid rates by P, 0 to 1. P0 acts as 0.001.",
             &[
                 no(PWordMissing, &["M48.2"]),
                 no(PWordInvalid, &["M48.2 P-1"]),
                 no(PWordInvalid, &["M48.2 P1.001"]),
             ],
         ),
-        m(490, "Overrides off", "All three.", &[]),
+        m(490, "Overrides off", "Switches all three overrides off.", &[]),
         m(491, "Feed override off", "Feed rates are as programmed.", &[]),
-        m(492, "Traverse override off", "Traverses are as fast as the axes may.", &[]),
+        m(492, "Rapid override off", "Rapids are as fast as the axes can.", &[]),
         m(
             500,
             "Feed override",
-            "With P as M48.1; P0: off; without P: on, with the factor it has.",
+            "P sets the factor, as M48.1. P0 switches the override off. Without P it is on with its present factor.",
             &[no(PWordInvalid, &["M50 P2.001"]), no(PWordInvalid, &["M50 P-1"])],
         ),
         m(
             501,
-            "Traverse override",
-            "With P as M48.2; P0: off; without P: on, with the factor it has.",
+            "Rapid override",
+            "P sets the factor, as M48.2. P0 switches the override off. Without P it is on with its present factor.",
             &[no(PWordInvalid, &["M50.1 P1.001"])],
         ),
         m(
             510,
             "Spindle override",
-            "As M50, of the speed of the spindle, 0.05 to 2. `{sso:n}` shows it.",
+            "As M50, for the spindle speed. P is 0.05 to 2. `{sso:n}` shows the factor.",
             &[no(PWordInvalid, &["M51 P0.049"]), no(PWordInvalid, &["M51 P2.001"])],
         ),
     ],

@@ -16,23 +16,23 @@ const PREFACE: &str = "\
 
 <!-- Made from `src/gcode/codes` by `cargo xtask docs`: change it there. -->
 
-Kerf speaks the language of RS274/NGC, with some codes of LinuxCNC and TinyG. A line that is refused changes
+Kerf runs the G-code of RS274/NGC, and some codes of LinuxCNC and TinyG. A line that is refused changes
 nothing and moves nothing; its response has the status.
 
-Whatever the order of the words, a line is carried out in this one: units, feed mode, F, S, T, M6, spindle,
+The order of the words in a line has no effect. A line runs in this order: units, feed mode, F, S, T, M6, spindle,
 coolant, overrides, dwell, plane, tool length, coordinate system, path, distances, retract mode, G10 G28 G30 G92
-and their kin, motion, stop.
+and related codes, motion, stop.
 
-Where others may do otherwise:
+Differences from some other controllers:
 
-- F is in the units of its own line: `G20 F10` is 10 inches a minute.
+- F is in the units of its own line: `G20 F10` is 10 inches per minute.
 - G53 is for G0 and G1 only; its words are absolute even in G91.
-- G28 and G30 with axis words move the named axes alone.
-- G43 without H takes the tool in the spindle; H0 is no tool.
+- G28 and G30 with axis words move only the named axes.
+- G43 without H uses the tool in the spindle; H0 is no tool.
 - M6 stops the spindle. The machine then waits for `~`; with `{psw:0}` it does not wait.
-- G88 goes back up by itself after its stop.
-- G95 goes by the speed that is programmed, not by the one that an encoder measures.
-- Overrides act when the moves before them have been made, and stop nothing; requests (`mfo`) act at once.
+- G88 retracts by itself after its stop.
+- G95 uses the programmed S. With an encoder, feeds are slower while the spindle is slower than S.
+- M48 to M51 act after the moves before them, without a stop; override requests (`mfo`) act at once.
 - M2 and M30 reset more than the standard says; see M2.
 
 ";
@@ -40,7 +40,7 @@ Where others may do otherwise:
 /// Returns the whole document.
 pub fn markdown() -> String {
     let mut text = PREFACE.to_string();
-    text += "## Overview\n\nWords in bold are needed; of axes at least one. A code with a capability is refused with status ";
+    text += "## Overview\n\nWords in bold are required; of the axes at least one. A code with a capability is refused with status ";
     text += &format!("{} by an image\nthat lacks it: see ", number(Status::NotBuiltIn));
     text += "[what an image may lack](protocol.md#what-an-image-may-lack).\n\n";
     text += "| Code | | Group | Words | Capability |\n|---|---|---|---|---|\n";

@@ -8,97 +8,102 @@ use crate::status::Status::{
 
 pub const MODES: Section = Section {
     title: "Planes, units, distances, path",
-    intro: "Each of these stays in force until another one of its group comes.",
+    intro: "All these codes are modal.",
     docs: &[
         g(
             170,
             "XY plane",
-            "Arcs lie in XY, canned cycles go along Z. In force at power-up and after M2, unless `gpl` says \
-otherwise.",
+            "Arcs lie in XY. Canned cycles move along Z. Active at power-up and after M2, unless `gpl` selects another plane.",
             &[],
         ),
-        g(180, "ZX plane", "Arcs lie in ZX, canned cycles go along Y.", &[]),
-        g(190, "YZ plane", "Arcs lie in YZ, canned cycles go along X.", &[]),
+        g(180, "ZX plane", "Arcs lie in ZX. Canned cycles move along Y.", &[]),
+        g(190, "YZ plane", "Arcs lie in YZ. Canned cycles move along X.", &[]),
         g(
             200,
             "Inches",
-            "Lengths are inches and F inches a minute, from this line on, whatever its order. Degrees stay \
-degrees. Reports and settings speak inches too.",
+            "Lengths are in inches and F in inches per minute, for this whole line and the lines after it. Rotary axes stay \
+in degrees. Reports and settings use inches too.",
             &[],
         ),
         g(
             210,
             "Millimetres",
-            "Lengths are millimetres and F millimetres a minute, from this line on, whatever its order. In \
-force at power-up and after M2, unless `gun` says otherwise.",
+            "Lengths are in millimetres and F in millimetres per minute, for this whole line and the lines after it. Active \
+at power-up and after M2, unless `gun` selects inches.",
             &[],
         ),
-        g(400, "No cutter compensation", "There never is any.", &[]),
+        g(400, "Cutter compensation off", "No effect: Kerf has no cutter compensation.", &[]),
         g(410, "Cutter compensation, left", COMPENSATION, &[no(CutterCompensation, &["G41"])]),
         g(420, "Cutter compensation, right", COMPENSATION, &[no(CutterCompensation, &["G42"])]),
         g(
             610,
             "Exact path",
-            "The path is followed exactly, without a stop where none is needed. Each move is made by itself.",
+            "Follows the path exactly, without a stop where none is needed. Moves are not merged.",
             &[],
         ),
-        g(611, "Exact stop", "Each move ends at rest; the chords of an arc do not.", &[]),
+        g(
+            611,
+            "Exact stop",
+            "Stops at the end of each move, but not between the chords of an arc.",
+            &[],
+        ),
         g(
             640,
             "Continuous path",
-            "The path is followed without a stop where none is needed. Short feed moves of linear axes that lie on a line, to within P, are \
-made one: up to 12 ms of them, or 3.2 mm. P is 0.001 mm if it is not given, and 0.0254 mm at most; with 0 they lie on the line exactly. On \
-a curve on which none can be made one with the next, only every eighth is looked at. In force at power-up and after M2, unless `gpa` says otherwise.",
+            "Follows the path without a stop where none is needed. Short feed moves of linear axes are merged if they lie on \
+a straight line within P. A merged move takes at most 12 ms and has at most 3.2 mm. P is 0.001 mm by default and \
+0.0254 mm at most; with P0 only exactly collinear moves are merged. On a curve where no moves can be merged, \
+only every eighth move is tested, later every 32nd. Active at power-up and after M2, unless `gpa` selects \
+another mode.",
             &[no(PWordNegative, &["G64 P-0.001"])],
         ),
         g(
             70,
-            "Diameters",
-            "X words are diameters from this line on, whatever they are for: moves, G10, G92 and the others. X moves by half of each. I of an arc is a \
-radius still, and so is X in reports and settings.",
+            "Diameter mode",
+            "X words are diameters from this line on, for moves, G10, G92 and all other codes. X moves by half the value. I \
+of an arc is always a radius, and so is X in reports and settings.",
             &[],
         ),
-        g(80, "Radii", "X words are radii. In force at power-up and after M2.", &[]),
+        g(80, "Radius mode", "X words are radii. Active at power-up and after M2.", &[]),
         g(
             900,
-            "Absolute distances",
-            "Axis words are positions in the coordinate system in force. In force at power-up and after M2, \
-unless `gdi` says otherwise.",
+            "Absolute distance mode",
+            "Axis words are positions in the active coordinate system. Active at power-up and after M2, unless `gdi` selects \
+G91.",
             &[],
         ),
         g(
             901,
             "Absolute arc centres",
-            "I, J and K of arcs are positions in the coordinate system in force.",
+            "I, J and K of arcs are positions in the active coordinate system.",
             &[],
         ),
         g(
             910,
-            "Incremental distances",
-            "Axis words are measured from the present position. What rounding takes is carried on, so that \
-increments add up exactly.",
+            "Incremental distance mode",
+            "Axis words are distances from the present position. Rounding errors are carried over, so that increments add up \
+exactly.",
             &[],
         ),
         g(
             911,
             "Incremental arc centres",
-            "I, J and K of arcs are measured from the start of the arc. In force at power-up and after M2.",
+            "I, J and K of arcs are distances from the start of the arc. Active at power-up and after M2.",
             &[],
         ),
     ],
 };
 
-const COMPENSATION: &str =
-    "Always refused: the program has to come with the radius of the tool worked in.";
+const COMPENSATION: &str = "Always refused. The CAM program must compensate for the tool radius.";
 
 pub const FEEDS: Section = Section {
     title: "Feed modes",
-    intro: "Each stays in force until another one comes. A change of the mode forgets F.",
+    intro: "All these codes are modal. A change of the feed mode clears F.",
     docs: &[
         g(
             930,
-            "Inverse time",
-            "Each feed move takes 1/F minutes and needs an F of its own.",
+            "Inverse time mode",
+            "Each feed move takes 1/F minutes and needs its own F.",
             &[
                 no(FeedrateMissing, &["G93 G1 X1 F2", "X2"]),
                 no(InverseTimeNotAllowed, &["G93 G81 X1 Z-1 R1 F2"]),
@@ -106,16 +111,17 @@ pub const FEEDS: Section = Section {
         ),
         g(
             940,
-            "Units per minute",
-            "F is the speed along the path, in the units in force a minute. In force at power-up and after M2.",
+            "Units per minute mode",
+            "F is the speed along the path, in the active units per minute. Active at power-up and after M2.",
             &[no(FeedrateMissing, &["G93 G1 X1 F2", "G94 X2"])],
         ),
         g(
             950,
-            "Units per turn",
-            "F is the way for each turn of the spindle. Feeds are planned for the speed S that has been programmed, with G96 that at the end of the move. \
-With an encoder (`spn`) they follow the speed that it measures, to 0.5 %, each 20 ms, up to S: a spindle that is slower has slower feeds, and one that stands still none. A faster one, as by \
-its override, does not count, nor does any without an encoder.",
+            "Units per revolution mode",
+            "F is the distance per revolution of the spindle. With an encoder (`spn`) feeds follow the measured speed, to 0.5 \
+%, every 20 ms, up to S. A slower spindle makes feeds slower, a stopped one stops them. A spindle that is faster \
+than S, for example by its override, does not make feeds faster. Without an encoder feeds are those for S. With \
+G96 the S of a move is that at its end.",
             &[
                 no(FeedrateMissing, &["M3 S1000", "F100", "G95 G1 X1"]),
                 no(SpindleMustTurn, &["G95 G1 X1 F0.1"]),

@@ -66,22 +66,20 @@ macro_rules! thread {
 
 pub const MOVES: Section = Section {
     title: "Moves",
-    intro: "Axis words on a line without a code of this group move in the mode that is in force. X, Y and \
-Z are in the units in force, A, B and C in degrees (an axis in radius mode: a length along its \
-circumference).",
+    intro: "Axis words on a line without a code of this group move in the active motion mode. X, Y and Z are in the active \
+units. A, B and C are in degrees, or lengths along the circumference if the axis is in radius mode (`am` 3).",
     docs: &[
         g(
             0,
-            "Traverse",
-            "Straight to the axis words, as fast as the axes may. Stays in force. Without axis words \
-nothing moves.",
+            "Rapid move",
+            "Moves straight to the axis words, as fast as the axes can. Modal. Without axis words nothing moves.",
             &[],
         ),
         g(
             10,
-            "Feed",
-            "Straight to the axis words at the feed rate F. If only A, B and C move, F is in degrees. Stays in \
-force, and needs a feed even without axis words.",
+            "Linear move",
+            "Moves straight to the axis words at the feed rate F. If only A, B and C move, F is in degrees. Modal. F is \
+required even without axis words.",
             &[
                 no(FeedrateMissing, &["G1 X1"]),
                 no(SpindleMustTurn, &["G95 F0.1", "G1 X1"]),
@@ -89,12 +87,11 @@ force, and needs a feed even without axis words.",
             ],
         ),
         g(20, "Arc, clockwise", ARC, arc!("G2")),
-        g(30, "Arc, counter-clockwise", "As G2, the other way round.", arc!("G3")),
+        g(30, "Arc, counter-clockwise", "As G2, but counter-clockwise.", arc!("G3")),
         g(
             40,
             "Dwell",
-            "Stands still for P seconds, to the millisecond, after the moves before it and before a move on \
-the same line.",
+            "Pauses for P seconds, to the millisecond. The pause comes after earlier moves and before a move on its own line.",
             &[
                 no(PWordMissing, &["G4"]),
                 no(PWordNegative, &["G4 P-1"]),
@@ -103,27 +100,31 @@ the same line.",
         ),
         g(
             800,
-            "No motion mode",
-            "Ends canned cycles. Until another code of the group comes, axis words move nothing and are \
-refused. Beside another code of the group it only ends them, as in `G0 G80 G90`. In force at power-up.",
+            "Cancel motion mode",
+            "Ends canned cycles. Axis words are refused until another code of the group comes. Beside another code of the \
+group G80 only ends canned cycles, as in `G0 G80 G90`. Active at power-up.",
             &[no(AxisNotAllowed, &["G80 X1"])],
         ),
-        g(320, "Thread", "The same as G33.", thread!("G32")),
+        g(320, "Spindle-synchronized motion", "As G33.", thread!("G32")),
         g(
             330,
-            "Thread",
-            "Straight to the axis words in step with the spindle, by its encoder (`spn`); see lathe.md. K, on each line, is the way in a turn of the axis \
-that moves farthest: the lead. F does not count. The machine comes to rest, waits for the index, and goes so that each pass lies in the one \
-before, whatever the speed. Feed override and `!` wait for the end of the pass. If there are no pulses for 6 seconds (42, 43), or an axis would \
-be too fast (146), an alarm says so, and nothing moves. A spindle that is lost in the cut is an alarm (44): the axes come to rest.",
+            "Spindle-synchronized motion",
+            "Cuts a thread: moves straight to the axis words in step with the spindle encoder (`spn`); see lathe.md. K is the \
+lead: the distance per turn of the axis that moves farthest. Each line needs K. F has no effect. The machine \
+stops, waits for the index pulse, and starts so that each pass follows the groove of the previous pass at any \
+speed. Feed override has no effect in the pass. `!` waits for the end of the pass, unless `spr` is set. If no \
+pulses come for 6 seconds (42, 43), or if an axis would be too fast (146), an alarm is raised and nothing moves. \
+If the spindle stops in the cut, the axes come to rest with alarm 44.",
             thread!("G33"),
         ),
         g(
             331,
             "Rigid tapping",
-            "As G33 to the axis words, where the spindle is told to turn round; the axes follow it until it stands, and back in step. Where the \
-line began the spindle is told to turn as before, and when it has turned round the axes go back to there. So the tap goes on beyond the axis words while the spindle \
-slows down: leave room for it. If it has not turned round within the way of a second, that is an alarm (47). It needs M3 or M4. `!` waits for the end.",
+            "Moves to the axis words as G33 does. There Kerf reverses the spindle; the axes follow it to its stop and back in \
+step. At the start of the line Kerf reverses the spindle again. Once it has reversed, the axes return to the \
+start. The tap overshoots the axis words while the spindle slows down: leave room for it. If the spindle does \
+not reverse within the travel of one second, alarm 47 is raised. M3 or M4 must be active. `!` waits for the \
+end of the cycle.",
             &[
                 no_on(On::NoSwitches, NoEncoder, &["M3 S100 G33.1 Z-5 K1"]),
                 no(AxisWordMissing, &["M3 S100 G33.1 K1"]),
@@ -136,11 +137,13 @@ slows down: leave room for it. If it has not turned round within the way of a se
         g(
             760,
             "Threading cycle",
-            "A thread along Z in several passes, each as G33 and in the one before. The drive line is parallel to Z through where X is. Z is where passes end; P the \
-lead; I from the drive line to the peak of the thread, negative for an outer thread, positive for an inner one; J the depth of the first pass and K of the last, from the peak. \
-The n-th pass is J n^(1/R) deep: R1, if it is not given, as much each time, R2 the same area. Q is the compound slide angle, 0 to 80 degrees: a pass begins depth tan Q further on. H more \
-passes are made at the full depth. E is how long a taper is along Z, where L says: L1 at the entry, L2 at the exit, L3 both. With G7, I, J and K are diameters. The tool ends on the drive line at Z. \
-Before the first index pulse nothing moves (42, 43). Words are for their line.",
+            "Cuts a thread along Z in several passes. Each pass moves as G33 does and follows the groove of the previous \
+pass. The drive line is parallel to Z at the starting X. Passes end at Z. P is the lead. I is the distance from \
+the drive line to the thread peak: negative for an external thread, positive for an internal one. J is the depth \
+of the first pass, K that of the last, from the peak. Pass n is J n^(1/R) deep: R1, the default, makes equal \
+depth steps, R2 equal chip areas. Q is the compound slide angle, 0 to 80 degrees: a pass of depth d begins d tan Q further along Z. H is the number of additional passes at full depth. E is the length of a taper along Z. L is its \
+place: 1 entry, 2 exit, 3 both. With G7, I, J and K are diameters. The tool ends on the drive line at Z. Nothing \
+moves before the first index pulse (42, 43). The words apply to their own line only.",
             &[
                 no_on(On::NoSwitches, NoEncoder, &["G76 P1 Z-10 I-1 J0.2 K0.6"]),
                 no(AxisWordMissing, &["G76 P1 I-1 J0.2 K0.6"]),
@@ -164,25 +167,26 @@ Before the first index pulse nothing moves (42, 43). Words are for their line.",
     ],
 };
 
-const ARC: &str = "From here to the axis words around a centre, in the plane in force, seen from the \
-positive end of the third axis, along which a helix advances. The centre is at I, J, K (with G91.1 from the \
-start, where one of two may be left out, with G90.1 from the origin), or R is the radius, negative for the \
-long way round. Without an end point in the plane: a full circle. P full turns more; of a full circle, P \
-turns in all. Radii at start and end may differ by 5 um, or by a thousandth, but never by 1 mm; the smallest \
-R is 0.001 mm. Stays in force.";
+const ARC: &str = "Moves along an arc to the axis words, in the active plane. The direction is that seen from the positive end of \
+the third axis. A word of the third axis makes a helix. I, J and K give the centre: with G91.1 relative to the \
+start, where one of the two words may be omitted, with G90.1 relative to the origin. Instead of them R may give \
+the radius; a negative R selects the longer arc. Without an end point in the plane the arc is a full circle. P \
+adds full turns; for a full circle P is the number of turns. The radii at start and end may differ by 5 um or by \
+a thousandth, but never by more than 1 mm. The smallest R is 0.001 mm. Modal.";
 
 pub const PROBES: Section = Section {
     title: "Probing",
     intro: "",
     docs: &[
-        g(382, "Probe until it touches", PROBE, probe!("G38.2")),
-        g(383, "Probe until it touches, if it does", QUIET, probe!("G38.3")),
-        g(384, "Probe until it lets go", PROBE, probe!("G38.4")),
-        g(385, "Probe until it lets go, if it does", QUIET, probe!("G38.5")),
+        g(382, "Probe towards, alarm without contact", PROBE, probe!("G38.2")),
+        g(383, "Probe towards, no alarm", QUIET, probe!("G38.3")),
+        g(384, "Probe away, alarm without release", PROBE, probe!("G38.4")),
+        g(385, "Probe away, no alarm", QUIET, probe!("G38.5")),
     ],
 };
 
-const PROBE: &str = "Moves straight towards the axis words at the feed rate until the probe changes. X, Y and Z \
-only, at least 0.254 mm. The machine stops beyond the contact point (`prb`) and returns to it at the same feed, so that G10 L20 and G92 in \
-the next line apply to the contact point. With `pbo` 0 it stays where it has stopped. A move that ends without a contact raises an alarm. Refused on machines without a probe.";
-const QUIET: &str = "As the code above, but a move that ends without a contact raises no alarm.";
+const PROBE: &str = "Moves straight towards the axis words at the feed rate until the probe changes. Only X, Y and Z may move, by at \
+least 0.254 mm. The machine stops beyond the contact point (`prb`) and returns to it at the same feed, so that \
+G10 L20 and G92 in the next line apply to the contact point. With `pbo` 0 it stays where it has stopped. If the \
+probe does not change, an alarm is raised. Refused on machines without a probe.";
+const QUIET: &str = "As the code above, but no alarm is raised.";
