@@ -29,7 +29,7 @@ Requests, in JSON and in text mode:
 | write | `{xvm:1200}` | `$xvm=1200` |
 | restore all defaults | `{defa:1}` | `$defa=1` |
 
-A setting takes effect before its response is sent, for the lines behind it. Moves that are under way or queued keep the limits
+A setting takes effect before its response is sent, for the lines after it. Moves that are running or queued keep the limits
 with which they were planned. A setting survives a power cut, unless its description says otherwise. After G20,
 lengths are read and written in inches; values of rotary axes stay in degrees. A write is refused with one of these statuses:
 
@@ -53,13 +53,13 @@ const MACHINES: &str = "\
 ## Machines
 
 `{mch:1}` sets all settings of motors and axes, `ja`, `ct` and `gpl` to the values of that machine. All other settings stay as they
-are. While anything moves, the request is refused with status 106. `{mch:n}` reads which machine was chosen last, even if settings have been changed
+are. While anything moves, the request is refused with status 106. `{mch:n}` reads the machine that was chosen last, even if settings have been changed
 since. In an image that is built with `--machine NAME`, the values of that machine are the defaults. The values are a starting point: check `tr`,
-`sa`, `mi` and the travel against your machine before you trust them. Storing takes about 2.4 s: wait until `{kept:n}` is 1. After a power cut
-before that, some settings may have their old values: choose the machine again.
+`sa`, `mi` and the travel against your machine before you trust them. Storing takes about 2.4 s: wait until `{kept:n}` is 1. If the power
+is cut before that, some settings may have their old values: choose the machine again.
 
-After homing an axis stands at one end of its travel: at `tn` if it homes to the lower switch, at `tm` if it homes to the upper one. On all machines
-but the `printer` Z homes upwards, and machine zero is the top of Z. On the `printer` Z 0 is the bed.
+After homing an axis stands at one end of its travel: at `tn` if it homes to the lower switch, at `tm` if it homes to the upper one. Z homes upwards on
+all machines except the `printer`, and machine zero is the top of Z. On the `printer` Z 0 is the bed.
 
 ";
 
@@ -79,10 +79,10 @@ others (`{g54:{x:1,y:2}}`). Lengths and angles have four decimals.
 A new value takes effect before its response is sent; that of a tool takes effect with the next G43. All values are 0 at first. `$o` and `$$`
 list all of these groups except the tools. Values that survive a power cut cannot be in status reports.
 
-## A program of your own
+## Stored program
 
 Kerf stores one program of G-code, for example to measure a tool or to move to a fixed position. The program has room for 783 bytes, 607 in
-an image that can print. Each line counts with one byte for its end, and may have 48 bytes.
+an image that can print. A line may have 48 bytes, and takes one byte more for its end.
 
 | | JSON | Text |
 |---|---|---|
@@ -93,11 +93,11 @@ an image that can print. Each line counts with one byte for its end, and may hav
 | run the program | `{test:100}` | `$test=100` |
 | stop the program | `{test:0}` | `$test=0` |
 
-The program exists once the response to `{prog:t}` has status 0. From `{prog:f}` until then there is no program, and a power cut leaves none.
+The program is stored once the response to `{prog:t}` has status 0. From `{prog:f}` until then there is no program, even after a power cut.
 A program can be stored only at rest (106). Status 34 means that there is no room for it.
 
 The program ends with M2, M30 or its last line, as a built-in job does. Once its motion is done, an exception report has status 8. If a line is
-refused, the program ends, and an exception report has the reason at once. Lines are not checked when they are stored, only when they are run.
+refused, the program ends, and an exception report gives the reason at once. Lines are not checked when they are stored, only when they are run.
 ";
 
 /// Returns the whole text of `docs/settings.md`.

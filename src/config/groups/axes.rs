@@ -10,10 +10,10 @@ group! {
             "0 disabled, 1 standard, 2 inhibited: the position counts, the motors do not move, 3 radius: axis words are lengths, which `ra` converts to angles.";
         VM "vm": fixed(3, 0, POSITIVE).with(UNIT), [800_000, 800_000, 800_000, 230_400_000, 3_600_000, 3_600_000],
             length(text!("velocity maximum"), SPEED),
-            "Maximum velocity of traverses (G0). Kerf lowers a value that the motors cannot follow, and a message says so.";
+            "Maximum velocity of rapid moves (G0). Kerf lowers a value that the motors cannot follow, and a message says so.";
         FR "fr": fixed(3, 0, POSITIVE).with(UNIT), [800_000, 800_000, 800_000, 230_400_000, 3_600_000, 3_600_000],
             length(text!("feedrate maximum"), SPEED),
-            "Maximum velocity of feeds (G1, G2, G3). Kerf lowers a value that the motors cannot follow, and a message says so.";
+            "Maximum velocity of feed moves (G1, G2, G3). Kerf lowers a value that the motors cannot follow, and a message says so.";
         TN "tn": fixed(4, 3, ANY).with(UNIT | CLAMP), [0, 0, 0, -1_0000, -1_0000, -1_0000],
             length(text!("travel minimum"), NONE),
             "Travel minimum: lower end of travel in machine coordinates, for soft limits (`sl`). It is also the position after homing to the lower switch. -214748.3647 means no limit.";
