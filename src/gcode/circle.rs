@@ -166,8 +166,8 @@ fn turns(block: &Block) -> Result<u16, Status> {
     }
 }
 
-/// Refuses a centre from which start and end are not equally far. Refuses also a centre that sees start and end in the
-/// same direction although they differ.
+/// Refuses a centre from which start and end are not equally far. Also refuses a centre from which start and end,
+/// although different points, lie in the same direction.
 fn check_radii(arc: &Arc, start: &PerAxis<Length>, target: &PerAxis<Length>) -> Result<(), Status> {
     let [from, to] = [arc::spoke(start, arc), arc::spoke(target, arc)];
     let radius = math::sqrt(from[0] * from[0] + from[1] * from[1]);

@@ -230,9 +230,9 @@ pub enum Motion {
         /// Where to.
         target: PerAxis<Length>,
     },
-    /// `{chk:1}` and `{chk:0}`: from here on lines are only checked, or are carried out again.
+    /// `{chk:1}` and `{chk:0}`: the lines that follow are only checked, or are executed again.
     Check,
-    /// From here on moves follow the plane of the bed (true), or do not.
+    /// The moves that follow are corrected for the tilt of the bed (true), or are not.
     #[cfg(feature = "bed-plane")]
     FollowBed(bool),
     /// M104 to M190: heaters and the fan.

@@ -57,9 +57,9 @@ struct Words<'a> {
     line: u32,
     /// Whether a printing host has written the line.
     prints: bool,
-    /// What rounding has taken from previous E words, if the E word is relative.
+    /// The residue of rounding from previous E words, if the E word is relative.
     carried: Option<i16>,
-    /// What rounding takes from the E word of this line.
+    /// The residue of rounding from the E word of this line.
     rest: i16,
 }
 
@@ -342,7 +342,7 @@ impl<'a> Words<'a> {
     }
 
     /// Completes an E word whose first four decimals have been read. Adds the fifth decimal, and for a relative E word
-    /// what rounding has taken from previous ones.
+    /// the residue of rounding from previous ones.
     #[inline(never)]
     fn filament(&mut self, value: Length) -> Length {
         let mut by = Exact { units: value, rest: 0 };

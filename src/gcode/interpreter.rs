@@ -38,7 +38,7 @@ pub struct Info {
     pub commented: bool,
 }
 
-/// The state of the G-code interpreter, and the keeper of its tables.
+/// The state of the G-code interpreter, and the tables that outlast a program.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Interpreter<T = Ram> {
     pub(super) state: State,
@@ -373,8 +373,8 @@ impl<T: Tables> Interpreter<T> {
         )
     }
 
-    /// Restores what [`Self::keep`] has returned, and moves the model to `place`, where the machine is. A canned cycle
-    /// that was in force is cancelled. An axis that has lost its home meanwhile is not homed.
+    /// Restores what [`Self::keep`] has returned, and moves the model to `place`, the position of the machine. Cancels
+    /// a canned cycle that was in force. An axis that was marked as not homed in the meantime stays so.
     #[inline(never)]
     pub fn give_back(&mut self, modes: &Modes, offsets: &Offsets, place: &PerAxis<Length>) {
         let state = &mut self.state;
@@ -516,7 +516,7 @@ impl<T> Interpreter<T> {
         self.state.modal.coolant = coolant;
     }
 
-    /// Moves the model to where the machine is: after homing, and after the queue was dropped.
+    /// Moves the model to the position of the machine: after homing, and after the queue was dropped.
     pub fn set_position(&mut self, machine: &PerAxis<Length>) {
         self.state.position = *machine;
         self.state.residue = [0; AXES];

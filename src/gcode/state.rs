@@ -31,7 +31,7 @@ pub struct State {
     /// F as written, while G94 or G95 is in force. 0 if no F is in force.
     pub feed: f32,
     pub line: u32,
-    /// What rounding has taken from `position`, in ten-thousandths of a unit. Incremental moves add it to the next
+    /// The residue of rounding in `position`, in ten-thousandths of a unit. Incremental moves add it to the next
     /// length.
     pub residue: PerAxis<i16>,
     /// End of the last move, machine coordinates.

@@ -191,7 +191,7 @@ const fn ops(some: &[Op]) -> [Op; OPS] {
 
 #[small]
 impl Steps {
-    /// Returns the next step of a line. `position` is where the machine is. `None` after the last step.
+    /// Returns the next step of a line. `position` is the position of the machine. `None` after the last step.
     #[inline(never)]
     pub fn next(&mut self, commands: &Commands, position: &PerAxis<Length>) -> Option<Step> {
         loop {

@@ -1,7 +1,7 @@
 //! Sticky words: the words of canned cycles that stay in force from line to line (RS274/NGC 3.5.16).
 //!
-//! Numbers are kept as written, in units of a length, because R and Z have a different meaning with G90 and with G91.
-//! They stay in force while the same cycle goes on in the same plane.
+//! Numbers are kept as they were written, in units of a length, because R and Z have a different meaning with G90 and
+//! with G91. They stay in force while the same cycle goes on in the same plane.
 
 use super::axes;
 use super::block::Block;

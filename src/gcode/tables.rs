@@ -81,12 +81,12 @@ pub struct Edit {
     pub values: PerAxis<Length>,
 }
 
-/// The keeper of the rows.
+/// Storage for the rows.
 pub trait Tables {
     /// Returns the values of a row. On AVR this searches the log: up to 2 ms, and 3.4 ms more while a byte is written.
     fn row(&self, row: TableRow) -> PerAxis<Length>;
 
-    /// Whether a stored position was ever stored. A keeper that does not record this returns true.
+    /// Whether a stored position was ever stored. A storage that does not record this returns true.
     fn is_stored(&self, _row: TableRow) -> bool {
         true
     }

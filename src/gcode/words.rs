@@ -46,7 +46,7 @@ pub const OFFSETS: u32 = 7 << I;
 /// The words that have a meaning on any line, without a code that takes them.
 pub const ALWAYS: u32 = bit(F) | bit(S) | bit(T) | bit(N);
 
-/// The mark of a letter without a slot.
+/// The value of [`SLOT`] for a letter without a slot.
 const NONE: u8 = 255;
 
 progmem! {
