@@ -34,8 +34,8 @@ pub trait Dialect {
     /// others.
     const IS_PLAIN: bool = false;
 
-    /// Whether the settings select this dialect for a port. If no dialect is selected, the port starts in the first
-    /// dialect of the table.
+    /// Whether the settings select this dialect for a port. If the settings select no dialect, the port starts in the
+    /// first dialect of the table.
     fn is_chosen(settings: &Settings, port: u8) -> bool {
         let _ = (settings, port);
         false
@@ -68,7 +68,7 @@ pub trait Dialect {
         None
     }
 
-    /// Answers a line that could not be kept with a status. `line` is what is left of the line.
+    /// Answers, with a status, a line that could not be stored. `line` is what is left of the line.
     fn refuse(
         status: Status,
         line: &[u8],
@@ -160,8 +160,8 @@ pub trait Answers {
     /// than once.
     fn dropped(&mut self) {}
 
-    /// Drops all output except what the line itself asks to be reported. For lines from a file: no sender waits for
-    /// an answer.
+    /// Drops all output except reports that the line itself asks for. For lines from a file, because no sender waits
+    /// for an answer.
     fn silence(&mut self) {}
 
     /// Whether the answer is a list. The caller then keeps little output queued, so that a `?` is answered soon.
@@ -188,7 +188,7 @@ pub trait Tells {
         false
     }
 
-    /// Returns the number of free blocks that a queue report has told.
+    /// Returns the number of free blocks that a queue report has reported.
     fn blocks_free(&self) -> usize {
         0
     }
@@ -203,7 +203,7 @@ pub trait Remembers {
     /// Restores the defaults, after the settings have got their defaults.
     fn restore(&mut self);
 
-    /// Makes the next report complete, because its reader has been told nothing so far.
+    /// Makes the next report complete, because its reader has received no report so far.
     fn refresh(&mut self);
 }
 

@@ -9,7 +9,7 @@ use crate::kinematics;
 use crate::status::Status;
 use crate::units::AXES;
 
-/// The product of `sa` and `tr` (both scaled as kept) with the steps per millimetre (in thousandths), for one
+/// The product of `sa` and `tr` (both scaled as stored) with the steps per millimetre (in thousandths), for one
 /// microstep: 360 degrees times 10^4, 10^6 and 10^3.
 const STEPS: u64 = 360 * 10_000_000_000_000;
 
@@ -73,7 +73,7 @@ pub fn set_steps<M: Machine>(
     Ok(())
 }
 
-/// Returns the steps per millimetre of a motor, in thousandths, if `by` is the travel per turn, scaled as kept. Works
+/// Returns the steps per millimetre of a motor, in thousandths, if `by` is the travel per turn, scaled as stored. Works
 /// both ways: if `by` is the steps per millimetre, in thousandths, returns the travel per turn. Returns 0, which no
 /// setting accepts, if the result is out of range.
 #[small]

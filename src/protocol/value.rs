@@ -8,7 +8,7 @@ use crate::gcode::tables::TableRow;
 pub enum Value {
     /// Line number of the block that was read last.
     BlockLine,
-    /// Line number of the block that was finished last, to its last step.
+    /// Line number of the last block that was executed to its last step.
     FinishedLine,
     /// Line number of the moving block.
     MotionLine,
@@ -60,7 +60,7 @@ pub enum Value {
     /// Whether the synchronized pass of the line has begun: a [`Status`](crate::status::Status) as a number, from
     /// `Encoder::pass`.
     Pass,
-    /// Pulses of the encoder since the reset that did not fit; 255 for 255 or more.
+    /// Misfits: pulses of the encoder since the reset that did not fit; 255 for 255 or more.
     PulseMisfits,
     /// Why the machine has started: see [`Cause`](crate::hal::resets::Cause).
     Reset,
@@ -82,7 +82,7 @@ pub enum Value {
     Door,
     /// 1 in check mode.
     Check,
-    /// Free blocks of the planner, as told to senders: at least six.
+    /// Free blocks of the planner as reported to senders: at least six.
     QueueFree,
     /// Free blocks of the planner, the true number.
     BlocksFree,

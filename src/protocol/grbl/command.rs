@@ -9,7 +9,7 @@ pub enum Command {
     Gcode,
     /// An empty line, which has no command.
     Nothing,
-    /// A `?`, which is not a line.
+    /// A `?`, which is taken out of the stream and is not a line.
     Question,
     /// `$`.
     Help,

@@ -16,7 +16,7 @@ use crate::progmem::Text;
 use crate::protocol::{Hold, Machine, Out, Remembers, Value};
 use crate::text;
 
-/// The number of reports from one `WCO` or `Ov` to the next, at rest.
+/// The number of reports from one `WCO` to the next, and from one `Ov` to the next, at rest.
 const AT_REST: u8 = 10;
 /// The number of reports from one `WCO` to the next, and from one `Ov` to the next, while the machine is not at rest.
 const OFFSETS: u8 = 30;

@@ -139,7 +139,8 @@ impl Answers for Request {
 
     fn dropped(&mut self) {
         match self.command {
-            // A report is in the midst of its line, or the line has not run, which whoever runs it refuses.
+            // Nothing to do in the middle of a report, or before the block has run: the code that runs the block
+            // refuses it.
             _ if self.report.is_some() || self.block.is_some() => {}
             Command::Gcode if self.at == 0 => self.at = DROPPED,
             Command::StoreStartup(_) if self.at != 0 => self.status = Status::Alarmed,
@@ -197,7 +198,8 @@ impl Request {
             // The commands from here on need the machine at rest or in an alarm.
             _ if at == 0 && self.command != Command::Unlock && !may_change(machine) => {
                 let ends = machine.doing() == Doing::Runs && machine.value(Value::MovesLast) == 0;
-                // grbl answers a line that moves nothing when the machine is at rest, so a sender expects it to be.
+                // Senders assume that the machine is at rest after the answer to a line without motion, because grbl
+                // answers it then. The command therefore waits for rest.
                 if ends { Step::Later(0) } else { Step::Error(BUSY) }
             }
             Command::Settings => list_setting(at, machine, out),
@@ -284,7 +286,7 @@ impl Request {
         if threads(machine) {
             return begins(machine);
         }
-        // A probing mode that an earlier line has left does not count: this line has to move.
+        // A probing mode in force from an earlier line counts only if this line moves.
         let probes =
             self.at == 0 && command::moves(line) && is_probing(machine.value(Value::MotionMode));
         let mut is = |value| machine.value(value) != 0;
@@ -350,7 +352,7 @@ fn begins(machine: &mut impl Machine) -> Step {
     if waits { Step::Later(0) } else { Step::Done }
 }
 
-/// Whether settings may be read and changed: at rest, in check mode too, and in an alarm.
+/// Whether settings may be read and changed: at rest (also in check mode), and in an alarm.
 #[small]
 fn may_change(machine: &mut impl Machine) -> bool {
     let stopped = machine.cycle() == Cycle::Stopped;

@@ -28,15 +28,14 @@ progmem! {
         some
     };
 }
-/// How many of them an image has. The last two are those of a lathe.
+/// The number of these settings in this image. The last two are those of a lathe.
 const BASE: u8 = if Capability::Lathe.is_built_in() { 24 } else { 22 };
 
 /// The number of axes that can home.
 const HOMING: u8 = 4;
 /// The fixed value of `$26`, in ms.
 const DEBOUNCE_MS: i32 = 10;
-/// Bits of `grm`: those that are the lowest two bits of `$10`, the one that is `$13`, and those that are the next two
-/// of `$10`.
+/// Bits of `grm`. `REPORT`: the lowest two bits of `$10`. `INCHES`: `$13`. `SYNC`: the next two bits of `$10`.
 const REPORT: i32 = 3;
 const INCHES: i32 = 4;
 const SYNC: i32 = 48;
@@ -322,7 +321,7 @@ fn put(machine: &mut impl Machine, setting: Option<Setting>, to: Number) -> Resu
     put_value(machine, Some(setting), value)
 }
 
-/// Stores a value that is scaled as kept.
+/// Stores a value that has the scale of the stored setting.
 #[inline(never)]
 #[small]
 fn put_value(
@@ -395,7 +394,7 @@ fn set_switches(machine: &mut impl Machine, bit: i32, on: bool) -> Result<(), St
     })
 }
 
-/// `$22=1`: makes those switches homing switches that are so by default, unless there are homing switches already.
+/// `$22=1`: switches the default homing switches on, unless there are homing switches already.
 #[small]
 fn home_again(machine: &mut impl Machine) -> Result<(), Status> {
     if switches(machine, 1, false) != 0 {

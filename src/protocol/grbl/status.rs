@@ -14,7 +14,7 @@ pub const TOO_LONG: u8 = 14;
 /// The error of `$J=` with words that a jog may not have.
 pub const BAD_JOG: u8 = 16;
 
-/// The alarm of a probing whose probe is in its final state before anything moves.
+/// The alarm of a probing that begins with the probe already in its final state.
 pub const PROBE_CLOSED: u8 = 4;
 
 /// Returns the number of the error for a status; 0 for none.

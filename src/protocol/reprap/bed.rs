@@ -8,8 +8,8 @@
 //! | G29 S5 | forgets the points |
 //! | M420 S1, S0 | moves follow the plane, or do not; without S as G29 S0 |
 //!
-//! Everything is done at rest, one operation at a time; while the machine moves the line waits. Words are lengths in
-//! machine coordinates. An alarm, or a move that is interrupted, ends the code. No plane is known then.
+//! Every operation runs at standstill, one at a time. While the machine moves, the line waits. Words are lengths in
+//! machine coordinates. An alarm or an interrupted move ends the code, and leaves no plane.
 
 use super::command::{has, number, value};
 use super::host::Step;

@@ -350,7 +350,7 @@ mod tests {
                 assert_eq!(of(fast), of(slow), "{line}");
                 assert_eq!(block.of(line.as_bytes()).trim_ascii(), frame.block.of(line.as_bytes()));
             }
-            // Those without a number, and two or three with a number.
+            // Two lines without a number, and if no line has overtaken also three with a number.
             assert_eq!(usual_ones, if ahead == 0 { 5 } else { 2 });
         }
     }

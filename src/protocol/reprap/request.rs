@@ -1,8 +1,8 @@
 //! Answers a line.
 //!
-//! The output of a code comes before the `ok`, one part per step. What has to be waited for (rest, homing, memory) is
-//! polled each millisecond, at 2,000 cycles. Nothing of the answer has been written then, so other output may come
-//! first.
+//! The output of a code comes before the `ok`, one part per step. Conditions that the code waits for (standstill,
+//! homing, memory) are polled each millisecond, at 2,000 cycles. Nothing of the answer has been written by then, so
+//! other output may come first.
 
 use super::command;
 use super::frame::{Fault, Frame, Session};

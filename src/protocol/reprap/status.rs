@@ -17,8 +17,8 @@ pub fn is_unknown(status: Status) -> bool {
     )
 }
 
-/// Whether a print continues after the refusal of this line: the line is no move, no heater stays cold, and there is
-/// no alarm. Such a refusal is not reported as `Error:`, because hosts disconnect when they read that.
+/// Whether a print continues after the refusal of this line: the line is no move, no heater stays cold because of it,
+/// and there is no alarm. Such a refusal is not reported as `Error:`, because hosts disconnect when they read that.
 #[inline(never)]
 #[small]
 pub fn is_passed_over(status: Status, block: &[u8]) -> bool {

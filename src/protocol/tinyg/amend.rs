@@ -1,7 +1,7 @@
 //! Changes to the status report: `{srs:{set:{vel:t,posa:f}}}`, `{srs:{clear:t}}`, `{srs:{defa:t}}`.
 //!
-//! Each step handles one pair and reports it as it was sent. The first pair that makes no sense is refused; the pairs
-//! before it have taken effect.
+//! Each step handles one pair and reports it as it was sent. The first invalid pair is refused; the pairs before it
+//! have taken effect.
 
 use super::json::{self, Kind, Pair};
 use super::request::{Context, Request};

@@ -107,7 +107,7 @@ fn sets_style(line: &[u8]) -> bool {
     line.windows(2).any(|pair| pair.eq_ignore_ascii_case(b"js"))
 }
 
-/// Everything that a line can ask for by a name alone.
+/// All names that a line can read.
 fn askable() -> Vec<String> {
     let mut names: Vec<String> =
         ["", "$", "o", "m", "q", "g", "h", "prog", "test", "defa", "boot", "me", "sr", "qr"]

@@ -183,8 +183,8 @@ impl Request {
         Some(request)
     }
 
-    /// Answers a line that could not be kept with a status. `line` is what is left of the line. The mode stays as it
-    /// is.
+    /// Answers, with a status, a line that could not be stored. `line` is what is left of the line. The mode does not
+    /// change.
     pub fn refused(
         status: Status,
         line: &[u8],

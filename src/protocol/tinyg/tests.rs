@@ -51,7 +51,7 @@ fn answers_as_documented() {
     }
 }
 
-/// Answers in forms that the exchanges above do not cover.
+/// Answers of which the exchanges above have no example.
 #[test]
 fn answers_as_senders_expect() {
     for (line, answer) in [

@@ -55,7 +55,7 @@ impl Token {
         Token(row as u16)
     }
 
-    /// Whether the value is in EEPROM only, and so takes too long to read for the status report.
+    /// Whether the value is only in EEPROM, and therefore takes too long to read for the status report.
     pub fn is_far(self) -> bool {
         self.0 >= FIRST_ROW || self.setting().is_some_and(Setting::is_cold)
     }

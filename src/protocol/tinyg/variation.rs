@@ -17,7 +17,7 @@ use crate::progmem::Text;
 use crate::status::Status;
 use crate::text;
 
-/// What a sender takes the machine for.
+/// What kind of machine the sender expects.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub enum Variation {

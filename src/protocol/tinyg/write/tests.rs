@@ -100,7 +100,8 @@ fn foreign_text_is_escaped() {
     assert_eq!(out, br#"a\"\\??"#);
 }
 
-/// What a machine of another make was seen to say; the lines that ask for something are in a transcript.
+/// Responses recorded from another manufacturer's machine. A transcript has those recorded responses that answer a
+/// line.
 #[test]
 fn checksums_are_those_of_real_machines() {
     let respond = |status, length, fill: &dyn Fn(&mut Writer<Vec<u8>>)| {
