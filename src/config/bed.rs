@@ -1,5 +1,5 @@
-//! The bed of a printer as a plane through three points. It tells how much Z is lifted at a place, so that moves
-//! follow the bed.
+//! The bed of a printer as a plane through three points. The plane gives the height of the bed at a place, so that
+//! moves follow the bed.
 //!
 //! Pure code, kept beside the settings because the planner, reports and G29 all read it. Lengths are in machine
 //! coordinates, as integers. Every caller gets the same number for the lift at a place, so nothing drifts when the
@@ -85,8 +85,8 @@ impl Bed {
         self.count = 0;
     }
 
-    /// Shifts the points when the machine position `from` is set to `to`, as by G28.3. While moves follow the plane,
-    /// Z of the points stays.
+    /// Shifts the points when the machine position `from` is redefined as `to`, as by G28.3. While moves follow the
+    /// plane, Z of the points stays.
     #[inline(never)]
     pub fn rename(&mut self, from: &PerAxis<Length>, to: &PerAxis<Length>) {
         for (axis, (from, to)) in from.iter().zip(to).enumerate() {
@@ -121,8 +121,8 @@ impl Bed {
         Ok(())
     }
 
-    /// Returns how much Z is lifted at a place. An `f32` has 24 bits, so single units of a length are lost where the
-    /// bed rises by more than 800 mm.
+    /// Returns the height of the bed at a place, which is added to Z. An `f32` has 24 bits, so single units of a length
+    /// are lost where the bed rises by more than 800 mm.
     #[inline(never)]
     fn lift(&self, x: Length, y: Length) -> Length {
         let [[from_x, from_y, z], ..] = self.points;
@@ -154,7 +154,7 @@ impl Bed {
     }
 }
 
-/// A vector between two points.
+/// A vector from one point to another.
 type Way = [f32; 3];
 
 /// Returns the distance between two positions of one axis.

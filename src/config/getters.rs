@@ -34,8 +34,8 @@ impl Settings {
         self.motor(motor, motor::MI)
     }
 
-    /// Returns how often the steps of the shortest length have to be halved until no motor makes more than one step,
-    /// plus one if a motor drives X and Y together. 15 or more stand for more than 14.
+    /// Returns how often the steps of a [`Length`] of one unit have to be halved until no motor makes more than one
+    /// step; one more if a motor drives X and Y together. 15 or more stand for more than 14.
     pub fn octaves(&self) -> u8 {
         self.octaves
     }
@@ -229,7 +229,7 @@ impl Settings {
         self.system_large(system::SI) as u16
     }
 
-    /// The rate of the serial line, as it was set: a code, or bits a second.
+    /// The rate of the serial line as the sender has set it: a code, or bits a second.
     pub fn baud(&self) -> i32 {
         self.system_large(system::BAUD)
     }
@@ -273,13 +273,13 @@ impl Settings {
         }
     }
 
-    /// Whether the first line on a port that is valid in one dialect alone decides the dialect. Not if the user has
-    /// set text mode or silence, which only TinyG's dialect has.
+    /// Whether the dialect of a port is decided by the first line that is valid in one dialect only. False if the user
+    /// has set text mode or silence, which only TinyG's dialect has.
     pub fn lets_senders_choose(&self, port: u8) -> bool {
         self.dialect_of(port) == 0 && self.starts_in_json() && self.json_verbosity() != 0
     }
 
-    /// Whether the machine passes for a g2core.
+    /// Whether the machine identifies itself as a g2core.
     pub fn is_g2core(&self) -> bool {
         self.dialect() == 1
     }

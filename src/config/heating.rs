@@ -1,4 +1,5 @@
-//! What lines may ask of heaters. Kept beside the settings, because the interpreter reads it.
+//! The state of the heaters, against which lines are checked. Kept beside the settings, because the interpreter reads
+//! it.
 
 use crate::boards::ACTIVE;
 use crate::capability::Capability;
@@ -7,7 +8,8 @@ use crate::status::Status;
 /// The number of printers: 1 in an image that can print, else 0.
 pub const PRINTERS: usize = Capability::Printer.is_built_in() as usize;
 
-/// What lines may ask of heaters. Arrays have the hot end first. The heat task keeps the values up to date.
+/// The state of the heaters, against which lines are checked. Arrays have the hot end first. The heat task keeps the
+/// values up to date.
 #[derive(Clone, Copy, Debug)]
 pub struct Heating {
     /// The highest temperature allowed for each heater, in eighths of a degree; 0 if the heater does not exist.

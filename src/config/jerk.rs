@@ -1,8 +1,8 @@
 //! Jerk limits that have no effect.
 //!
 //! A jerk limit that lets an axis reach its acceleration limit within a millisecond has no effect. The motion code
-//! ignores it (`motion::governor::effective_jerk`), because no slice of motion is shorter. The sender is told when it
-//! sets such a limit. Cost on AVR: 1,500 cycles.
+//! ignores it (`motion::governor::effective_jerk`), because no slice of motion is shorter. The sender gets a warning
+//! when it sets such a limit. Cost on AVR: 1,500 cycles.
 
 use super::groups::axis;
 use super::setting::large_of;

@@ -1,9 +1,9 @@
 //! Machine profiles: the values of the settings on a router, a mill, a printer, a lathe.
 //!
-//! A profile is one constant in one file under `machines/`. It lists the settings that differ from those of the
-//! careful machine; the careful machine's own file lists what differs from TinyG. Names, ranges and decimals are
-//! checked when the image is built. Each difference takes six bytes of program memory. A difference that X and Y
-//! share counts once.
+//! A profile is one constant in one file under `machines/`. It lists the settings in which the machine differs from the
+//! careful machine. The careful machine's own file lists its differences from TinyG. Names, ranges and decimals are
+//! checked when the image is built. Each difference takes six bytes of program memory. A difference that X and Y share
+//! counts once.
 //!
 //! An image is built for the profile [`ACTIVE`], whose values are its defaults. `{mch:2}` switches to the values of
 //! another profile ([`Settings::take_over`](super::Settings::take_over)).
@@ -73,7 +73,7 @@ pub struct Entry {
     setting: u8,
     /// The motors or axes, as bits; 1 for the machine itself.
     owners: u8,
-    /// The value, scaled as kept.
+    /// The value, scaled as stored.
     value: i32,
 }
 
@@ -92,7 +92,7 @@ impl Entry {
         numbers.map(move |number| first.numbered(number))
     }
 
-    /// Returns the value, scaled as kept.
+    /// Returns the value, scaled as stored.
     pub(super) fn value(&self) -> i32 {
         self.value
     }

@@ -49,7 +49,7 @@ pub struct Settings {
     /// The octaves of the motor with the finest steps: see [`StepRatio::octaves`]. One more if a motor drives X and Y
     /// together.
     octaves: u8,
-    /// What lines may ask of heaters. Empty in an image without heaters.
+    /// The state of the heaters, against which lines are checked. Empty in an image without heaters.
     pub heating: [Heating; heating::PRINTERS],
     /// The configuration of the motor drivers. Empty in an image without configurable drivers.
     pub drives: [Drive; DRIVERS],
@@ -91,19 +91,20 @@ impl Settings {
         self.bed.first().filter(|bed| bed.follows())
     }
 
-    /// Returns the value of a setting, scaled as kept. For a setting that is in EEPROM only this is its default.
+    /// Returns the value of a setting, scaled as stored. For a setting that is in EEPROM only this is its default.
     #[small]
     pub fn get(&self, setting: Setting) -> i32 {
         match setting.place() {
             Place::Small(slot) => self.small(slot).into(),
             Place::Large(slot) => self.large(slot),
             Place::Constant => self.constant(setting),
-            // `tasks::storage` reads the values that are in EEPROM only.
+            // `tasks::storage` reads the values that are only in EEPROM.
             Place::Log => setting.default_value(),
         }
     }
 
-    /// Returns the value of a constant. Some constants have other values while the machine passes for a g2core.
+    /// Returns the value of a constant. Some constants have other values while the machine identifies itself as a
+    /// g2core.
     #[small]
     fn constant(&self, setting: Setting) -> i32 {
         let other = if self.is_g2core() { table::G2CORE.at(setting.number().into()) } else { None };
@@ -253,7 +254,7 @@ impl Settings {
     }
 }
 
-/// Returns `number` scaled as kept and within the limits of `row`, with `max` as the upper limit. A value out of
+/// Returns `number` scaled as stored and within the limits of `row`, with `max` as the upper limit. A value out of
 /// range is an error, or the nearest limit if the row has [`CLAMP`].
 fn limit(row: &SettingRow, max: i32, number: Number, inches: bool) -> Result<i32, Status> {
     let clamp = row.is(CLAMP);

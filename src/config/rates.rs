@@ -76,7 +76,7 @@ impl Settings {
     }
 }
 
-/// Returns the velocity at which a motor makes `rate` steps a second, scaled as kept (thousandths of a mm or degree
+/// Returns the velocity at which a motor makes `rate` steps a second, scaled as stored (thousandths of a mm or degree
 /// per minute), at least 1. `None` if the motor never steps.
 fn fastest(ratio: StepRatio, rate: u32) -> Option<i32> {
     if ratio.num == 0 {

@@ -413,7 +413,7 @@ impl Setting {
         matches!(self.row().kind, Kind::Small | Kind::Large) && !self.is_baud()
     }
 
-    /// Whether the setting can have this value, scaled as kept.
+    /// Whether the setting can have this value, scaled as stored.
     pub fn accepts(self, value: i32) -> bool {
         let row = self.row();
         let linear_mode = row.is(MODE) && !self.owner().is_rotary();
@@ -500,7 +500,7 @@ impl Setting {
         }
     }
 
-    /// Returns the default of the setting, scaled as kept.
+    /// Returns the default of the setting, scaled as stored.
     pub fn default_value(self) -> i32 {
         match machines::ACTIVE {
             0 => self.careful_value(),
@@ -508,7 +508,7 @@ impl Setting {
         }
     }
 
-    /// Returns the value of the setting in the profile of a machine, scaled as kept. About 3,000 cycles on AVR.
+    /// Returns the value of the setting in the profile of a machine, scaled as stored. About 3,000 cycles on AVR.
     pub fn value_on(self, machine: u8) -> i32 {
         if self.is_machine() {
             return machine.into();

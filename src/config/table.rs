@@ -63,9 +63,9 @@ pub struct SettingRow {
     pub stored: u8,
     /// The number of decimals that are shown.
     pub shown: u8,
-    /// Lower limit, scaled as kept.
+    /// Lower limit, scaled as stored.
     pub min: i32,
-    /// Upper limit, scaled as kept.
+    /// Upper limit, scaled as stored.
     pub max: i32,
 }
 
@@ -257,20 +257,20 @@ const fn is_called(token: &[u8; 4], name: &[u8]) -> bool {
     name.len() <= token.len()
 }
 
-/// Values of the settings, scaled as kept.
+/// Values of the settings, scaled as stored.
 pub(super) struct Values {
     pub(super) system: [i32; system::COUNT],
     pub(super) motor: [[i32; MOTORS]; motor::COUNT],
     pub(super) axis: [[i32; AXES]; axis::COUNT],
 }
 
-/// The values of TinyG's defaults, and Kerf's own where no profile says otherwise.
+/// TinyG's defaults, and Kerf's own defaults for settings that TinyG lacks and that no profile sets.
 const PLAIN: Values = Values { system: system::PLAIN, motor: motor::PLAIN, axis: axis::PLAIN };
 
 /// The values of the careful machine, from which the other profiles differ.
 pub(super) const CAREFUL: Values = PLAIN.with(machines::CAREFUL.entries);
 
 progmem! {
-    /// The values of the constants at the head of the group `sys` while the machine passes for a g2core.
+    /// The values of the first four constants of the group `sys` while the machine identifies itself as a g2core.
     pub static G2CORE: [i32; 4] = [10_103, 990, 3, 0];
 }

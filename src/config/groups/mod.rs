@@ -43,7 +43,7 @@ pub type Meaning = (&'static str, &'static str);
 ///
 /// `group! { module: type of a value, table of defaults => { CONSTANT "name": row, default, words, meaning; .. } }`.
 /// The table of defaults is either `PLAIN`, the defaults in the rows, or the result of applying the careful machine's
-/// profile to them. A default is scaled as kept.
+/// profile to them. A default is scaled as stored.
 macro_rules! group {
     ($(#[$doc:meta])* $module:ident: $value:ty, $defaults:expr => {
         $($place:ident $name:literal: $row:expr, $default:expr, $words:expr, $meaning:literal;)*
@@ -57,7 +57,7 @@ macro_rules! group {
             pub const COUNT: usize = [$($name),*].len();
             /// The rows.
             pub const LIST: [SettingRow; COUNT] = numbered([$(named($row, $name)),*]);
-            /// The defaults in the rows, scaled as kept.
+            /// The defaults in the rows, scaled as stored.
             pub const PLAIN: [$value; COUNT] = [$($default),*];
             /// The meanings of the settings.
             #[cfg(feature = "std")]
@@ -76,7 +76,7 @@ macro_rules! group {
                 /// The rows.
                 pub static ROWS: [SettingRow; COUNT] = LIST;
 
-                /// The defaults in force in this image, scaled as kept.
+                /// The defaults in force in this image, scaled as stored.
                 pub static DEFAULTS: [$value; COUNT] = $defaults;
 
                 /// What text mode calls the settings.
