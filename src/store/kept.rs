@@ -1,4 +1,4 @@
-//! Which settings are kept: all but constants, the rate of the serial line, and what senders say of their job.
+//! Which settings are stored: all but constants, the rate of the serial line, and the sender's data about its job.
 //!
 //! Most kept settings are in RAM as well; each of them is an [`Item`]. The rest are rarely read and are found here
 //! ([`value`]). In memory an item is identified by its name, because the numbers of items differ between firmware
@@ -29,7 +29,7 @@ impl Item {
         key(self.0)
     }
 
-    /// Returns the item's value and its default.
+    /// Returns the item's value, and its default.
     pub fn value(self, settings: &Settings) -> (i32, i32) {
         (settings.get(self.0), self.0.default_value())
     }

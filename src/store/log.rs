@@ -37,7 +37,7 @@ pub struct Write {
 /// The next step of storing an item.
 #[derive(Clone, Copy, Debug)]
 pub enum Put {
-    /// Write this copy of an older record, which makes room, and ask again.
+    /// Write this copy of an older record, which makes room, then call [`Log::put`] again.
     Room(Write),
     /// Write this record, which is that of the item.
     Last(Write),
@@ -65,8 +65,8 @@ impl Log {
         log
     }
 
-    /// Whether memory is not empty but holds no record: another program's data, or random bytes. Cost on AVR: up to
-    /// 100,000 cycles, if the memory is empty.
+    /// Whether memory is not empty but holds no record. It then holds another program's data, or random bytes. Cost on
+    /// AVR: up to 100,000 cycles, if the memory is empty.
     pub fn is_rubbish<M: Memory>(&self, memory: &M) -> bool {
         self.is_empty() && (0..M::SIZE).any(|at| memory.read(at) != 0xFF)
     }

@@ -17,8 +17,8 @@
 //!
 //! Behind the log is a program of the user ([`program`]).
 //!
-//! Items are known by their names, not by their places in a table. Firmware with more settings, or with other
-//! settings, finds those that it knows and takes its defaults for the rest. An item that has always had its default
+//! Items are known by their names, not by their places in a table. Firmware with more settings, or with other settings,
+//! finds the items that it knows and uses its defaults for the others. An item whose value has always been the default
 //! takes no room. Values are checked when they are read, as if they had been sent.
 
 pub mod kept;

@@ -12,8 +12,8 @@
 //! the old program invalid, [`end`] makes the new one valid. So after a power failure there is the old program, the
 //! new one or none. The program is checked when it is started, which takes 10 ms on AVR, and is then read in place.
 //!
-//! A start-up line takes 43 bytes: its length, a checksum of two bytes, and at most 40 of text. A line that was cut
-//! off by a power failure counts as none.
+//! A start-up line takes 43 bytes: its length, a checksum of two bytes, and at most 40 of text. If a power failure has
+//! cut a line off, there is no line.
 //!
 //! If the log of earlier firmware has reached this area, the log keeps it ([`Log::is_wide`](super::Log::is_wide)). No
 //! program can be stored then.
@@ -171,7 +171,7 @@ pub fn put_startup<M: Memory>(memory: &mut M, n: u8, text: &[u8]) -> Stored {
     }
 }
 
-/// Writes the first byte that differs from its wanted value. Returns whether all bytes are right and no write is in
+/// Writes the first byte that differs from its wanted value. Returns true if all bytes are right and no write is in
 /// progress.
 #[small]
 fn put<M: Memory>(memory: &mut M, bytes: impl Iterator<Item = (u16, u8)>) -> bool {
