@@ -46,8 +46,8 @@ pub fn doing(works: impl Fn() -> bool) -> Doing {
     }
 }
 
-/// Whether a hold is on that is to be shown. The short hold of a kill at standstill, which lasts until the waiting
-/// lines are dropped, is not shown. Thread mode.
+/// Whether senders are shown a hold. The short hold of a kill at standstill, which lasts until the waiting lines are
+/// dropped, is not shown. Thread mode.
 #[inline(always)]
 pub fn shows_hold(works: impl Fn() -> bool) -> bool {
     let rests = || !works() || machine::is_stopped();

@@ -36,7 +36,7 @@ pub enum Event {
     Jog,
     /// Lines are only checked from now on.
     Check,
-    /// The cycle has come to its end, or a program stop has been left.
+    /// The cycle has come to its end, or the machine has left a program stop.
     Done,
     /// An alarm has been requested, or probing has failed.
     Alarm,

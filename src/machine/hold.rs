@@ -1,18 +1,18 @@
-//! The part of the machine's state that says whether motion goes on, and whether the queue is being dropped.
+//! The part of the machine's state that says whether motion is held, and whether the queue is being dropped.
 //!
 //! The states are ordered so that each query is one comparison of a byte. The door is open in the states with an odd
 //! discriminant, except in `Resuming`.
 
 use super::Event;
 
-/// Whether motion goes on, and whether lines and the queue are being dropped.
+/// Whether motion is held, and whether lines and the queue are being dropped.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Hold {
-    /// Motion goes on.
+    /// Motion is not held.
     #[default]
     Off,
-    /// Motion comes to rest, and then goes on.
+    /// Motion comes to rest, and then resumes.
     Resuming,
     /// Motion is held, or slows down to be held.
     Held,

@@ -53,13 +53,13 @@
 //! | `Cleared` | `{clear:n}`, M2, M30, if the alarm permits it | thread | steps may be made again |
 //!
 //! Exec reads the byte of the [`Hold`] for each stretch of motion ([`is_held`]). It writes the byte in one case only,
-//! from `Resuming` to `Off`. Thread mode can nevertheless write without a lock. Each of its events leads from
-//! `Resuming` and from `Off` to the same state, or leaves both alone, and an unchanged byte is not written. Costs: a
+//! from `Resuming` to `Off`. Thread mode can nevertheless write without a lock, because each of its events either leads
+//! from `Resuming` and from `Off` to one state, or changes neither, and an unchanged byte is not written. Costs: a
 //! query 3 cycles, an event 50.
 //!
-//! Nothing here waits. [`Notices`] holds what is still to be reported. [`Signs`] holds the requests of real-time
-//! characters that cannot be carried out yet. Whether a jog may begin depends on the order of bytes in the stream, not
-//! on the state: see [`jog`].
+//! Nothing here waits. [`Notices`] holds what is still to be reported. [`Signs`] holds the effects of real-time
+//! characters that are still pending. Whether a jog may begin depends on the order of bytes in the stream, not on the
+//! state: see [`jog`].
 
 pub mod alarm;
 mod cycle;
@@ -201,13 +201,13 @@ pub fn has_open_door() -> bool {
     byte > Hold::Resuming as u8 && byte & 1 != 0
 }
 
-/// Whether motion goes on, or goes on by itself after it has come to rest. Thread mode.
+/// Whether motion is not held, or resumes by itself after it has come to rest. Thread mode.
 #[inline(always)]
 pub fn goes_on() -> bool {
     hold_byte().get() <= Hold::Resuming as u8
 }
 
-/// Whether held motion goes on after it has come to rest. Any level.
+/// Whether held motion resumes after it has come to rest. Any level.
 #[inline(always)]
 pub fn is_resuming() -> bool {
     hold_byte().get() == Hold::Resuming as u8
@@ -250,8 +250,8 @@ pub fn dropped() -> (Cycle, bool) {
     before
 }
 
-/// Begins an alarm and has the queue dropped, unless an equally bad or worse alarm is on. Calls `first` before exec
-/// sees the alarm. Returns whether the alarm has begun. Thread mode.
+/// Begins an alarm and drops the queue, unless an equally bad or worse alarm is on. Calls `first` before exec sees the
+/// alarm. Returns whether the alarm has begun. Thread mode.
 #[inline(always)]
 pub fn raise(alarm: Alarm, first: impl FnOnce()) -> bool {
     let counts = self::alarm().is_exceeded_by(alarm);
@@ -280,7 +280,7 @@ pub fn start_alarmed() {
     alarm_byte().set(State::AFTER_FAULT.alarm as u8);
 }
 
-/// Notes that the machine has come to rest in a hold. Returns whether motion goes on. Exec only.
+/// Records that the machine has come to rest in a hold. Returns whether motion resumes. Exec only.
 #[inline(always)]
 pub fn rested() -> bool {
     let resumes = is_resuming();

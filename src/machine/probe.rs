@@ -42,8 +42,8 @@ impl Probe {
         self.state.get()
     }
 
-    /// Returns where the contact was, or where the move ended without contact, in machine coordinates. Axes that
-    /// cannot probe stood still there.
+    /// Returns the position of the contact, or where the move ended without contact, in machine coordinates. Axes that
+    /// cannot probe stood still at that position.
     pub fn at(&self, axis: u8) -> Option<Length> {
         self.at.get().get(usize::from(axis)).copied()
     }

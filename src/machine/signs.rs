@@ -1,4 +1,4 @@
-//! Signs: real-time characters that have arrived and have not had their whole effect yet.
+//! Real-time characters that have arrived and have not yet had their whole effect.
 //!
 //! `tasks::hold` and `tasks::jog` write and read them, in thread mode. The power task calls [`Signs::age`].
 
@@ -12,7 +12,7 @@ const TOGETHER_MS: u16 = 20;
 /// The pending characters.
 #[derive(Default)]
 pub struct Signs {
-    /// A `~` has come, and no `!` since. Held motion goes on when the reader reaches the place of the `~`.
+    /// A `~` has come, and no `!` since. Held motion resumes when the reader reaches the place of the `~`.
     pub resume: Cell<bool>,
     /// A `%` has come during the present hold. It does not count if it turns out to be in a comment.
     pub percent: Cell<bool>,
@@ -25,18 +25,18 @@ pub struct Signs {
 }
 
 impl Signs {
-    /// Records that a `%` has come without a hold, at the time `now` (ms). It has no effect unless a `!` comes right
+    /// Records that a `%` has come without a hold, at the time `now` (ms). It has no effect unless a `!` comes directly
     /// behind it.
     pub fn lone_percent(&self, now: u32) {
         self.lone.set(Some(now as u16));
     }
 
-    /// Whether a `%` without a hold has come right before the time `now`.
+    /// Whether a `%` without a hold has come directly before the time `now`.
     fn is_behind_percent(&self, now: u32) -> bool {
         self.lone.get().is_some_and(|at| (now as u16).wrapping_sub(at) < TOGETHER_MS)
     }
 
-    /// Whether a `%` without a hold has come right before the `!` that comes at the time `now`. Forgets the `%`.
+    /// Whether a `%` without a hold has come directly before a `!` that comes at the time `now`. Forgets the `%`.
     pub fn take_lone_percent(&self, now: u32) -> bool {
         let is_behind = self.is_behind_percent(now);
         self.lone.set(None);
