@@ -60,7 +60,7 @@ impl Pulses {
     pub const NONE: Self = Self { now: 0, index: 0, index_at: 0, at_index: 0, sync: 0, sync_at: 0 };
 }
 
-/// What is known of the turning spindle.
+/// The speed and the direction of the spindle, computed from its pulses.
 #[derive(Clone, Copy, Debug)]
 pub struct Encoder {
     /// Pulses of sync in a turn; 0 for no encoder.
@@ -228,7 +228,7 @@ impl Encoder {
         self.misfits
     }
 
-    /// Whether the first misfit has come and has not been reported. Takes it as reported.
+    /// Whether the first misfit has come and has not been reported. Marks it as reported.
     pub fn take_misfit(&mut self) -> bool {
         let is_new = self.misfits != 0 && !self.told;
         self.told |= is_new;
@@ -345,7 +345,8 @@ impl Encoder {
         if age > two + two / 64 + SLACK { 0 } else { self.speed() }
     }
 
-    /// Returns the speed of the last turn, thousandths of a turn a minute. 0 if the spindle stands still. Cost: 900.
+    /// Returns the speed of the last turn, thousandths of a turn a minute. 0 if the spindle stands still. Cost: 900
+    /// cycles.
     pub fn speed(&self) -> u32 {
         if self.turn == 0 {
             return 0;

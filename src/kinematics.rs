@@ -57,7 +57,7 @@ pub fn place(drives: u8, place: &PerAxis<Length>) -> Option<Length> {
     place.get(usize::from(drives)).copied()
 }
 
-/// Does the same as [`place()`], but is not inlined. For code that need not be fast.
+/// Like [`place()`], but not inlined. For code that need not be fast.
 #[inline(never)]
 #[small]
 pub fn place_of(drives: u8, at: &PerAxis<Length>) -> Option<Length> {

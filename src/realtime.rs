@@ -66,7 +66,8 @@ pub const JOG_END: u8 = 0x85;
 /// The code, counted from [`FIRST`], that sets the feed override to 100 %. The four codes behind it change the
 /// override.
 pub const FULL: u8 = 0;
-/// The code that sets the spindle override to 100 %. The four codes behind it change the override.
+/// The code, counted from [`FIRST`], that sets the spindle override to 100 %. The four codes behind it change the
+/// override.
 const SPINDLE: u8 = 9;
 
 /// The override requests, and the request to end a jog, since they were last taken. Its size does not depend on the

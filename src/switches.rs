@@ -39,11 +39,11 @@ pub enum Next {
 /// The debounced state of all switches.
 #[derive(Clone, Debug)]
 pub struct Switches {
-    /// The switches that are worked, after debouncing.
+    /// The actuated switches, after debouncing.
     worked: u16,
-    /// The switches that the last sample found worked.
+    /// The switches that were actuated in the last sample.
     last: u16,
-    /// The switches that are locked because they have changed lately.
+    /// The switches that are locked because they have changed within [`LOCK_MS`].
     locked: u16,
     /// Samples until the locked switches are free again.
     left: u8,
@@ -53,12 +53,12 @@ pub struct Switches {
 }
 
 impl Switches {
-    /// Returns the state in which no switch is worked.
+    /// Returns the state in which no switch is actuated.
     pub const fn new() -> Self {
         Self { worked: 0, last: 0, locked: 0, left: 0, paused: false }
     }
 
-    /// Returns the switches that are worked, after debouncing.
+    /// Returns the actuated switches, after debouncing.
     pub fn worked(&self) -> u16 {
         self.worked
     }
@@ -69,23 +69,23 @@ impl Switches {
         *self = Self { worked: now, last: now, ..Self::new() };
     }
 
-    /// Whether a sample that finds the switches `now` worked has to be confirmed by another.
+    /// Whether a sample that finds the switches `now` actuated has to be confirmed by another.
     pub fn is_news(&self, now: u16) -> bool {
         (now ^ self.worked) & !self.locked != 0
     }
 
-    /// Notes the first of two samples. The second one decides.
+    /// Stores the first of two samples. The second one decides.
     pub fn note(&mut self, now: u16) {
         self.last = now;
     }
 
-    /// Returns the switches that have changed, given a second sample that finds the switches `now` worked.
+    /// Returns the switches that have changed, given a second sample that finds the switches `now` actuated.
     #[inline(always)]
     pub fn changed(&self, now: u16) -> u16 {
         (now ^ self.worked) & !(now ^ self.last) & !self.locked
     }
 
-    /// Evaluates a sample that finds the switches `now` worked. Returns the switches that have changed, and when the
+    /// Evaluates a sample that finds the switches `now` actuated. Returns the switches that have changed, and when the
     /// next sample is due.
     pub fn sample(&mut self, now: u16) -> (u16, Next) {
         let changed = self.changed(now);
