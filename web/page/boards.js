@@ -1,13 +1,15 @@
-// The machine that the page talks to: a simulated one in a Worker, or a real one behind Web Serial. Both have the same face.
+// The machine that the page is connected to: a simulated one in a Worker, or a real one behind Web Serial. Both have
+// the same interface.
 //
-// | member | |
+// | member | meaning |
 // |---|---|
-// | `send(text)` | characters, as they are |
+// | `send(text)` | sends characters unchanged |
 // | `ask(line)` | sends a line; its answer as `{ body, status }`, one question at a time |
-// | `stream(job)`, `stopStream()` | sends a job safely |
+// | `stream(job)`, `stopStream()` | sends a job by counting responses; stops sending |
 // | events | `line` (`{ line, asked }`: whether it answers `ask`), `sent`, `state`, `trail`, `booted`, `progress`, `streamed`, `closed` |
 //
-// An answer belongs to the first question whose name it has. While a job is sent all answers are the job's, and `ask` is an error.
+// An answer belongs to the oldest question whose name it contains. While a job is sent, all answers belong to the job,
+// and `ask` is an error.
 
 import { Lines, answerStatus, isText, nameIn, parse } from './protocol.js';
 import { Sender, linesOf } from './sender.js';
@@ -19,7 +21,7 @@ class Board extends EventTarget {
   #lines = new Lines();
   #asked = [];
   streaming = false;
-  /// What the page says first decides: `tinyg` or `grbl`.
+  /// The dialect of the page's first line, which decides the dialect of the port: `tinyg` or `grbl`.
   dialect = 'tinyg';
 
   tell(name, detail) {
@@ -30,7 +32,7 @@ class Board extends EventTarget {
     this.addEventListener(name, ({ detail }) => act(detail));
   }
 
-  /// Characters from the machine.
+  /// Takes characters from the machine.
   hear(text) {
     for (const line of this.#lines.add(text)) {
       const waits = this.streaming ? undefined : this.#questionOf(line);
@@ -45,17 +47,17 @@ class Board extends EventTarget {
     return at < 0 ? undefined : this.#asked.splice(at, 1)[0];
   }
 
-  /// Sends a line that somebody has typed.
+  /// Sends a line that the user has typed.
   type(line) {
     this.tell('sent', line);
     this.sendLine(line);
-    // Answers in text tell no status: a question in JSON has those of a job in JSON again.
+    // Answers in text mode have no status. A question in JSON makes the answers to the job JSON again.
     if (this.streaming && this.dialect === 'tinyg' && isText(line)) this.sendLine('{qr:n}');
   }
 
-  /// Sends a job. An error if the machine does not answer in a way by which lines can be counted.
+  /// Sends a job. Throws if the machine does not answer in a way by which lines can be counted.
   async stream(job) {
-    // A question in JSON has answers in JSON follow.
+    // After a question in JSON the answers are JSON.
     if (this.dialect === 'tinyg') await this.ask('{qr:n}');
     this.streaming = true;
     this.begin(job);
@@ -78,7 +80,7 @@ class Board extends EventTarget {
     return answer;
   }
 
-  /// Nobody waits any more.
+  /// Drops all waits for answers.
   forget() {
     this.#asked = [];
     this.#lines = new Lines();
@@ -133,7 +135,7 @@ export class SimulatedBoard extends Board {
     this.#worker.postMessage({ stopStream: true });
   }
 
-  /// What the EEPROM holds, once everything is stored.
+  /// Returns the EEPROM contents, once everything is stored.
   eeprom() {
     const id = (this.#count += 1);
     return new Promise((resolve) => {
@@ -142,7 +144,7 @@ export class SimulatedBoard extends Board {
     });
   }
 
-  /// Off and on again; what is stored stays.
+  /// Switches the machine off and on. Stored values stay.
   power() {
     this.#worker.postMessage({ power: true });
   }
@@ -178,7 +180,7 @@ export class SerialBoard extends Board {
   #reader;
   #sender;
 
-  /// Asks the user for a port and opens it: a board resets then.
+  /// Asks the user for a port and opens it. A board resets when its port is opened.
   static async open(baudRate = 115_200) {
     const board = new SerialBoard();
     board.#port = await navigator.serial.requestPort();
@@ -202,7 +204,7 @@ export class SerialBoard extends Board {
         break;
       }
     } catch {
-      // The cable is out: `closed` tells it.
+      // The cable has been unplugged. The event `closed` below reports that.
     }
     this.#reader = undefined;
     this.#port = undefined;
@@ -267,7 +269,7 @@ export class SerialBoard extends Board {
       this.#writer?.releaseLock();
       await port?.close();
     } catch {
-      // It is closed already.
+      // The port is closed already.
     }
   }
 }

@@ -1,15 +1,17 @@
-// Velocity, acceleration and jerk over time, by uPlot; the three zoom together, and their cursor is the time bar's.
+// Charts of velocity, acceleration and jerk over time, drawn by uPlot. The three zoom together, and share a cursor with
+// the time bar.
 //
-// Owned by main.js. A curve of a million samples is shown as the lowest and highest of each pixel's, worked out anew at each zoom.
+// Owned by main.js. Of a long curve the lowest and the highest value of each of `BINS` bins are shown. They are
+// computed again at each zoom.
 
 import { byId } from './dom.js';
 import { colour } from './theme.js';
 
 const HEIGHT = 118;
-/// Bins over the width; each has two points.
+/// Number of bins over the width; each has two points.
 const BINS = 700;
 
-/// The lowest and highest of each bin between two times, in order: times and values.
+/// Returns the lowest and the highest value of each bin between two times, in the order of time: times and values.
 export function binned(curve, intervalMs, from, to, factor) {
   const first = Math.max(Math.floor((from * 1_000) / intervalMs), 0);
   const last = Math.min(Math.ceil((to * 1_000) / intervalMs), curve.length - 1);
@@ -38,7 +40,7 @@ export class Charts {
   #data;
   #onTime;
 
-  /// `onTime` is told where somebody clicks, in ms.
+  /// `onTime` is called with the time, in ms, at which the user has clicked.
   constructor(onTime) {
     this.#onTime = onTime;
     document.addEventListener('theme', () => this.#data && this.#make());
@@ -115,7 +117,7 @@ export class Charts {
     }
   }
 
-  /// The cursor is at a time, ms.
+  /// Moves the cursor to a time, ms.
   at(ms) {
     for (const plot of this.#plots) plot.setCursor({ left: plot.valToPos(ms / 1_000, 'x'), top: -10 }, false);
   }

@@ -1,6 +1,7 @@
-// Small helpers to make elements and to write numbers. No state.
+// Helpers that make elements and format numbers. No state.
 
-/// An element: `h('button', { class: 'primary', onclick }, 'Run')`. Attributes that are false or missing are left out.
+/// Makes an element: `h('button', { class: 'primary', onclick }, 'Run')`. Attributes that are false or missing are left
+/// out.
 export function h(tag, attributes = {}, ...children) {
   const element = document.createElement(tag);
   for (const [name, value] of Object.entries(attributes)) {
@@ -14,12 +15,12 @@ export function h(tag, attributes = {}, ...children) {
 
 export const byId = (id) => document.getElementById(id);
 
-/// Tells who cannot see the page.
+/// Announces a text to screen readers.
 export function say(text) {
   byId('say').textContent = text;
 }
 
-/// `1:02:03.4`, or `2:03.4`.
+/// Formats a time: `1:02:03.4`, or `2:03.4`.
 export function clock(ms) {
   const tenths = Math.round(ms / 100);
   const [h_, m, s] = [Math.floor(tenths / 36_000), Math.floor(tenths / 600) % 60, (tenths % 600) / 10];
@@ -27,7 +28,7 @@ export function clock(ms) {
   return h_ > 0 ? `${h_}:${String(m).padStart(2, '0')}:${seconds}` : `${m}:${seconds}`;
 }
 
-/// A number with thin groups: `12 345`.
+/// Formats a number with thin spaces between groups: `12 345`.
 export function grouped(number) {
   return (Math.round(number) || 0).toLocaleString('en').replaceAll(',', ' ');
 }
@@ -36,7 +37,7 @@ export function millimetres(mm) {
   return mm >= 10_000 ? `${(mm / 1_000).toFixed(2)} m` : `${mm.toFixed(1)} mm`;
 }
 
-/// Has the browser save a file.
+/// Makes the browser save a file.
 export function download(name, text) {
   const url = URL.createObjectURL(new Blob([text], { type: 'text/plain' }));
   const link = h('a', { href: url, download: name });

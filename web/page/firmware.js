@@ -1,13 +1,13 @@
-// The firmware as a WebAssembly module: one instance is one machine. See web/src/lib.rs for what each call does.
+// The firmware as a WebAssembly module: one instance is one machine. web/src/lib.rs documents each call.
 //
 // Owned by a Worker, or by a test in Node. Buffers that a call returns are copies.
 
 const encoder = new TextEncoder();
-/// Characters as bytes: those above 7F act at once.
+/// Converts characters to bytes. Bytes above 7F act at once.
 const bytesOf = (text) => Uint8Array.from(text, (character) => character.charCodeAt(0));
 const decoder = new TextDecoder('latin1');
 
-/// How many inputs a board has, and what they are called: the order of `boards::inputs`.
+/// The number and the names of the inputs of a board, in the order of `boards::inputs`.
 export const INPUTS = ['xmin', 'xmax', 'ymin', 'ymax', 'zmin', 'zmax', 'amin', 'amax', 'probe', 'door', 'stop'];
 
 export class Firmware {
@@ -27,7 +27,7 @@ export class Firmware {
     return this.wasm.memory.buffer.slice(at, at + length);
   }
 
-  /// Boots with the contents of an EEPROM, empty for a new machine; `asked` after a reset by the firmware.
+  /// Boots with EEPROM contents, empty for a new machine. `asked` after a reset that the firmware has asked for.
   boot(eeprom = new Uint8Array(), asked = false) {
     const length = this.#give(eeprom);
     if (this.wasm.boot(length, asked ? 1 : 0) !== 1) throw new Error('the firmware does not boot');
@@ -38,12 +38,13 @@ export class Firmware {
     this.wasm.send(port, this.#give(typeof data === 'string' ? bytesOf(data) : data));
   }
 
-  /// What the firmware has sent since the last call.
+  /// Returns what the firmware has sent since the last call.
   heard(port = 0) {
     return decoder.decode(this.#take(this.wasm.heard(port)));
   }
 
-  /// Runs for `ms` of the machine's time; less if `stops` at the end of a line from the firmware. Returns how long.
+  /// Runs for `ms` of the machine's time, or less: if `stops`, until the firmware ends a line. Returns the milliseconds
+  /// that have passed.
   run(ms, stops = false) {
     return this.wasm.run(ms, stops ? 1 : 0);
   }
@@ -74,7 +75,7 @@ export class Firmware {
     this.wasm.begin_samples();
   }
 
-  /// Four steps for each sample.
+  /// Returns the samples, four numbers of steps each.
   samples() {
     return new Int32Array(this.#take(this.wasm.samples()));
   }
@@ -83,20 +84,22 @@ export class Firmware {
     return this.wasm.sample_ms();
   }
 
-  /// Velocity, acceleration and jerk of the samples, in mm and s; `scale` is the millimetres of a step of each motor.
+  /// Returns velocity, acceleration and jerk of the samples, in mm and s. `scale` is the length of a step of each
+  /// motor, mm.
   curves(scale) {
     this.wasm.work_out_curves(this.#give(new Uint8Array(Float64Array.from(scale).buffer)));
     const curve = (which) => new Float32Array(this.#take(this.wasm.curve(which)));
     return { velocity: curve(0), acceleration: curve(1), jerk: curve(2) };
   }
 
-  /// Lowest, highest and all steps of each motor since the samples began.
+  /// Returns the lowest and the highest position and the number of steps of each motor since the samples began.
   extremes() {
     const all = new Float64Array(this.#take(this.wasm.extremes()));
     return [0, 1, 2, 3].map((m) => ({ lowest: all[3 * m], highest: all[3 * m + 1], total: all[3 * m + 2] }));
   }
 
-  /// Which lines ask for more than the limits allow: six feed limits, six velocities, per minute.
+  /// Returns which lines ask for more than the limits allow. The limits are six feed limits and six velocities, per
+  /// minute.
   asked(limits, text) {
     const job = encoder.encode(text);
     const bytes = new Uint8Array(96 + job.length);
@@ -105,12 +108,12 @@ export class Firmware {
     return JSON.parse(decoder.decode(this.#take(this.wasm.asked(this.#give(bytes)))));
   }
 
-  /// Profiles and codes.
+  /// Returns profiles and codes.
   tables() {
     return JSON.parse(new TextDecoder().decode(this.#take(this.wasm.tables())));
   }
 
-  /// Bytes of memory that the machine and its samples take.
+  /// Returns the bytes of memory that the machine and its samples take.
   memory() {
     return this.wasm.memory.buffer.byteLength;
   }

@@ -1,7 +1,8 @@
-// The panel of a job: what to run, how it goes, and what came of it.
+// The panel of a job: the file, the progress, and the results.
 //
-// Owned by main.js, which lends it the machine whose settings count. The run is in a Worker of its own, so that the page stays usable; a new
-// one for each job, which is ended when the job is cancelled and does not listen.
+// Owned by main.js, which passes the machine whose settings the run uses. The run is in a Worker of its own, so that
+// the page stays usable. Each job has a new Worker, so that a job that is cancelled can be ended even if it does not
+// react.
 
 import { byId, clock, grouped, h, millimetres, say } from './dom.js';
 
@@ -11,7 +12,7 @@ const EXAMPLES = [
   ['spiral.gcode', 'Spiral: 2,000 segments of 0.1 mm'],
   ['engraving.gcode', 'Engraving: short moves at low speed'],
 ];
-/// Refusals and notes that are shown; the rest are counted.
+/// Number of refusals and notes that are shown; the others are only counted.
 const SHOWN = 200;
 const LIMITS = { short: (least) => `A move takes at least 0.75 ms: the shortest goes at ${least}` };
 
@@ -61,7 +62,7 @@ export class JobPanel {
     this.file.value = '';
   }
 
-  /// A job is there: it runs at once.
+  /// Takes a new job, and runs it at once.
   take(name, text) {
     this.#job = { name, text };
     this.name.textContent = `${name}, ${grouped(text.split('\n').length)} lines`;
@@ -85,7 +86,7 @@ export class JobPanel {
     const board = this.context.board();
     const eeprom = board?.simulated ? await board.eeprom() : new Uint8Array();
     const settings = board?.simulated ? [] : await this.context.settingsOfBoard();
-    // Cancelled meanwhile, or begun anew.
+    // The user has cancelled the run or started another one meanwhile.
     if (run !== this.#run) return;
     const worker = new Worker(new URL('./job-worker.js', import.meta.url), { type: 'module' });
     this.#worker = worker;
@@ -180,7 +181,7 @@ export class JobPanel {
   }
 }
 
-/// Files that are dropped on the view.
+/// Takes files that are dropped on the view.
 export function takeDrops(onFile) {
   const drop = byId('drop');
   let depth = 0;

@@ -1,18 +1,19 @@
-// Carries a job out on a machine of its own, as fast as the computer can, and tells what came of it.
+// Runs a job on a machine of its own, as fast as the computer can, and returns the results.
 //
-// Runs in a Worker, or in Node for tests. The machine begins at the work zero, with the settings of the machine that is shown; it is at
-// rest and homed. Homing is taken for done, stops (M0) are passed over, for nobody is there. An error says why it could not begin.
+// Runs in a Worker, or in Node for tests. The machine begins at the work zero, at rest and homed, with the settings of
+// the machine that is shown. Homing is assumed to succeed, and program stops (M0) are resumed at once, because there is
+// no user. The error of a job that cannot begin says why.
 
 import { Firmware } from './firmware.js';
 import { Lines, answerStatus, parse } from './protocol.js';
 import { HARMLESS, Sender, homes, linesOf } from './sender.js';
 import { pathOf } from './path.js';
 
-/// The longest wait for an answer, ms of the machine's time: more than any move takes.
+/// Longest wait for an answer, ms of the machine's time: more than any move takes.
 const LONGEST_MS = 24 * 3_600_000;
-/// Milliseconds of the computer's time after which others have their turn.
+/// Milliseconds of the computer's time after which the run lets other tasks run.
 const TURN_MS = 40;
-/// More lines than this in a second, and the board's CPU, which is not reckoned with here, may be the limit.
+/// With more lines than this in a second the board's CPU may be the limit. The run does not simulate that limit.
 const MOST_LINES = 464;
 const AXES = ['x', 'y', 'z'];
 
@@ -27,7 +28,7 @@ class Talk {
     this.firmware = new Firmware(module);
     this.firmware.boot(eeprom);
     this.ms = 0;
-    // The greeting.
+    // Waits for the greeting.
     this.pass(100);
     this.#heard = [];
   }
@@ -41,7 +42,7 @@ class Talk {
     return this.#heard.shift();
   }
 
-  /// The answer to a line; an error if it is refused.
+  /// Returns the answer to a line; throws if the line is refused.
   ask(line) {
     this.firmware.send(`${line}\n`);
     for (let waited = 0; waited < 60_000; waited += 1) {
@@ -57,7 +58,7 @@ class Talk {
   }
 }
 
-/// What motors and axes are, as the machine tells it.
+/// Returns the settings of motors and axes, as the machine reports them.
 function describe(talk) {
   const motors = [1, 2, 3, 4].map((m) => talk.ask(`{${m}:n}`)[m]);
   const axes = ['x', 'y', 'z', 'a', 'b', 'c'].map((axis) => talk.ask(`{${axis}:n}`)[axis]);
@@ -66,7 +67,7 @@ function describe(talk) {
   return { axes, scale, motorOf };
 }
 
-/// The other coordinate systems that have an offset: name and place in work coordinates.
+/// Returns the other coordinate systems that have an offset: name, and place in work coordinates.
 function offsets(talk, zero) {
   return ['g55', 'g56', 'g57', 'g58', 'g59', 'g591', 'g592', 'g593'].flatMap((name) => {
     const { x, y, z } = talk.ask(`{${name}:n}`)[name];
@@ -74,7 +75,8 @@ function offsets(talk, zero) {
   });
 }
 
-/// Runs a job: `{ text, eeprom, settings, zero }`. `progress` is told `{ sent, total, ms }` now and then, and ends the run by returning false.
+/// Runs a job: `{ text, eeprom, settings, zero }`. `progress` is called with `{ sent, total, ms }` now and then. The
+/// run ends if it returns false.
 export async function runJob(module, job, progress = () => true) {
   const talk = new Talk(module, job.eeprom ?? new Uint8Array());
   const { firmware } = talk;
@@ -119,7 +121,7 @@ export async function runJob(module, job, progress = () => true) {
       if (note?.status !== undefined && !HARMLESS.includes(note.status)) {
         note.text = 'It cannot be tried here: the alarm was cleared, and the job went on.';
         firmware.send('{clear:n}\n');
-        // Its answer is no line's of the job.
+        // The answer to this line does not belong to a line of the job.
         awaitClear(talk, sender, pace);
       }
     }
@@ -142,7 +144,7 @@ export async function runJob(module, job, progress = () => true) {
   return finish({ firmware, systems, axes, scale, motorOf, zero, ms, sender, notes, asked, pace });
 }
 
-/// The answer to `{clear:n}` is waited for, while lines before it are answered.
+/// Waits for the answer to `{clear:n}`, and counts the answers to lines before it.
 function awaitClear(talk, sender, pace) {
   for (let waited = 0; waited < 10_000; waited += 1) {
     talk.pass(20, true);
@@ -153,7 +155,7 @@ function awaitClear(talk, sender, pace) {
   }
 }
 
-/// Where work zero is if nobody says it: the lower ends of X and Y, the middle of Z.
+/// The default place of the work zero: the lower ends of X and Y, the middle of Z.
 export function defaultZero(axes) {
   const [x, y, z] = axes;
   return [x.tn, y.tn, (z.tn + z.tm) / 2];

@@ -1,5 +1,5 @@
-// The Worker of a dry run: one job, on a machine of its own. Told `{ module, job }`, then perhaps `{ cancel: true }`; tells `{ progress }`,
-// and at the end `{ result }`, `{ cancelled: true }` or `{ error }`.
+// The Worker of a dry run: one job, on a machine of its own. It receives `{ module, job }`, then perhaps `{ cancel:
+// true }`. It sends `{ progress }`, and at the end `{ result }`, `{ cancelled: true }` or `{ error }`.
 
 import { runJob } from './job-run.js';
 

@@ -1,24 +1,26 @@
-// The panel of a machine to talk to: position and state, what stops and resumes it, overrides, jogging, switches, spindle, and a terminal.
+// The panel of the connected machine: position and state, stop and resume, overrides, jogging, switches, spindle, and a
+// terminal.
 //
-// Owned by main.js; the same for a simulated machine and a real one, of which only the first has switches to press. Positions and the state are
-// those that the machine tells (`sr`), the steps those of a simulated machine's pins. Keys jog only while the jog buttons have the focus.
+// Owned by main.js, and used for a simulated machine and for a real one. Only a simulated machine has switches to
+// press. Positions and the state are those that the machine reports (`sr`). Steps are those at a simulated machine's
+// pins. Keys jog only while the jog buttons have the focus.
 
 import { INPUTS } from './firmware.js';
 import { STATES, parse } from './protocol.js';
 import { byId, grouped, h, say } from './dom.js';
 
-/// Lines of the terminal that are kept.
+/// Number of lines that the terminal keeps.
 const KEPT = 600;
 /// Real-time characters.
 const FLUSH = '!%';
 const END = '\x04';
 const RESET = '\x18';
-/// Pulses of the encoder in a turn, which `spn` is set to.
+/// Pulses of the encoder in a turn; `spn` is set to this value.
 const PULSES = 16;
 const SPINDLE = 1;
 const SPEEDS = [['1', 'real time'], ['10', '10 times'], ['100', '100 times'], ['Infinity', 'as fast as it goes']];
 const DIALECTS = [['tinyg', 'TinyG'], ['grbl', 'grbl 1.1']];
-/// How often grbl's dialect is asked for the state, ms; TinyG's tells it.
+/// How often a machine in grbl's dialect is asked for its state, ms. In TinyG's dialect the machine reports it unasked.
 const POLL_MS = 200;
 const SWITCHES = [[0, 'X min'], [1, 'X max'], [2, 'Y min'], [3, 'Y max'], [4, 'Z min'], [5, 'Z max'], [8, 'Probe'], [9, 'Door'], [10, 'Emergency stop']];
 
@@ -72,7 +74,8 @@ export class MachinePanel {
     return [h('label', { for: id }, name), slider, shown];
   }
 
-  /// In grbl's dialect by characters that act at once: from 100 % in steps of 10 and 1; rapids have 100, 50 and 25 %.
+  /// In grbl's dialect overrides are characters that act at once: feed and spindle from 100 % in steps of 10 and 1,
+  /// rapids 100, 50 and 25 %.
   #change(setting, percent) {
     if (this.#board.dialect === 'tinyg') return this.#board.type(`{${setting}:${percent / 100}}`);
     if (setting === 'mto') return this.#board.send(percent > 75 ? '\x95' : percent > 37 ? '\x96' : '\x97');
@@ -165,14 +168,15 @@ export class MachinePanel {
     if (text === FLUSH || text === END) this.#board.stopStream();
   }
 
-  /// What is said first after a start decides: the machine starts anew.
+  /// The first line after a start decides the dialect, so the machine is restarted.
   #speak(dialect) {
     this.#board.dialect = dialect;
     if (this.#board.simulated) this.#board.power();
     else this.#board.send(RESET);
   }
 
-  /// Another profile: the switches are where its motors work them after a restart.
+  /// Selects another profile, and restarts the machine. After the restart the motors actuate the switches at the places
+  /// of the new profile.
   async #become(machine) {
     this.#board.type(`{mch:${machine}}`);
     await this.#stored();
@@ -185,7 +189,7 @@ export class MachinePanel {
     else await new Promise((resolve) => setTimeout(resolve, 1_500));
   }
 
-  /// Moves an axis by the chosen distance, from where it is; nothing while it moves.
+  /// Jogs an axis by the chosen distance from its present position. Does nothing while the axis moves.
   async jog(axis, sign) {
     if (this.#board.dialect === 'grbl') return this.#board.type(`$J=G91 G21 ${axis.toUpperCase()}${sign * Number(this.step.value)} F600`);
     try {
@@ -197,7 +201,7 @@ export class MachinePanel {
     }
   }
 
-  /// Talks to this board from now on.
+  /// Connects the panel to this board.
   use(board) {
     this.#board = board;
     this.simulated.hidden = !board.simulated;
@@ -224,7 +228,7 @@ export class MachinePanel {
     this.context.onBoot();
   }
 
-  /// Where the motors of a simulated machine work its switches: mm on each motor's axis.
+  /// Sets where the motors of a simulated machine actuate its switches, by the steps in a mm of each axis.
   wire(stepsPerMm) {
     const [x, y, z] = stepsPerMm;
     if (x) this.#board.near(INPUTS.indexOf('xmin'), Math.round(-5 * x));
@@ -295,7 +299,7 @@ export class MachinePanel {
     this.#turn(state);
   }
 
-  /// The spindle turns as its output says, 24,000 turns a minute at 100 %, unless it is stalled.
+  /// The spindle follows its output, 24,000 turns a minute at 100 %, unless it is stalled.
   #turn(state) {
     const rpm = state.outputs & SPINDLE && !this.#stalled ? (state.pulse / 1_000) * 24_000 : 0;
     if (rpm === this.#turns) return;

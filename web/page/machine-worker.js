@@ -1,29 +1,31 @@
-// The Worker of the machine that one talks to: runs it at real time, faster, or as fast as it goes.
+// The Worker of the simulated machine that the page is connected to. Runs the machine at real time, faster, or as fast
+// as possible.
 //
-// | told | |
+// | message | meaning |
 // |---|---|
-// | `{ module }` | first of all: boots a new machine |
-// | `{ send, port }`, `{ line }` | characters for a port; a line that somebody has typed |
-// | `{ speed }` | times real time; Infinity for as fast as it goes |
-// | `{ stream }`, `{ stopStream: true }` | a job to send safely; nothing more of it is sent |
+// | `{ module }` | comes first: boots a new machine |
+// | `{ send, port }`, `{ line }` | characters for a port; a line that the user has typed |
+// | `{ speed }` | multiple of real time; Infinity for as fast as possible |
+// | `{ stream }`, `{ stopStream: true }` | sends a job by counting responses; sends no more of it |
 // | `{ press, closed }`, `{ near: [input, step] }`, `{ spindle: { rpm, perTurn } }` | contacts and the spindle |
 // | `{ snapshot: id }` | answered by `{ snapshot: id, eeprom }`, once everything is stored |
-// | `{ power: true, eeprom }` | power off and on, with this EEPROM |
+// | `{ power: true, eeprom }` | switches power off and on, with these EEPROM contents |
 //
-// Tells `{ heard, port }`, `{ state }` thirty times a second while something changes, `{ trail }`, the steps between two states, `{ booted }`, and of
-// a job `{ progress }`, `{ streamed }`. A machine that is too fast for the computer falls behind; `state.behind` says so.
+// It sends `{ heard, port }`; `{ state }` thirty times a second while something changes; `{ trail }`, the steps between
+// two states; `{ booted }`; and for a job `{ progress }` and `{ streamed }`. A machine that needs more time than the
+// computer has falls behind real time; `state.behind` then says so.
 
 import { Firmware } from './firmware.js';
 import { Lines } from './protocol.js';
 import { Sender, linesOf } from './sender.js';
 
-/// Milliseconds between two turns, and how much of one the machine may take.
+/// Milliseconds between two turns, and the most of them that the machine may take.
 const TURN_MS = 16;
 const BUSY_MS = 12;
-/// Longest time to catch up with, ms.
+/// Longest lag behind real time that is made up for, ms.
 const LATEST_MS = 250;
 const TELL_MS = 33;
-/// A write to EEPROM takes 3.4 ms a byte; a settings change is kept within a second.
+/// A write to EEPROM takes 3.4 ms a byte. A changed setting is stored within a second.
 const STORED_MS = 600;
 
 let module;
@@ -36,7 +38,7 @@ let due = 0;
 let last = performance.now();
 let told = 0;
 let before = '';
-/// How often nothing has changed between two states.
+/// Number of states in a row without a change.
 let quiet = 0;
 
 function boot(eeprom, asked) {
@@ -56,7 +58,7 @@ function endStream(why) {
   postMessage({ streamed: { answered, refused, notes, why } });
 }
 
-/// Runs for some of the machine's time while the computer has time. Returns how long.
+/// Runs for up to `ms` of the machine's time while the computer has time. Returns the milliseconds that have passed.
 function run(ms) {
   const end = performance.now() + BUSY_MS;
   let passed = 0;
@@ -99,7 +101,7 @@ function turn() {
   const passed = now - last;
   last = now;
   if (!firmware) return;
-  // As fast as it goes while there is something to do.
+  // At unlimited speed the machine runs as long as it has something to do.
   const idle = !sender && quiet > 30;
   const wanted = speed === Infinity ? (idle ? passed : 1e6) : due + passed * speed;
   const whole = Math.floor(wanted);
@@ -123,7 +125,7 @@ function tell(now, behind) {
   postMessage({ state });
 }
 
-/// The EEPROM, once what has been set is stored.
+/// Returns the EEPROM contents, once all changed settings are stored.
 function stored() {
   for (let waited = 0, same = 0, then = ''; waited < 10_000 && same < STORED_MS; waited += 50) {
     firmware.run(50);

@@ -1,8 +1,8 @@
-// Puts the page together: loads the firmware, boots a machine in a Worker, and joins the panels to the view.
+// Puts the page together: loads the firmware, boots a machine in a Worker, and connects the panels to the view.
 //
 // | module | owns |
 // |---|---|
-// | `boards.js` | the machine that one talks to, simulated or real |
+// | `boards.js` | the connected machine, simulated or real |
 // | `job-panel.js` | a job and its dry run in `job-worker.js` |
 // | `machine-panel.js` | controls and terminal |
 // | `settings-panel.js`, `settings-file.js` | settings as a form and as a file |
@@ -23,7 +23,7 @@ import { View } from './view.js';
 
 const page = { board: undefined, result: undefined, ms: 0, playing: false, scale: undefined };
 
-/// What motors and axes of the simulated machine are: steps in a mm of X, Y, Z, their motors, and the ends of travel.
+/// Reads the geometry of the machine: steps in a mm of X, Y and Z, their motors, and the ends of travel.
 async function readMachine(board) {
   const motors = [];
   for (const m of [1, 2, 3, 4]) motors.push((await board.ask(`{${m}:n}`)).body[m]);
@@ -39,7 +39,7 @@ function placeOf(steps, offset = 0) {
   return motorOf.map((m, axis) => (m < 0 || perMm[axis] === 0 ? 0 : steps[offset + m] / perMm[axis]));
 }
 
-/// The machine has booted: its switches are wired, and the view knows its travel.
+/// Called when the machine has booted. Wires its switches, and shows its travel in the view.
 async function booted(board, panel) {
   try {
     if (board.dialect === 'grbl') {
@@ -55,7 +55,7 @@ async function booted(board, panel) {
     page.view.clearTrail();
     await settings.show();
   } catch (error) {
-    // A reset in between: the next boot asks again.
+    // The machine was reset meanwhile. The next boot asks again.
     console.info(error.message);
   }
 }
@@ -174,7 +174,7 @@ function use(board, machinePanel) {
   settings.use(board);
 }
 
-/// A real board in the place of the simulated one, or back.
+/// Replaces the simulated board by a real one, or the other way round.
 async function connect(machinePanel, module) {
   if (!page.board.simulated) {
     await page.board.close();
@@ -192,7 +192,7 @@ async function connect(machinePanel, module) {
       say('The port is closed.');
       use(new SimulatedBoard(module), machinePanel);
     });
-    // A board resets when its port is opened, and greets.
+    // A board resets and sends its greeting when its port is opened.
     setTimeout(() => board.ask('{sr:n}').then(() => settings.show()).catch(() => showLink('No answer', 'bad')), 2_500);
   } catch (error) {
     if (error.name !== 'NotFoundError') say(`The port cannot be opened: ${error.message}`);

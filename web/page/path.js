@@ -1,8 +1,10 @@
-// The path to draw, from samples of steps. Pure functions, run in a Worker.
+// Computes the path to draw from samples of steps. Pure functions that run in a Worker.
 
-/// Leaves samples out that lie on a straight line between others, to less than a step: the vertices, and the sample that each of them is.
+/// Leaves out samples that lie on a straight line between others, to within a step. Returns the vertices, and the
+/// sample of each vertex.
 ///
-/// `steps` has four numbers for each sample, `axes` the motor, mm of a step and origin of X, Y, Z.
+/// `steps` has four numbers for each sample. `axes` has, for X, Y and Z, the motor, the length of a step in mm, and the
+/// origin.
 export function pathOf(steps, axes) {
   const count = steps.length / 4;
   const at = (i, axis) => (axes[axis] ? steps[4 * i + axes[axis].motor] * axes[axis].scale + axes[axis].origin : 0);
@@ -31,7 +33,7 @@ export function pathOf(steps, axes) {
     }
     const along = p[0] * direction[0] + p[1] * direction[1] + p[2] * direction[2];
     const off = Math.sqrt(Math.max(0, length * length - along * along));
-    // Once in a while on a long line, so that its colour can change.
+    // Long lines keep some samples, so that the colour can change along them.
     if (off <= tolerance && along >= reach - tolerance && i - samples.at(-1) < 25) {
       reach = Math.max(reach, along);
       continue;

@@ -1,6 +1,6 @@
-// What lines from a machine mean, in TinyG's dialect and in grbl's. Pure functions.
+// Interprets lines from a machine, in TinyG's dialect and in grbl's. Pure functions.
 
-/// Status of a line that was passed over, and of one that an alarm refused.
+/// Status of a line that was skipped, and of a line that was refused in an alarm.
 export const PASSED_OVER = 3;
 export const ALARM = 203;
 
@@ -12,16 +12,17 @@ function json(text) {
   }
 }
 
-/// A line as JSON, or nothing. With `js` 0 names have no quotes.
+/// Parses a line as JSON; `undefined` if it is not JSON. With `js` 0 names have no quotes.
 export function parse(line) {
   if (!line.startsWith('{')) return undefined;
   return json(line) ?? json(line.replace(/([{,])(\w+):/g, '$1"$2":'));
 }
 
-/// Status of a refusal in text mode, which tells no number.
+/// Status of a refusal in text mode, which has no number.
 export const UNTOLD = -1;
 
-/// The status of the answer to a line; nothing of what answers no line: a greeting, a report, the end of a probing. In text mode a prompt answers.
+/// Returns the status of the answer to a line; `undefined` for lines that answer no line, such as a greeting, a report
+/// or the end of a probing. In text mode a prompt answers a line.
 export function answerStatus(line) {
   if (line === 'ok') return 0;
   const error = /^error:(\d+)/.exec(line);
@@ -34,32 +35,32 @@ export function answerStatus(line) {
   return footer[1];
 }
 
-/// Whether a line is of text mode, in which the machine answers from then on: `$xvm`, `?`, `h`.
+/// Whether a line belongs to text mode (`$xvm`, `?`, `h`). The machine answers in text mode from then on.
 export function isText(line) {
   return /^\s*[$?h]/.test(line);
 }
 
-/// The status of an exception.
+/// Returns the status of an exception.
 export function exceptionStatus(line) {
   return parse(line)?.er?.st;
 }
 
-/// The first name in a line of JSON, typed strictly or not: `xvm` of `{xvm:n}`.
+/// Returns the first name in a line of JSON, with or without quotes: `xvm` of `{xvm:n}`.
 export function nameIn(line) {
   return /^\s*\{\s*"?(\w+)/.exec(line)?.[1];
 }
 
-/// What `stat` numbers are.
+/// The meanings of the numbers of `stat`.
 export const STATES = ['starts', 'ready', 'alarm', 'at rest', 'program ended', 'runs', 'holds', 'probes', '', 'homes', 'jogs', 'stopped', '', 'panic'];
 
-/// Splits a stream of characters into lines; keeps what has no end yet.
+/// Splits a stream of characters into lines, and keeps the last line until its end has come.
 export class Lines {
   #rest = '';
 
   add(text) {
     const lines = (this.#rest + text).split('\n');
     this.#rest = lines.pop();
-    // XON and XOFF are no part of a line.
+    // XON and XOFF do not belong to a line.
     return lines.map((line) => line.replace(/[\r\x11\x13]/g, '')).filter((line) => line !== '');
   }
 }

@@ -1,19 +1,22 @@
-// Sends a job safely, by counting responses: at most four lines, and no more bytes than the machine has room for, wait for an answer.
+// Sends a job by counting responses: at most four lines, and no more bytes than the machine has room for, wait for an
+// answer.
 //
-// The same for a simulated machine and a real one. Owned by whoever has the line; it never waits, and keeps no clock. A machine that
-// answers no more leaves it where it is; `stop` forgets what has not been sent. A strict one stops at the first line that is refused, and at an
-// alarm. What somebody types meanwhile is told by `foreign`, so that its answer is not taken for one of the job's.
+// Used for a simulated machine and for a real one. Owned by the code that has the line. It never waits, and has no
+// clock, so it does not notice a machine that has stopped answering. `stop` drops what has not been sent. A strict
+// sender stops at the first refused line and at an alarm. `foreign` reports lines that the user types meanwhile, so
+// that their answers are not counted for the job.
 
-/// Exceptions after which a job goes on.
+/// Exceptions after which a job continues.
 export const HARMLESS = [37, 38, 39, 40, 180];
 
 import { answerStatus, exceptionStatus, isText, nameIn, parse, ALARM, PASSED_OVER } from './protocol.js';
 
-/// Lines that may wait for their answers, and their bytes together: 587 fit the machine.
+/// Most lines that may wait for their answers, and their bytes together. The machine has room for 587 bytes.
 const IN_FLIGHT = 4;
 const BYTES = 500;
 
-/// The lines of a job as they are sent: `{ number, text, left }`, where `left` are characters that would act at once and were left out.
+/// The lines of a job as they are sent: `{ number, text, left }`. `left` is true if characters that would act at once
+/// were removed.
 export function* linesOf(job) {
   let number = 0;
   for (const raw of job.split('\n')) {
@@ -39,16 +42,16 @@ export class Sender {
   #foreign = [];
   #prompts = 0;
 
-  /// `lines` are those of `linesOf`; `total` is for the progress alone.
+  /// `lines` are those of `linesOf`. `total` is used only for the progress.
   constructor(lines, total, strict = false) {
     this.strict = strict;
-    /// Why a strict one has stopped.
+    /// The reason why a strict sender has stopped.
     this.stopped = '';
     this.#lines = lines[Symbol.iterator]();
     this.total = total;
     this.answered = 0;
     this.sent = 0;
-    /// The number of the line that was answered last.
+    /// The number of the last line that was answered.
     this.last = 0;
     this.refused = [];
     this.notes = [];
@@ -60,14 +63,15 @@ export class Sender {
     this.#next = done ? undefined : value;
   }
 
-  /// A line that an alarm has refused is sent once more, before all others, when the alarm has been cleared.
+  /// Queues a line that was refused in an alarm, to be sent once more after the alarm has been cleared, before all other
+  /// lines.
   #retry(line) {
     this.#again.push({ ...line, again: true, left: false });
     this.answered -= 1;
     return true;
   }
 
-  /// The text that may be sent now, with its line ends; empty if the machine has enough.
+  /// Returns the text that may be sent now, with line ends; empty if no more may be sent.
   take() {
     let text = '';
     for (let line = this.#peek(); line && this.#fits(line); line = this.#peek()) {
@@ -91,7 +95,7 @@ export class Sender {
     return first || (this.#waiting.length < IN_FLIGHT && this.#bytes + line.text.length + 1 <= BYTES);
   }
 
-  /// Somebody else has sent a line.
+  /// Takes note of a line that was not sent by this sender.
   foreign(line) {
     const name = nameIn(line);
     if (name !== undefined) this.#foreign.push(name);
@@ -102,7 +106,7 @@ export class Sender {
     }
   }
 
-  /// Whether an answer is that to a foreign line.
+  /// Whether an answer belongs to such a line.
   #isForeign(line) {
     const body = parse(line)?.r;
     const at = body ? this.#foreign.findIndex((name) => name in body) : -1;
@@ -118,7 +122,7 @@ export class Sender {
     this.stop();
   }
 
-  /// A line from the machine. True if it is the answer to a line of the job.
+  /// Takes a line from the machine. Returns true if the line answers a line of the job.
   hear(heard) {
     const exception = exceptionStatus(heard);
     if (exception !== undefined) {
@@ -139,7 +143,7 @@ export class Sender {
     return true;
   }
 
-  /// Nothing more is sent.
+  /// Stops sending.
   stop() {
     this.#again = [];
     this.#next = undefined;

@@ -1,6 +1,7 @@
-// What the numbers of a setting stand for, from its description. A pure function.
+// Parses the choices of a setting from its description. A pure function.
 
-/// The words of a description such as `0 off, 1 homing, 2 limit`: a name for each whole number from `minimum` to `maximum`, or nothing.
+/// Parses a description such as `0 off, 1 homing, 2 limit`. Returns a name for each whole number from `minimum` to
+/// `maximum`, or `undefined`.
 export function choices({ type, minimum, maximum, description = '' }) {
   if (type !== 'integer' || maximum - minimum > 5) return undefined;
   const names = [];

@@ -1,21 +1,24 @@
-// All settings of a machine as a file, and back. The file is that of `cargo xtask settings save`; as lines it is a request each, which
-// any sender sends like a job and `cargo xtask sim --set @FILE` understands.
+// Saves all settings of a machine to a file, and loads them. The file is that of `cargo xtask settings save`. It can
+// also be saved as lines, one request each, which any sender sends like a job, and which `cargo xtask sim --set @FILE`
+// reads.
 //
-// Owned by the settings panel, which shows what was refused. Sending goes on after a refusal; an answer that does not come is an error.
+// Owned by the settings panel, which shows the refused settings. Sending continues after a refusal. A missing answer is
+// an error.
 
 /// The groups, in the order in which they are loaded.
 export const GROUPS = ['1', '2', '3', '4', 'x', 'y', 'z', 'a', 'b', 'c', 'p1', 'sp', 'co', 'sq', 'uda', 'udb', 'udc', 'udd', 'sys'];
 const SYSTEMS = ['g54', 'g55', 'g56', 'g57', 'g58', 'g59', 'g591', 'g592', 'g593'];
 const TOOLS = Array.from({ length: 10 }, (_, n) => `tt${n + 1}`);
 const STORED = ['g28', 'g30'];
-/// What the machine is; it is not sent back.
+/// Values that identify the machine. They are not sent back.
 const FIXED = ['fb', 'fv', 'hp', 'hv', 'id', 'net', 'baud', 'kerf'];
-/// These change how the machine answers, and these may stop it: last.
+/// Settings that change how the machine answers, and settings that may stop it. They are sent last.
 const TALK = ['ej', 'js', 'tv', 'ec', 'ee', 'ex', 'rxm', 'sv', 'si', 'qv', 'dia', 'jv'];
 const STOPPING = ['saf', 'est'];
-/// Settings that an image without their capability lacks, and what it does as if they were this: left out at that value.
+/// Settings that images without their capability lack, with the values that are equivalent to their absence. A setting
+/// with that value is left out.
 const OPTIONAL = { sp: { n: 0, b: 0, r: 0, l: 0, di: 0 } };
-/// Longest line.
+/// Longest line that is sent.
 const LINE = 200;
 
 /// Reads all groups from a machine.
@@ -32,8 +35,8 @@ export async function save(board) {
 
 const spelled = (value) => (typeof value === 'string' ? `"${value}"` : String(value));
 
-/// The requests that set what a file says, in an order that a machine takes: profile, motors, axes, the rest, and last what changes the
-/// conversation. Stored positions cannot be set.
+/// Returns the requests that set the values of a file, in an order that the machine accepts: profile, motors, axes, the
+/// rest, and last the settings that change the conversation. Stored positions cannot be set.
 export function requests(file) {
   const system = Object.entries(file.sys ?? {});
   const special = [...FIXED, ...TALK, ...STOPPING, 'mch'];
@@ -46,7 +49,7 @@ export function requests(file) {
   return [...lines, ...late(STOPPING), ...late(TALK)];
 }
 
-/// Members of a group in as few lines as they fit.
+/// Splits the members of a group into as few lines as possible.
 function packed(group, members) {
   const wrap = (pairs) => (group === 'sys' ? `{${pairs}}` : `{${group}:{${pairs}}}`);
   const lines = [];
@@ -63,12 +66,12 @@ function packed(group, members) {
   return lines;
 }
 
-/// The file as lines for a sender.
+/// Returns the file as lines for a sender.
 export function asLines(file) {
   return `${requests(file).join('\n')}\n`;
 }
 
-/// Reads a file of either kind: the requests in it. An error says what is wrong with it.
+/// Parses a file of either kind. Returns its requests. The error says what is wrong with the file.
 export function read(text) {
   if (/^\s*\{\s*"/.test(text)) {
     const file = JSON.parse(text);
@@ -82,10 +85,11 @@ export function read(text) {
   return lines;
 }
 
-/// The status of a value that cannot be set, which a file may have all the same.
+/// The status of a value that cannot be set. A file may contain such values.
 const READ_ONLY = 104;
 
-/// Sends requests; those that were refused, each with its status. Each member of a refused line is tried by itself.
+/// Sends requests. Returns the refused ones, each with its status. After a refused line each of its members is sent on
+/// its own.
 export async function load(board, lines) {
   const refused = [];
   for (const line of lines) {
@@ -99,7 +103,7 @@ export async function load(board, lines) {
   return refused;
 }
 
-/// A request for each member of a line.
+/// Returns a request for each member of a line.
 function parts(line) {
   const group = /^\{(\w+):\{(.*)\}\}$/.exec(line);
   const pairs = (group ? group[2] : line.slice(1, -1)).split(',');

@@ -1,7 +1,8 @@
-// The settings as a form, made from `settings.schema.json`, which is made from the firmware's table; and as a file.
+// The settings as a form, made from `settings.schema.json`, and as a file. The schema is generated from the firmware's
+// table.
 //
-// Owned by main.js. Fields show what the machine says; a change is sent at once, and what the machine makes of it is shown. Refusals stand
-// at the field. A group is read when it is chosen.
+// Owned by main.js. Fields show the values of the machine. A change is sent at once, and the field then shows the value
+// that the machine has stored. A refusal is shown at the field. A group is read when the user selects it.
 
 import { choices } from './settings-choices.js';
 import { asLines, load, read, save } from './settings-file.js';
@@ -12,7 +13,7 @@ const NAMES = {
   p1: 'Pulses of the spindle', sp: 'Spindle', co: 'Coolant', sq: 'Squaring',
 };
 
-/// From what to what a number may be; ends that no machine comes near are left out.
+/// Returns the range of a number as text. Limits that no machine comes near are left out.
 function rangeOf(about) {
   const { minimum, maximum } = about;
   if (minimum === undefined || choices(about)) return '';
@@ -21,7 +22,7 @@ function rangeOf(about) {
   return low ? `${minimum} and more` : '';
 }
 
-/// A description, with code for what stands between backticks.
+/// Converts a description: text between backticks becomes code.
 function spelled(text) {
   return text.split('`').map((part, n) => (n % 2 === 1 ? h('code', {}, part) : part));
 }

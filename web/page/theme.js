@@ -1,4 +1,5 @@
-// Light and dark: as the system has it, or as the switch says. Fires `theme` on the document when it changes.
+// Light and dark theme: that of the system, or the one selected by the switch. Fires `theme` on the document when it
+// changes.
 
 import { byId } from './dom.js';
 
@@ -32,7 +33,7 @@ export function startTheme() {
     try {
       localStorage.setItem('kerf-theme', choice);
     } catch {
-      // It holds for this visit.
+      // The choice lasts for this visit.
     }
     apply();
   });
@@ -40,7 +41,7 @@ export function startTheme() {
   apply();
 }
 
-/// The value of a colour of the theme.
+/// Returns the value of a colour of the theme.
 export function colour(name) {
   return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 }

@@ -1,7 +1,7 @@
-// The path in 3D, drawn from the steps that were made; three.js does the drawing.
+// The path in 3D, drawn by three.js from the steps that were made.
 //
-// Owned by main.js. Coordinates are work coordinates in mm, Z up. Draws only when something has changed. A browser without WebGL gets a
-// sentence in its place, and everything else works.
+// Owned by main.js. Coordinates are work coordinates in mm, Z up. Draws only when something has changed. In a browser
+// without WebGL a sentence takes its place, and the rest of the page works.
 
 import * as THREE from 'three';
 import { OrbitControls } from './vendor/OrbitControls.js';
@@ -11,14 +11,14 @@ import { LineMaterial } from './vendor/lines/LineMaterial.js';
 import { byId } from './dom.js';
 import { colour } from './theme.js';
 
-/// Colours from slow to fast; the legend in style.css has them too.
+/// Colours from slow to fast. The legend in style.css repeats them.
 const RAMP = ['#3d58b0', '#1a9aa6', '#4caf62', '#e0a020', '#dd5b2b'].map((hex) => new THREE.Color(hex));
-/// More segments than this are drawn as thin lines.
+/// With more segments than this the path is drawn as thin lines.
 const WIDE = 120_000;
-/// Vertices of the trail of the machine that one talks to.
+/// Most vertices of the trail of the connected machine.
 const TRAIL = 20_000;
 
-/// The colour of a part of the highest speed, into three numbers of an array.
+/// Writes the colour of a share of the highest speed to three numbers of an array.
 function paint(colours, at, part) {
   const place = Math.min(Math.max(part, 0), 1) * (RAMP.length - 1);
   const low = Math.min(Math.floor(place), RAMP.length - 2);
@@ -84,7 +84,8 @@ export class View {
     });
   }
 
-  /// Where the machine's travel ends, in work coordinates, and where other coordinate systems have their zero: `{ name, place }` each.
+  /// Shows the ends of the machine's travel, in work coordinates, and the zeros of other coordinate systems: `{ name,
+  /// place }` each.
   limits(lower, upper, systems = []) {
     this.#box = { lower, upper };
     this.#systems = systems;
@@ -107,7 +108,7 @@ export class View {
     this.draw();
   }
 
-  /// A grid of 10 mm in the plane of the work zero, of 50 or 100 mm on larger machines.
+  /// Draws a grid in the plane of the work zero, of 10 mm, or of 50 or 100 mm on larger machines.
   #grid(lower, upper) {
     const span = Math.max(upper.x - lower.x, upper.y - lower.y);
     const step = [10, 50, 100, 500].find((step) => span / step <= 40) ?? 1_000;
@@ -119,7 +120,7 @@ export class View {
     return new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color: colour('line') }));
   }
 
-  /// The axes at the work zero.
+  /// Draws the axes at the work zero.
   #zero(size) {
     const shown = this.#shown.getSize(new THREE.Vector3()).length();
     const length = Math.min(Math.max(size.x, size.y) / 8, Math.max(shown / 5, 4), 60);
@@ -128,7 +129,7 @@ export class View {
     return [arrow(1, 0, 0, 0xc8453b), arrow(0, 1, 0, 0x3d9a50), arrow(0, 0, 1, 0x3f6fd0)];
   }
 
-  /// A cross and a name at the zero of another coordinate system.
+  /// Draws a cross and a name at the zero of another coordinate system.
   #offset({ name, place: [x, y, z] }, size) {
     const arm = Math.max(size.x, size.y) / 40;
     const points = [x - arm, y, z, x + arm, y, z, x, y - arm, z, x, y + arm, z, x, y, z - arm, x, y, z + arm];
@@ -221,7 +222,7 @@ export class View {
     this.#path = this.#rest = undefined;
   }
 
-  /// The tool is at a place, and so much of the path is done.
+  /// Shows the tool at a place, and a share of the path as done.
   at(place, sample) {
     if (!this.renderer) return;
     this.#tool.position.set(...place);
@@ -235,13 +236,13 @@ export class View {
     this.draw();
   }
 
-  /// Goes on with the trail of the machine that one talks to: three numbers for each place.
+  /// Extends the trail of the connected machine: three numbers for each place.
   follow(places) {
     if (!this.renderer || places.length === 0) return;
     const attribute = this.#trail.geometry.getAttribute('position');
     const count = places.length / 3;
     if (this.#trailCount + count > TRAIL) {
-      // The older half is forgotten.
+      // Drops the older half.
       attribute.array.copyWithin(0, 3 * (TRAIL / 2), 3 * this.#trailCount);
       this.#trailCount = Math.max(this.#trailCount - TRAIL / 2, 0);
     }
@@ -258,14 +259,14 @@ export class View {
     this.draw();
   }
 
-  /// Whether a whole job is shown, or the machine that one talks to.
+  /// Selects whether a whole job is shown, or the connected machine.
   showJob(on) {
     for (const line of [this.#path, this.#rest]) if (line) line.visible = on;
     if (this.#trail) this.#trail.visible = !on;
     this.draw();
   }
 
-  /// Looks from a side, at all of the path.
+  /// Looks at the whole path from one side.
   look(from) {
     if (!this.renderer) return;
     const directions = { iso: [-0.55, -1, 0.75], top: [0, -0.0001, 1], front: [0, -1, 0.0001], side: [1, 0, 0.0001] };
@@ -283,7 +284,7 @@ export class View {
   }
 }
 
-/// How many segments end at or before a sample.
+/// Returns the number of segments that end at or before a sample.
 function below(samples, sample) {
   let [low, high] = [0, samples.length];
   while (low < high) {

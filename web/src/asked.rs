@@ -1,8 +1,9 @@
-//! Which lines of a job ask for more than the limits allow.
+//! Finds the lines of a job that ask for a higher rate than the limits allow.
 //!
-//! The lines are read as [`kerf::canon`] reads them. A straight feed along several axes may be as fast as the first of them allows; an arc as
-//! fast as the slowest axis that it moves. A move shorter than [`SHORTEST_S`] at its rate is slowed down as well, whatever the limits are. Lines that are
-//! refused say nothing here. Owned by the page, for a job before its run. Cost: 2 us a line.
+//! [`kerf::canon`] reads the lines. On a straight feed along several axes the first axis that reaches its limit limits
+//! the rate along the path. On an arc the lowest limit of the two axes of its plane applies. A move shorter than
+//! [`SHORTEST_S`] at its rate is slowed down as well, whatever the limits are. Refused lines are left out. The page
+//! calls this for a job before it runs the job. Cost: 2 us a line.
 
 use std::fmt::Write;
 
@@ -11,21 +12,21 @@ use kerf::gcode::command::Feed;
 use kerf::gcode::setup::Usual;
 use kerf::units::{AXES, AXIS_LETTERS, Length, PerAxis};
 
-/// A block takes at least so long, in seconds (`BLOCK_S_MIN` of the planner).
+/// The shortest duration of a block, in seconds (`BLOCK_S_MIN` of the planner).
 const SHORTEST_S: f64 = 0.75e-3;
-/// More than this part above a limit is worth a word.
+/// A rate is reported only if it exceeds the limit by more than this factor.
 const SLACK: f64 = 1.005;
-/// What is found: an axis that limits, or that moves are short.
+/// The number of findings: one for each axis that limits, and one for short moves.
 const KINDS: usize = AXES + 1;
 const SHORT: usize = AXES;
 
-/// What limits some lines.
+/// The lines that one limit slows down.
 #[derive(Clone, Copy, Default)]
 struct Finding {
     lines: usize,
     first: usize,
     last: usize,
-    /// The highest rate asked for, and the lowest that is allowed where it is, mm/min.
+    /// The highest rate that these lines ask for, and the lowest rate that is allowed, mm/min.
     asked: f64,
     allowed: f64,
 }
@@ -42,7 +43,7 @@ impl Finding {
     }
 }
 
-/// Where the lines are, and what they ask for.
+/// The position and the feed rate after the lines so far.
 struct Walk<'a> {
     /// Feed limits of X to C, mm/min or degrees a minute; 0 for none.
     limits: &'a [f64],
@@ -108,7 +109,8 @@ impl Walk<'_> {
     }
 }
 
-/// What limits the lines of a job, as JSON: `[{"limit":"x","lines":2,"first":4,"last":9,"asked":900,"allowed":800}]`, rates in mm/min. `limits` are the
+/// Returns the limits that lines of a job exceed, as JSON:
+/// `[{"limit":"x","lines":2,"first":4,"last":9,"asked":900,"allowed":800}]`, with rates in mm/min. `limits` are the
 /// highest feed rates of X to C and then their highest velocities, per minute; 0 for none.
 pub fn findings(text: &str, limits: &[f64; 2 * AXES]) -> String {
     let feeds: Vec<f64> = (0..AXES)

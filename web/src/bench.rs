@@ -1,7 +1,7 @@
-//! The machine on its test bench: its ports, its clock, its switches and its spindle.
+//! The simulated machine: its ports, clock, switches and spindle.
 //!
-//! Time goes on in whole milliseconds, and only in [`Bench::run`]. What the firmware sends is kept until it is taken; the page takes it after each
-//! run, so that it stays below what the line carries in that time.
+//! Time passes in whole milliseconds, and only in [`Bench::run`]. The output of the firmware is kept until the page
+//! takes it. The page takes it after each run, so it stays below what the line transmits in that time.
 
 use kerf::boards::{MOTORS, inputs};
 use kerf::hal::imp::{Machine, eeprom, gpio, inputs as pins, now, pwm, was_reset, watchdog};
@@ -9,21 +9,21 @@ use kerf::hal::resets::Cause;
 
 use crate::samples::Samples;
 
-/// The speed of the serial line at start-up, bits a second.
+/// The rate of the serial line at start-up, bits a second.
 const BAUD: u32 = 115_200;
-/// Cycles of a millisecond.
+/// Clock cycles in a millisecond.
 const CYCLES_PER_MS: u64 = kerf::boards::ACTIVE.clock_hz as u64 / 1_000;
 
-/// How far a motor has been, in steps.
+/// The lowest and the highest position of a motor, in steps.
 #[derive(Clone, Copy, Default)]
 struct Range {
     lowest: i64,
     highest: i64,
-    /// All steps until the samples began.
+    /// The number of steps made before the samples began.
     before: u64,
 }
 
-/// A machine, and what has been seen of it.
+/// A machine, and its recorded output and motion.
 pub struct Bench {
     machine: Machine,
     heard: [Vec<u8>; 2],
@@ -32,7 +32,8 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// Boots the firmware with what its EEPROM holds. `None` for a second machine in a thread.
+    /// Boots the firmware with these EEPROM contents. `asked` says that the firmware has asked for the reset. `None`
+    /// for a second machine in a thread.
     pub fn boot(contents: &[u8], asked: bool) -> Option<Self> {
         eeprom::put(contents);
         watchdog::set_cause(if asked { Cause::Asked } else { Cause::PowerOn });
@@ -44,7 +45,7 @@ impl Bench {
         })
     }
 
-    /// Puts bytes on the line of a port; of another port than 0 and 1 they are dropped.
+    /// Puts bytes on the line of a port. Bytes for any other port than 0 and 1 are dropped.
     pub fn send(&self, port: u32, bytes: &[u8]) {
         match port {
             0 => self.machine.send(bytes),
@@ -53,7 +54,7 @@ impl Bench {
         }
     }
 
-    /// What the firmware has sent to a port since the last call.
+    /// Returns what the firmware has sent on a port since the last call.
     pub fn heard(&mut self, port: u32) -> Vec<u8> {
         self.listen();
         self.heard.get_mut(port as usize).map(std::mem::take).unwrap_or_default()
@@ -67,7 +68,8 @@ impl Bench {
         ended
     }
 
-    /// Runs for `ms`, less if it `stops` at the end of a line from the first port. Ends at a reset. How long it has run.
+    /// Runs for `ms` milliseconds. If `stops`, the run ends earlier when the firmware ends a line on the first port. A
+    /// reset ends it in any case. Returns the milliseconds that have passed.
     pub fn run(&mut self, ms: u32, stops: bool) -> u32 {
         for passed in 0..ms {
             if was_reset() {
@@ -81,7 +83,7 @@ impl Bench {
         ms
     }
 
-    /// A millisecond passes.
+    /// Lets a millisecond pass.
     fn pass(&mut self) {
         let (machine, ranges) = (&self.machine, &mut self.ranges);
         machine.run_until(1, || {
@@ -97,8 +99,9 @@ impl Bench {
         }
     }
 
-    /// Time in ms; the steps of each motor; outputs that are on, as bits of [`kerf::boards::outputs`]; what part of the period the spindle's pulse
-    /// takes, in thousandths; motors that have power, as bits; inputs that are worked, as bits; 1 if the firmware has asked for a reset.
+    /// Returns, in this order: the time in ms; the steps of each motor; the outputs that are on, as bits of
+    /// [`kerf::boards::outputs`]; the duty cycle of the spindle's PWM, in thousandths; the powered motors, as bits; the
+    /// actuated inputs, as bits; 1 if the firmware has asked for a reset.
     pub fn state(&self) -> Vec<f64> {
         let position = self.machine.emitted().position;
         let mut state = vec![(now() / CYCLES_PER_MS) as f64];
@@ -109,20 +112,20 @@ impl Bench {
         state
     }
 
-    /// What the EEPROM holds.
+    /// Returns the EEPROM contents.
     pub fn eeprom(&self) -> Vec<u8> {
         eeprom::contents()
     }
 
-    /// The contact at an input, of [`inputs`], closes or opens; nothing if there is no such input.
+    /// Closes or opens the contact at an input of [`inputs`]. Does nothing if there is no such input.
     pub fn press(&self, input: usize, closed: bool) {
         if input < inputs::COUNT {
             self.machine.set_input(input, closed);
         }
     }
 
-    /// From now on the contact at an input is closed while the motor of its axis is at a step or beyond; that of the probe while the third
-    /// motor is there or below.
+    /// From now on the contact at an input is closed while the motor of its axis is at this step or beyond. The contact
+    /// of the probe is closed while the third motor is at this step or below.
     pub fn near(&self, input: usize, step: i64) {
         if input <= inputs::PROBE {
             self.machine.set_near(input, step, false);
@@ -134,7 +137,7 @@ impl Bench {
         self.machine.turn_spindle(rpm, per_turn);
     }
 
-    /// Begins to keep samples, the present place first.
+    /// Begins to keep samples. The first one is the present position.
     pub fn begin_samples(&mut self) {
         let emitted = self.machine.emitted();
         self.samples = Some(Samples::from(emitted.position));
@@ -144,13 +147,13 @@ impl Bench {
         }
     }
 
-    /// The samples; none if [`Self::begin_samples`] has not been called.
+    /// Returns the samples; none if [`Self::begin_samples`] has not been called.
     pub fn samples(&self) -> &Samples {
         static NONE: Samples = Samples::NONE;
         self.samples.as_ref().unwrap_or(&NONE)
     }
 
-    /// Lowest, highest and all steps of each motor since the samples began.
+    /// Returns the lowest and the highest position and the number of steps of each motor since the samples began.
     pub fn extremes(&self) -> Vec<f64> {
         let steps = self.machine.emitted().steps;
         let of = |(range, steps): (&Range, u64)| {

@@ -1,35 +1,38 @@
-//! Velocity, acceleration and jerk along the path, from samples of steps.
+//! Computes velocity, acceleration and jerk along the path from samples of steps.
 //!
-//! First the way: the sum of the distances from sample to sample. Where steps are coarse, places are averaged before, over up to 8 ms before and behind, for
-//! the way along a staircase is longer than that along its slope. Then a cubic is fitted to the way over 30 ms before and behind a sample (least
-//! squares), so that the grid of the steps does not show; its derivatives in the middle are the curves. Owned by the page, once a job is done. Cost: 150
-//! ns a sample. A job without samples has empty curves.
+//! First the distance along the path is summed from sample to sample. Where steps are coarse, positions are averaged
+//! first, over up to 8 ms before and after a sample, because a staircase is longer than its slope. Then a cubic is
+//! fitted to the distance over 30 ms before and after a sample (least squares), so that single steps do not show. Its
+//! derivatives in the middle are the curves. The page calls this when a job is done. Cost: 150 ns a sample. A job
+//! without samples has empty curves.
 
 use kerf::boards::MOTORS;
 
 use crate::samples::{Place, Samples};
 
-/// Half of the time that a fit takes in, ms.
+/// Half of the time that a fit covers, ms.
 const HALF_MS: u32 = 30;
-/// Samples on each side that a cubic needs at the least.
+/// The least number of samples on each side of a cubic.
 const LEAST: usize = 3;
-/// Places are averaged over a sample more on each side for so many mm of the coarsest step, and over so many at the most.
+/// Positions are averaged over one more sample on each side for each of these lengths (mm) that the coarsest step has,
+/// up to [`MOST_AVERAGED`].
 const COARSE: f64 = 0.006;
 const MOST_AVERAGED: usize = 4;
 
-/// A value for each sample: mm/s, mm/s^2, mm/s^3.
+/// One value for each sample: mm/s, mm/s^2, mm/s^3.
 #[derive(Default)]
 pub struct Curves {
-    /// Along the path.
+    /// The velocity along the path.
     pub velocity: Vec<f32>,
-    /// How that changes.
+    /// The acceleration along the path.
     pub acceleration: Vec<f32>,
-    /// How that changes.
+    /// The jerk along the path.
     pub jerk: Vec<f32>,
 }
 
 impl Curves {
-    /// Those of samples; `scale` is the millimetres of a step of each motor, 0 for one that does not count.
+    /// Computes the curves of samples. `scale` is the length of a step of each motor, mm; 0 for a motor that does not
+    /// count.
     pub fn of(samples: &Samples, scale: [f64; MOTORS]) -> Self {
         let fit = Fit::new(samples.interval_ms());
         let way = way(samples.places(), scale);
@@ -44,12 +47,12 @@ impl Curves {
     }
 }
 
-/// How far the tool has gone at each sample, mm.
+/// Returns the distance along the path at each sample, mm.
 fn way(places: &[Place], scale: [f64; MOTORS]) -> Vec<f64> {
     let coarsest = scale.iter().fold(0.0, |most: f64, mm| most.max(mm.abs()));
     let reach = ((coarsest / COARSE) as usize).min(MOST_AVERAGED);
     let last = places.len().saturating_sub(1);
-    // The way of a motor from the average around one sample to that around the next.
+    // The distance of a motor from the average around one sample to the average around the next.
     let went = |at: usize, m: usize| {
         let (new, old) = ((at + 1 + reach).min(last), at.saturating_sub(reach));
         let steps = i64::from(places[new][m]) - i64::from(places[old][m]);
@@ -63,7 +66,7 @@ fn way(places: &[Place], scale: [f64; MOTORS]) -> Vec<f64> {
     std::iter::once(0.0).chain(steps).take(places.len()).collect()
 }
 
-/// Sums that the fit of a cubic over `-half..=half` needs, and the samples' distance in seconds.
+/// The sums for the fit of a cubic over `-half..=half`, and the time between samples, s.
 struct Fit {
     half: usize,
     h: f64,
@@ -84,7 +87,7 @@ impl Fit {
         Self { half, h, s0: 2.0 * half as f64 + 1.0, s2: sum(2), s4: sum(4), s6: sum(6) }
     }
 
-    /// The three derivatives. Before the first sample and behind the last one the tool stands.
+    /// Returns the three derivatives. Before the first sample and after the last one the tool stands still.
     fn derivatives(&self, way: &[f64], at: usize) -> [f64; 3] {
         let last = way.len() - 1;
         if way[at.saturating_sub(self.half)] == way[(at + self.half).min(last)] {
@@ -147,7 +150,7 @@ mod tests {
 
     #[test]
     fn a_circle_at_a_steady_speed_has_no_acceleration_along_it() {
-        // A radius of 5 mm at 20 mm/s, on fine steps and on coarse ones.
+        // A radius of 5 mm at 20 mm/s, with fine steps and with coarse ones.
         for (steps, most) in [(1_280.0, 4.0), (40.0, 60.0)] {
             let circle = |t: f64| [(4.0 * t).cos() * 5.0 * steps, (4.0 * t).sin() * 5.0 * steps];
             let scale = 1.0 / steps;

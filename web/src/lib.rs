@@ -1,20 +1,21 @@
-//! Kerf in a page: the firmware's own tasks over `hal::host`, compiled to WebAssembly.
+//! The firmware in a web page: its own tasks over `hal::host`, compiled to WebAssembly.
 //!
-//! An instance of the module is one machine. Its memory is the machine's: who wants another one, or this one after a reset, makes a new
-//! instance. `web/page/firmware.js` calls what this file exports; nobody else does. Calls do not overlap, for a module runs in one
-//! Worker.
+//! One instance of the module is one machine, and the instance's memory is the machine's memory. A second machine, or
+//! this machine after a reset, needs a new instance. Only `web/page/firmware.js` calls the functions that this file
+//! exports. Calls do not overlap, because a module runs in one Worker.
 //!
-//! | part | is |
+//! | part | contents |
 //! |---|---|
-//! | [`mod@bench`] | the machine on its test bench: ports, clock, switches, spindle |
-//! | [`mod@samples`] | where the motors were, at equal distances in time |
-//! | [`mod@curves`] | velocity, acceleration and jerk, from those |
-//! | [`mod@asked`] | which lines ask for more than the machine's limits allow |
+//! | [`mod@bench`] | the simulated machine: ports, clock, switches, spindle |
+//! | [`mod@samples`] | the positions of the motors at equal intervals |
+//! | [`mod@curves`] | velocity, acceleration and jerk, computed from the samples |
+//! | [`mod@asked`] | the lines that ask for more than the machine's limits allow |
 //! | [`mod@tables`] | profiles and codes, as JSON |
 //!
-//! Bytes go in and out by two buffers: the page writes to [`input`] and says how many bytes are there; what a call returns as a length is at
-//! [`output`]. A pointer is good until the next call, for memory may grow. Lengths beyond a buffer are cut to it. Before [`boot`]
-//! everything else does nothing and returns 0. Units: ms of the machine's time, motor steps, mm and s in curves.
+//! Bytes pass through two buffers. The page writes to [`input`] and passes the number of bytes. A call whose result is
+//! a length has written its output to [`output`]. A pointer is valid until the next call, because memory may grow.
+//! Lengths beyond a buffer are cut to it. Before [`boot`] all other functions do nothing and return 0. Units: ms of the
+//! machine's time, motor steps; mm and s in curves.
 //!
 //! Cost: a second of the machine's time takes 1 to 5 ms on a desktop computer.
 
@@ -29,7 +30,7 @@ use std::cell::RefCell;
 use bench::Bench;
 use curves::Curves;
 
-/// What the page has made.
+/// The state of the module.
 #[derive(Default)]
 struct Page {
     input: Vec<u8>,
@@ -46,7 +47,7 @@ fn page<R>(act: impl FnOnce(&mut Page) -> R) -> R {
     PAGE.with_borrow_mut(act)
 }
 
-/// Has `act` use the machine, if there is one.
+/// Calls `act` with the machine, if there is one; else returns the default.
 fn bench<R: Default>(act: impl FnOnce(&mut Bench) -> R) -> R {
     page(|page| page.bench.as_mut().map(act).unwrap_or_default())
 }
@@ -62,7 +63,7 @@ impl Page {
     }
 }
 
-/// Makes room for `len` bytes of input; where that is.
+/// Makes room for `len` bytes of input, and returns its address.
 #[unsafe(no_mangle)]
 pub extern "C" fn input(len: usize) -> *mut u8 {
     page(|page| {
@@ -71,14 +72,14 @@ pub extern "C" fn input(len: usize) -> *mut u8 {
     })
 }
 
-/// Where the output of the last call is.
+/// Returns the address of the output of the last call.
 #[unsafe(no_mangle)]
 pub extern "C" fn output() -> *const u8 {
     page(|page| page.output.as_ptr())
 }
 
-/// Makes the machine and boots the firmware. The input is what its EEPROM holds, nothing for a new one; `asked` if a reset was asked for. 1 if it
-/// has booted; 0 for a second machine in an instance.
+/// Creates the machine and boots the firmware. The input is the EEPROM contents, empty for a new machine. `asked` is 1
+/// if the firmware has asked for the reset. Returns 1 if it has booted, 0 for a second machine in an instance.
 #[unsafe(no_mangle)]
 pub extern "C" fn boot(len: usize, asked: u32) -> u32 {
     page(|page| {
@@ -87,7 +88,7 @@ pub extern "C" fn boot(len: usize, asked: u32) -> u32 {
     })
 }
 
-/// Puts the input on the line of a port, 0 or 1; the bytes take their time.
+/// Puts the input on the line of a port, 0 or 1. The bytes arrive at the rate of the line.
 #[unsafe(no_mangle)]
 pub extern "C" fn send(port: u32, len: usize) {
     page(|page| {
@@ -97,7 +98,7 @@ pub extern "C" fn send(port: u32, len: usize) {
     });
 }
 
-/// What the firmware has sent to a port since the last call.
+/// Writes to the output what the firmware has sent on a port since the last call. Returns its length.
 #[unsafe(no_mangle)]
 pub extern "C" fn heard(port: u32) -> usize {
     page(|page| {
@@ -106,13 +107,13 @@ pub extern "C" fn heard(port: u32) -> usize {
     })
 }
 
-/// Runs for `ms`, less if it `stops` where the firmware has ended a line to the first port. How long it has run.
+/// Runs for `ms` milliseconds, or less: see [`Bench::run`]. Returns the milliseconds that have passed.
 #[unsafe(no_mangle)]
 pub extern "C" fn run(ms: u32, stops: u32) -> u32 {
     bench(|bench| bench.run(ms, stops != 0))
 }
 
-/// The state as numbers, see [`Bench::state`].
+/// Writes the state as numbers, see [`Bench::state`]. Returns the length.
 #[unsafe(no_mangle)]
 pub extern "C" fn state() -> usize {
     page(|page| {
@@ -121,7 +122,7 @@ pub extern "C" fn state() -> usize {
     })
 }
 
-/// What the EEPROM holds.
+/// Writes the EEPROM contents. Returns the length.
 #[unsafe(no_mangle)]
 pub extern "C" fn eeprom() -> usize {
     page(|page| {
@@ -130,31 +131,31 @@ pub extern "C" fn eeprom() -> usize {
     })
 }
 
-/// A contact closes or opens, see [`Bench::press`].
+/// Closes or opens a contact, see [`Bench::press`].
 #[unsafe(no_mangle)]
 pub extern "C" fn press(input: usize, closed: u32) {
     bench(|bench| bench.press(input, closed != 0));
 }
 
-/// A motor works a switch from now on, see [`Bench::near`].
+/// Makes a motor actuate a switch from now on, see [`Bench::near`].
 #[unsafe(no_mangle)]
 pub extern "C" fn near(input: usize, step: f64) {
     bench(|bench| bench.near(input, step as i64));
 }
 
-/// The spindle turns, see [`kerf::hal::imp::Machine::turn_spindle`].
+/// Turns the spindle, see [`kerf::hal::imp::Machine::turn_spindle`].
 #[unsafe(no_mangle)]
 pub extern "C" fn spindle(rpm: f64, per_turn: u32) {
     bench(|bench| bench.turn_spindle(rpm, per_turn.min(400) as u16));
 }
 
-/// Begins to keep samples, the present place first; those before are dropped.
+/// Begins to keep samples. The first one is the present position; earlier samples are dropped.
 #[unsafe(no_mangle)]
 pub extern "C" fn begin_samples() {
     bench(Bench::begin_samples);
 }
 
-/// The samples: four `i32` each, the steps of a motor.
+/// Writes the samples: for each, the steps of the motors, an `i32` each. Returns the length.
 #[unsafe(no_mangle)]
 pub extern "C" fn samples() -> usize {
     page(|page| {
@@ -163,14 +164,14 @@ pub extern "C" fn samples() -> usize {
     })
 }
 
-/// Milliseconds between two samples.
+/// Returns the milliseconds between two samples.
 #[unsafe(no_mangle)]
 pub extern "C" fn sample_ms() -> u32 {
     bench(|bench| bench.samples().interval_ms())
 }
 
-/// Works out the curves of the samples. The input is four `f64`: millimetres of a step of each motor, 0 for one that does not count. Returns
-/// the number of samples.
+/// Computes the curves of the samples. The input is one `f64` for each motor: the length of a step, mm; 0 for a motor
+/// that does not count. Returns the number of samples.
 #[unsafe(no_mangle)]
 pub extern "C" fn work_out_curves(len: usize) -> usize {
     page(|page| {
@@ -181,7 +182,7 @@ pub extern "C" fn work_out_curves(len: usize) -> usize {
     })
 }
 
-/// A curve, `f32` each: 0 velocity, 1 acceleration, 2 jerk.
+/// Writes a curve, an `f32` for each sample: 0 velocity, 1 acceleration, 2 jerk. Returns the length.
 #[unsafe(no_mangle)]
 pub extern "C" fn curve(which: u32) -> usize {
     page(|page| {
@@ -195,7 +196,8 @@ pub extern "C" fn curve(which: u32) -> usize {
     })
 }
 
-/// How far the motors have been since the samples begin, and how far they have gone: the lowest, highest and all steps of each, `f64`.
+/// Writes the lowest and the highest position and the number of steps of each motor since the samples began, as `f64`.
+/// Returns the length.
 #[unsafe(no_mangle)]
 pub extern "C" fn extremes() -> usize {
     page(|page| {
@@ -204,8 +206,8 @@ pub extern "C" fn extremes() -> usize {
     })
 }
 
-/// Which lines of a job ask for more than the limits allow, see [`asked::findings`]. The input is twelve `f64`, feed and rapid limits of six
-/// axes, and the text behind them.
+/// Writes the lines of a job that ask for more than the limits allow, see [`asked::findings`]. The input is twelve
+/// `f64`, the feed limits and the velocity limits of six axes, and then the text of the job. Returns the length.
 #[unsafe(no_mangle)]
 pub extern "C" fn asked(len: usize) -> usize {
     page(|page| {
@@ -216,13 +218,13 @@ pub extern "C" fn asked(len: usize) -> usize {
     })
 }
 
-/// Profiles, inputs and codes, see [`tables::json`].
+/// Writes the profiles and codes, see [`tables::json`]. Returns the length.
 #[unsafe(no_mangle)]
 pub extern "C" fn tables() -> usize {
     page(|page| page.tell(tables::json().into_bytes()))
 }
 
-/// Numbers of the input; what is missing is 0.
+/// Returns the numbers of the input; 0 for missing ones.
 fn numbers<const N: usize>(bytes: &[u8]) -> [f64; N] {
     let mut numbers = [0.0; N];
     for (number, bytes) in numbers.iter_mut().zip(bytes.chunks_exact(8)) {

@@ -1,36 +1,37 @@
-//! Where the motors were, at equal distances in time.
+//! The positions of the motors at equal intervals.
 //!
-//! A sample each 2 ms at first. When there are [`MOST`] of them every other one is dropped and the distance is doubled: memory is bounded however
-//! long a job takes, 16 MB, and any job of more than half an hour has between half a million and a million of them. Cost: a store.
+//! At first there is one sample each 2 ms. When there are [`MOST`] samples, every other one is dropped and the interval
+//! is doubled. So the memory is at most 16 MB however long a job takes, and a job of more than half an hour has between
+//! half a million and a million samples. Cost: a store.
 
 use kerf::boards::MOTORS;
 
 /// Milliseconds between two samples at first.
 const FINEST_MS: u32 = 2;
-/// Samples of 16 bytes at most.
+/// The greatest number of samples, of 16 bytes each.
 const MOST: usize = 1 << 20;
 
-/// The steps of each motor at a time.
+/// The steps of each motor at one time.
 pub type Place = [i32; MOTORS];
 
-/// Samples at equal distances.
+/// Samples at equal intervals.
 pub struct Samples {
     places: Vec<Place>,
     interval_ms: u32,
-    /// Milliseconds since the last one.
+    /// Milliseconds since the last sample.
     waited: u32,
 }
 
 impl Samples {
-    /// Without any.
+    /// No samples.
     pub const NONE: Self = Self { places: Vec::new(), interval_ms: FINEST_MS, waited: 0 };
 
-    /// With the first one.
+    /// Returns samples of which the first is `position`.
     pub fn from(position: [i64; MOTORS]) -> Self {
         Self { places: vec![place(position)], ..Self::NONE }
     }
 
-    /// A millisecond has passed, and the motors are here.
+    /// Takes the position of the motors after another millisecond.
     pub fn tick(&mut self, position: [i64; MOTORS]) {
         self.waited += 1;
         if self.waited < self.interval_ms {
@@ -38,40 +39,40 @@ impl Samples {
         }
         self.waited = 0;
         self.places.push(place(position));
-        // An odd number, so that the first and the last are kept.
+        // The number of samples is odd, so that the first and the last one are kept.
         if self.places.len() > MOST {
             self.places = self.places.iter().copied().step_by(2).collect();
             self.interval_ms *= 2;
         }
     }
 
-    /// How many there are.
+    /// Returns the number of samples.
     pub fn len(&self) -> usize {
         self.places.len()
     }
 
-    /// Whether there is none.
+    /// Whether there is no sample.
     pub fn is_empty(&self) -> bool {
         self.places.is_empty()
     }
 
-    /// Milliseconds between two.
+    /// Returns the milliseconds between two samples.
     pub fn interval_ms(&self) -> u32 {
         self.interval_ms
     }
 
-    /// All of them.
+    /// Returns all samples.
     pub fn places(&self) -> &[Place] {
         &self.places
     }
 
-    /// All of them, as bytes.
+    /// Returns all samples as bytes.
     pub fn bytes(&self) -> Vec<u8> {
         self.places.iter().flatten().flat_map(|steps| steps.to_le_bytes()).collect()
     }
 }
 
-/// Steps that 32 bits hold; 2^31 of them are more than any axis has.
+/// Limits the steps to 32 bits. No axis has 2^31 steps.
 fn place(position: [i64; MOTORS]) -> Place {
     position.map(|steps| steps.clamp(i32::MIN.into(), i32::MAX.into()) as i32)
 }

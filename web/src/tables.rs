@@ -1,13 +1,13 @@
-//! What the page has to know of the firmware, from its tables, as JSON.
+//! The tables of the firmware that the page needs, as JSON.
 //!
-//! Made once, when the page loads. Nothing here depends on a machine.
+//! The page asks for them once, when it loads. Nothing here depends on a machine.
 
 use kerf::boards::ACTIVE;
 use kerf::canon::{advice, statuses, text};
 use kerf::config::{VERSION, machines};
 use kerf::protocol::tinyg::number;
 
-/// A JSON string.
+/// Returns the text as a JSON string.
 fn quoted(text: &str) -> String {
     let mut quoted = String::from("\"");
     for c in text.chars() {
@@ -24,8 +24,9 @@ fn list(items: impl Iterator<Item = String>) -> String {
     format!("[{}]", items.collect::<Vec<_>>().join(","))
 }
 
-/// `{"version":..,"board":..,"machines":[{"name":..,"about":..}],"codes":[{"code":..,"text":..,"cause":..,"cure":..}]}`: machines by their
-/// numbers, codes of the statuses that a sender may see.
+/// Returns
+/// `{"version":..,"board":..,"machines":[{"name":..,"about":..}],"codes":[{"code":..,"text":..,"cause":..,"cure":..}]}`:
+/// the machines in the order of their numbers, and the codes of all statuses that a sender may receive.
 pub fn json() -> String {
     let machine = |machine: &&machines::MachineProfile| {
         format!("{{\"name\":{},\"about\":{}}}", quoted(machine.name), quoted(machine.about))
