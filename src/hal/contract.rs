@@ -215,24 +215,24 @@ contract! {
         fn read() -> Pulses;
     }
 
-    /// The PWM output that tells the spindle its speed.
+    /// The PWM output that controls the speed of the spindle.
     trait Pwm in pwm {
-        /// Sets the frequency, in thousandths of a Hz. The share becomes 0 and has to be set again. Thread mode.
+        /// Sets the frequency, in thousandths of a Hz. The duty cycle becomes 0 and has to be set again. Thread mode.
         fn set_frequency(millihertz: u32);
-        /// Sets the share of the period for which the pin is high, in thousandths. Exec, or other levels while exec
-        /// cannot run.
+        /// Sets the duty cycle, the part of the period for which the pin is high, in thousandths. Exec, or other levels
+        /// while exec cannot run.
         fn set_share(share: f32);
     }
 
     /// Heaters, their temperature sensors, and the fan, of boards that have them.
     trait Heaters in heaters {
         /// Begins a [reading](crate::heat::sensor) of a heater's sensor: 0 the hot end, 1 the bed. If a reading is
-        /// already under way, that one goes on and none begins; it takes 4 ms at most. Thread mode. Cost: 30, and 60
-        /// cycles of an interrupt each 104 us.
+        /// already under way, it continues and none begins; it takes 4 ms at most. Thread mode. Cost: 30, and 60 cycles
+        /// of an interrupt each 104 us.
         fn begin(heater: u8);
         /// Returns the reading that was begun last; `None` until it is complete. Thread mode. Cost: 12.
         fn reading() -> Option<u16>;
-        /// Reads the word of a heater's MAX6675; `None` if the heater cannot have one, or while the SD card is
+        /// Reads the word of a heater's MAX6675. `None` if the heater cannot have one, or while the SD card is
         /// selected. Thread mode. Cost: 500.
         fn word(heater: u8) -> Option<u16>;
         /// Sets the power of the hot end, the bed and the fan; 255 is full power. Outputs that
@@ -254,9 +254,9 @@ contract! {
     trait Card in card {
         /// Selects the card. Nobody else uses SPI until [`release`](Card::release). Thread mode.
         fn select();
-        /// Deselects the card, then sends one more byte, during which the card lets go of the line. Thread mode.
+        /// Deselects the card, then sends one more byte, during which the card releases the line. Thread mode.
         fn release();
-        /// Whether a sensor waits until the card is released. The sensor then has its turn within 40 ms. Thread mode.
+        /// Whether a sensor waits until the card is released. The sensor then gets its turn within 40 ms. Thread mode.
         fn is_wanted() -> bool;
         /// Sets the clock: 4 MHz if `fast`, else 250 kHz, for a card that is new. Thread mode.
         fn set_fast(fast: bool);
@@ -272,11 +272,11 @@ contract! {
         fn millis() -> u32;
     }
 
-    /// The watchdog, which resets a machine that has got stuck.
+    /// The watchdog, which resets a machine that hangs.
     trait Watchdog in watchdog {
         /// Returns why the machine has started. Any level.
         fn cause() -> Cause;
-        /// Restarts the time of the watchdog: all is well. Thread mode and exec.
+        /// Restarts the timeout of the watchdog. Thread mode and exec.
         fn feed();
     }
 
@@ -303,7 +303,7 @@ pub trait Timing {
     const BLOCK_S_MIN: f32 = 0.000_75;
     /// Blocks that can wait at once, limited by RAM.
     const LOOK_AHEAD: usize = if cfg!(feature = "sd") && !cfg!(feature = "std") { 38 } else { 61 };
-    /// Lines that can wait on a port. At most 9, because brief answers tell with one digit how many more may come.
+    /// Lines that can wait on a port. At most 9, because brief answers report with one digit how many more may come.
     const LINES: usize = 8;
     /// Bytes for all waiting lines: of USB, and of the second port.
     const LINE_BYTES: [usize; 2] = [412, 96];

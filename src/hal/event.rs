@@ -1,4 +1,4 @@
-//! What interrupts and the exec level tell thread-mode tasks, by the event bits of [`avr_embassy::event`].
+//! Tells thread-mode tasks what interrupts and the exec level have done, by the event bits of [`avr_embassy::event`].
 //!
 //! Each event has at most one waiting task. Only for [`Event::Transmitted`] there is one task for each port.
 
@@ -56,16 +56,15 @@ pub fn is_unheard() -> bool {
     imp::flags::has(Event::Received) && imp::flags::has(Event::Tick)
 }
 
-/// Whether other tasks should have their turn before the next line is carried out: for a real-time character or a
-/// switch, or because bytes are unheard ([`is_unheard`]) that the reader must not leave for some lines
-/// (`calls_reader`).
+/// Whether other tasks should have their turn before the next line is executed: because of a real-time character or a
+/// switch, or because bytes have come ([`is_unheard`]) that the reader has to see before that line (`calls_reader`).
 #[inline(always)]
 pub fn is_wanted() -> bool {
     imp::flags::has(Event::Realtime) || is_unheard() && imp::uart::calls_reader()
 }
 
-/// Segments that pass without a turn of the main loop before bytes that have come count as a question: see
-/// [`is_asked`].
+/// After this many segments without a turn of the main loop, received bytes are treated as a question that waits for
+/// its answer: see [`is_asked`].
 const UNHEARD: u8 = 1;
 
 machine_static! {
@@ -85,14 +84,14 @@ pub fn set_eager(ports: u8) {
     eager().set(ports);
 }
 
-/// Sets whether somebody waits for an answer that thread mode works on. Exec then leaves more of the CPU to thread
+/// Sets whether a sender waits for an answer that thread mode works on. Exec then leaves more of the CPU to thread
 /// mode.
 pub fn set_asked(waits: bool) {
     asked().set(waits.into());
 }
 
-/// Whether somebody waits for an answer, or may: bytes have come, and the main loop has had no turn since the last
-/// segment. Exec and thread mode.
+/// Whether a sender waits for an answer, or may wait for one: bytes have come, and the main loop has had no turn since
+/// the last segment. Exec and thread mode.
 #[inline(always)]
 pub fn is_asked() -> bool {
     asked().get() != 0 || (passed_over().get() >= UNHEARD && is_unheard())
@@ -132,12 +131,13 @@ pub fn wait_transmitted<R>(
     })
 }
 
-/// Has the main loop wake a task after the next `event`.
+/// Makes the main loop wake a task after the next `event`.
 pub fn wake_after(thread: Thread, event: Event, waker: &Waker) {
     event.bit().wake_after(thread, waker);
 }
 
-/// Has the main loop wake the task that waits for the transmitter of `port`, after the next byte that any port has sent.
+/// Makes the main loop wake the task that waits for the transmitter of `port`, after the next byte that any port has
+/// sent.
 pub fn wake_after_transmitted(thread: Thread, port: u8, waker: &Waker) {
     match port {
         USB => wake_after(thread, Event::Transmitted, waker),
@@ -156,7 +156,7 @@ fn is_eager() -> bool {
     (0..PORTS as u8).any(|port| eager & 1 << port != 0 && imp::uart::newest(port).is_some())
 }
 
-/// Does, in each turn of the main loop, what is too small for a task. `bits` are the events since the last turn.
+/// Runs work that is too small for a task, in each turn of the main loop. `bits` are the events since the last turn.
 pub fn turn(thread: Thread, bits: u8) {
     passed_over().set(0);
     if NATIVE {

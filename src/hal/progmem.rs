@@ -30,20 +30,20 @@ impl<T: Copy> Progmem<T> {
         Self(value)
     }
 
-    /// A copy of the value.
+    /// Returns a copy of the value.
     pub fn get(&self) -> T {
         load(&raw const self.0)
     }
 }
 
 impl<T: Copy, const N: usize> Progmem<[T; N]> {
-    /// Number of elements.
+    /// Returns the number of elements.
     #[allow(clippy::len_without_is_empty)]
     pub const fn len(&self) -> usize {
         N
     }
 
-    /// A copy of element `index`, or `None` beyond the end.
+    /// Returns a copy of element `index`, or `None` beyond the end.
     pub fn at(&self, index: usize) -> Option<T> {
         // The pointer arithmetic stays inside the array, and nothing is read but through `load`.
         (index < N).then(|| load((&raw const self.0).cast::<T>().wrapping_add(index)))
@@ -114,7 +114,7 @@ fn find(start: *const u8, stride: u8, count: u8, name: &[u8]) -> Option<u8> {
 }
 
 impl<T: Copy> Slice<T> {
-    /// A copy of element `index`, or `None` beyond the end.
+    /// Returns a copy of element `index`, or `None` beyond the end.
     pub fn at(self, index: usize) -> Option<T> {
         // The index is checked, as in an array of known length.
         (index < self.len).then(|| load(self.start.wrapping_add(index)))
@@ -129,7 +129,7 @@ impl<const N: usize> Progmem<[u8; N]> {
     }
 }
 
-/// A copy of a value that is part of a [`Progmem`].
+/// Returns a copy of a value that is part of a [`Progmem`].
 fn load<T: Copy>(from: *const T) -> T {
     // SAFETY: the callers in this module pass a pointer into a `Progmem`.
     unsafe { flash::load(from) }
@@ -161,7 +161,7 @@ impl Plain {
         self.len == 0
     }
 
-    /// Byte `index`, or `None` beyond the end.
+    /// Returns byte `index`, or `None` beyond the end.
     pub fn at(&self, index: u8) -> Option<u8> {
         (index < self.len).then(|| load(self.start.wrapping_add(index.into())))
     }
@@ -182,7 +182,7 @@ impl Plain {
         }
     }
 
-    /// The first `count` bytes.
+    /// Returns the first `count` bytes.
     #[inline(always)]
     pub fn first(self, count: u8) -> Self {
         Self { len: count.min(self.len), ..self }
@@ -195,7 +195,7 @@ impl Plain {
         Self { start: self.start.wrapping_add(usize::from(count)), len: self.len - count }
     }
 
-    /// The bytes, one by one.
+    /// Returns the bytes, one by one.
     pub fn bytes(self) -> impl Iterator<Item = u8> {
         let mut left = self;
         core::iter::from_fn(move || {

@@ -1,10 +1,10 @@
 //! Why the machine has started.
 //!
-//! The chip notes the cause of a reset, but common boot loaders clear that note before the firmware sees it.
-//! Therefore the firmware leaves a mark in memory that resets do not clear. The mark says that the firmware runs, or
-//! why it is about to reset itself.
+//! The chip sets flags for the cause of a reset (MCUSR), but common boot loaders clear them before the firmware can
+//! read them. Therefore the firmware leaves a mark in memory that resets do not clear. The mark says that the firmware
+//! runs, or why it is about to reset itself.
 //!
-//! | what the chip says | mark | cause |
+//! | flags of the chip | mark | cause |
 //! |---|---|---|
 //! | power-on | any | 0 |
 //! | brown-out | any | 2 |
@@ -12,7 +12,7 @@
 //! | watchdog | another | 3 |
 //! | external or nothing | starved | 3 |
 //! | external | another | 1 |
-//! | nothing, the loader has cleared it | running | 1: a reset by the button or the port, most likely |
+//! | nothing, the loader has cleared them | running | 1: most likely a reset by the button or the port |
 //! | nothing | none | 0 |
 
 /// Why the machine has started. The numbers are those of `{rst:n}`.
@@ -25,7 +25,7 @@ pub enum Cause {
     External = 1,
     /// The supply was too low for a moment.
     BrownOut = 2,
-    /// The firmware had got stuck.
+    /// The firmware has stopped responding.
     Watchdog = 3,
     /// `^x`, `{reset:1}`, or `{boot:1}` without a boot loader.
     Asked = 4,
@@ -42,7 +42,7 @@ impl Cause {
         }
     }
 
-    /// Whether nobody wanted this reset.
+    /// Whether the reset was unwanted.
     pub fn is_fault(self) -> bool {
         matches!(self, Cause::BrownOut | Cause::Watchdog)
     }
@@ -54,9 +54,9 @@ pub struct Mark(pub u16);
 
 impl Mark {
     const RUNNING: u16 = 0x4BA0;
-    /// The firmware is about to reset because somebody asked for it.
+    /// The firmware is about to reset because a sender asked for it.
     pub const ASKED: Mark = Mark(0x4B5A);
-    /// The firmware is about to reset because something has got stuck.
+    /// The firmware is about to reset because a task, exec or the step interrupt hangs.
     pub const STARVED: Mark = Mark(0x4BC3);
 
     /// Returns the mark of a running firmware that was started by `cause`.
@@ -77,7 +77,7 @@ const EXTERNAL: u8 = 1 << 1;
 const BROWN_OUT: u8 = 1 << 2;
 const WATCHDOG: u8 = 1 << 3;
 
-/// Returns why the machine has started, from the chip's note `chip` and the mark that was left.
+/// Returns why the machine has started, from the flags of the `chip` and the mark that was left.
 #[small]
 pub fn cause(chip: u8, mark: Mark) -> Cause {
     if chip & POWER_ON != 0 {

@@ -1,8 +1,8 @@
-//! What both sides of a serial line agree on: the rings, and the marks of lost bytes.
+//! The rings of a serial line, and the marks in them.
 //!
 //! A byte that comes when the receive ring is full is lost, and so is a byte that comes damaged. A mark stands in the
-//! place of the loss: it replaces the newest byte of a full ring, or the damaged byte, and tells the reader in three
-//! bits what was lost. Lost line ends are also counted (`imp::uart::lost_ends`), so that each lost line gets an
+//! place of the loss: it replaces the newest byte of a full ring, or the damaged byte. Three bits of the mark tell the
+//! reader what was lost. Lost line ends are also counted (`imp::uart::lost_ends`), so that each lost line gets an
 //! answer.
 
 use super::ring::{ConsumerView, Producer, Window};
@@ -47,8 +47,8 @@ pub const CUT: u8 = RETURNED;
 /// Not a loss marker either: records where `~` stood in the stream.
 pub const GO: u8 = RETURNED | BEHIND_END;
 
-/// Replaces a line that has been taken out of its turn. This byte never comes into the ring from outside, where it is
-/// `^x`: that resets.
+/// Replaces a line that has been taken out of its turn. This byte never comes into the ring from outside, because
+/// outside it is `^x`, the reset.
 pub const TAKEN: u8 = 0x18;
 /// Follows [`TAKEN`] in place of the carriage return of that line, after which a line feed may come.
 pub const TAKEN_RETURN: u8 = b'!';
@@ -58,8 +58,8 @@ pub const fn batch(ring: usize) -> u8 {
     (ring / 8) as u8
 }
 
-/// Stops the other side of a line; [`XON`] lets it go on. If flow control is by characters (`ex` 1), the receive
-/// interrupt takes both out of the stream and obeys, so that they never wait behind data.
+/// Stops the other side of a line; [`XON`] releases it. If flow control is by characters (`ex` 1), the receive
+/// interrupt takes both out of the stream and obeys them, so that they never wait behind data.
 pub const XOFF: u8 = 0x13;
 /// See [`XOFF`].
 pub const XON: u8 = 0x11;
@@ -87,13 +87,13 @@ pub const fn high_water(flow: Flow, ring: usize) -> usize {
 /// When the receive ring of the second port holds this many bytes, thread mode is late, and exec stops the sender.
 pub const LATE: usize = AUX_RING / 4;
 
-/// The sender may go on when the receive ring holds fewer bytes than this.
+/// The sender is released when the receive ring holds fewer bytes than this.
 pub const fn low_water(ring: usize) -> usize {
     if ring < RX_RING { ring / 16 } else { ring / 8 }
 }
 
-/// With more bytes than this in the receive ring of the first port the reader gets its turn: it may have to stop the
-/// sender.
+/// With more bytes than this in the receive ring of the first port the reader gets its turn, because it may have to
+/// stop the sender.
 const MANY: u8 = high_water(Flow::Characters, RX_RING) as u8;
 
 /// Whether the reader has to have its turn before the next waiting line is carried out: the bytes in the receive ring
@@ -129,7 +129,7 @@ impl Flow {
     }
 }
 
-/// Returns what the board says of a port; `None` if the board does not have that port.
+/// Returns the board's description of a port; `None` if the board does not have that port.
 pub const fn hardware(port: u8) -> Option<Serial> {
     let port = port as usize;
     if port < ACTIVE.serial.len() { Some(ACTIVE.serial[port]) } else { None }

@@ -21,7 +21,7 @@ pub fn set_low(_outputs: u8, on: u8) {
     set_outputs(on);
 }
 
-/// Returns what [`set_outputs`] was told last.
+/// Returns the outputs that [`set_outputs`] has set.
 pub fn outputs() -> u8 {
     switched().get()
 }

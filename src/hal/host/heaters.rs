@@ -1,4 +1,4 @@
-//! Heaters and their sensors: tests set what the converter reads, and see what the firmware has switched.
+//! Heaters and their sensors. Tests set the readings of the converter, and see what the firmware has switched.
 
 use super::Local;
 use crate::heat::sensor::SAMPLES;
@@ -45,7 +45,7 @@ pub fn set(heater: usize, reading: u16) {
     readings().set(all);
 }
 
-/// Returns what [`drive`] was told last: bits 0 hot end, 1 bed, 2 fan.
+/// Returns what [`drive`] has switched on: bits 0 hot end, 1 bed, 2 fan.
 pub fn on() -> u8 {
     switched().get()
 }

@@ -37,32 +37,32 @@ impl Machine {
         uart::set_sender_rate(USB, baud);
     }
 
-    /// Lets the sender put bytes on the line; they take their time.
+    /// Makes the sender put bytes on the line. They take the time that the baud rate requires.
     pub fn send(&self, bytes: &[u8]) {
         uart::send(USB, bytes);
     }
 
-    /// Lets a program, not the first, open the first port.
+    /// Makes a program, not the first one, open the first port.
     pub fn open_usb(&self) {
         uart::open_usb();
     }
 
-    /// Lets the program close the first port.
+    /// Makes the program close the first port.
     pub fn close_usb(&self) {
         uart::close_usb();
     }
 
-    /// Lets the sender put a byte on the line that arrives damaged.
+    /// Makes the sender put a byte on the line that arrives damaged.
     pub fn send_damaged(&self) {
         uart::send_damaged(USB);
     }
 
-    /// Lets the sender on the second port put bytes on the line.
+    /// Makes the sender on the second port put bytes on the line.
     pub fn send_aux(&self, bytes: &[u8]) {
         uart::send(AUX, bytes);
     }
 
-    /// Lets the sender on the second port stop the machine by its pin (CTS), or let it go on.
+    /// Makes the sender on the second port stop the machine by its pin (CTS), or allow it to continue.
     pub fn set_aux_cts(&self, stop: bool) {
         uart::set_cts(AUX, stop);
     }
@@ -92,9 +92,9 @@ impl Machine {
         inputs::set(input, !closed);
     }
 
-    /// Makes a motor work the contact at an input from now on. The contact of an end is closed while the motor of its
-    /// axis is at `step` or beyond; the contact of the probe while the third motor is at `step` or below. With
-    /// `opens` it is open there instead.
+    /// Makes a motor actuate the contact at an input from now on. The contact of an end is closed while the motor of
+    /// its axis is at `step` or beyond; the contact of the probe while the third motor is at `step` or below. With
+    /// `opens` the contact is open there instead.
     pub fn set_near(&self, input: usize, step: i64, opens: bool) {
         stepper::set_near(input, step, opens);
     }

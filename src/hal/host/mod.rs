@@ -1,8 +1,8 @@
 //! The host's stand-in for the hardware, over mocked time.
 //!
-//! Each thread is one machine with a clock of its own, in CPU cycles. Code takes no time. Time passes with what takes
-//! time on the chip as well: bytes on the line, ticks of the step timer, milliseconds. [`Machine`] moves the clock
-//! from one such event to the next and runs the same tasks, rings and step generator as the image.
+//! Each thread is one machine with a clock of its own, in CPU cycles. Code takes no time. Time passes with events that
+//! take time on the chip as well: bytes on the line, ticks of the step timer, milliseconds. [`Machine`] moves the clock
+//! from one such event to the next and runs the tasks, rings and step generator of the image.
 
 pub mod arithmetic;
 pub mod card;

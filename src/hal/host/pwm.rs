@@ -1,4 +1,4 @@
-//! The spindle's pulse-width output: keeps what it was set to, for tests.
+//! The spindle's PWM output. Keeps its settings for tests.
 
 use super::Local;
 
@@ -16,12 +16,12 @@ pub fn set_frequency(millihertz: u32) {
     told().set(0.0);
 }
 
-/// Sets the share of the period for which the pin is high, in thousandths.
+/// Sets the duty cycle, in thousandths.
 pub fn set_share(share: f32) {
     told().set(share);
 }
 
-/// Returns the frequency, in thousandths of a Hz, and the share, in thousandths.
+/// Returns the frequency, in thousandths of a Hz, and the duty cycle, in thousandths.
 pub fn output() -> (u32, f32) {
     (frequency().get(), told().get())
 }

@@ -20,7 +20,7 @@ pub struct Emitted {
     pub steps: [u64; MOTORS],
 }
 
-/// A switch that a motor works.
+/// A switch that a motor actuates.
 struct Near {
     input: usize,
     motor: usize,
@@ -182,12 +182,12 @@ pub fn set_step_output(pulse_us: u8, inverted: u8) {
     stepper().output.set((pulse_us, inverted));
 }
 
-/// Returns what [`set_step_output`] was told last: pulse width, and the inverted motors as bits.
+/// Returns what [`set_step_output`] has set: the pulse width, and the inverted motors as bits.
 pub fn step_output() -> (u8, u8) {
     stepper().output.get()
 }
 
-/// Makes the motor of an axis work the switch at an input from now on: see
+/// Makes the motor of an axis actuate the switch at an input from now on: see
 /// [`Machine::set_near`](super::Machine::set_near).
 pub(super) fn set_near(input: usize, step: i64, opens: bool) {
     let motor = if input < board_inputs::ENDS { input / 2 } else { 2 };

@@ -59,7 +59,7 @@ impl<const N: usize> Fill for Producer<u8, N> {
 struct Line {
     rx_in: Option<Box<dyn Fill>>,
     tx_out: Option<Consumer<u8, TX_RING>>,
-    /// Bytes the sender has yet to put on the line, and whether they arrive whole.
+    /// Bytes that the sender has yet to put on the line, and whether they arrive undamaged.
     arriving: VecDeque<(u8, bool)>,
     /// What the firmware has sent.
     sent: Vec<u8>,
@@ -75,7 +75,7 @@ struct Line {
     stopped: bool,
     /// Whether XOFF and XON from the other side count.
     heeds_xoff: bool,
-    /// Whether printable real-time characters are text.
+    /// Whether printable real-time characters are plain text.
     plain: bool,
     /// Whether the pin CTS counts. `cts` says whether it holds bytes back.
     heeds_cts: bool,
@@ -147,8 +147,8 @@ fn with<R>(port: u8, act: impl FnOnce(&mut Line) -> R) -> R {
     act(&mut lines()[usize::from(port)].borrow_mut())
 }
 
-/// Starts the lines, and the senders' ends, too: USB at `rate` bits a second, the second port at the board's rate.
-/// `None` after the first time.
+/// Starts the lines and the senders' ends of the lines: USB at `rate` bits a second, the second port at the board's
+/// rate. `None` after the first time.
 pub fn start(rate: u32) -> Option<AllEnds> {
     let usb = split(USB, usb_rx(), usb_tx(), rate)?;
     let aux = match hardware(AUX) {
@@ -274,13 +274,13 @@ pub fn take_closed() -> bool {
     with(USB, |line| core::mem::take(&mut line.closed))
 }
 
-/// Lets a program open the first port.
+/// Makes a program open the first port.
 pub(super) fn open_usb() {
     with(USB, |line| (line.opened, line.closed) = (true, false));
     flags::set(Event::Realtime);
 }
 
-/// Lets the program close the first port.
+/// Makes the program close the first port.
 pub(super) fn close_usb() {
     with(USB, |line| line.closed = true);
     flags::set(Event::Received);
@@ -341,7 +341,7 @@ pub fn take_asked(port: u8) -> Asked {
     with(port, |line| core::mem::take(&mut line.asked))
 }
 
-/// Lets the sender put bytes on the line.
+/// Makes the sender put bytes on the line.
 pub(super) fn send(port: u8, bytes: &[u8]) {
     with(port, |line| {
         line.arriving.extend(bytes.iter().map(|byte| (*byte, true)));
@@ -349,7 +349,7 @@ pub(super) fn send(port: u8, bytes: &[u8]) {
     });
 }
 
-/// Lets the sender put a byte on the line that arrives damaged.
+/// Makes the sender put a byte on the line that arrives damaged.
 pub(super) fn send_damaged(port: u8) {
     with(port, |line| {
         line.arriving.push_back((b'x', false));
@@ -357,7 +357,7 @@ pub(super) fn send_damaged(port: u8) {
     });
 }
 
-/// Lets the sender stop the machine by its RTS, which is our CTS, or let it go on.
+/// Makes the sender stop the machine by its RTS, which is our CTS, or allow it to continue.
 pub(super) fn set_cts(port: u8, stop: bool) {
     with(port, |line| line.cts = stop);
 }

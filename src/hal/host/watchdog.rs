@@ -21,7 +21,7 @@ pub fn set_cause(cause: Cause) {
     started().set(cause);
 }
 
-/// Restarts the time of the watchdog: all is well.
+/// Restarts the timeout of the watchdog.
 pub fn feed() {
     last().set(now());
 }

@@ -1,8 +1,9 @@
 //! Text in program memory, packed.
 //!
-//! This is byte pair encoding. A byte beyond ASCII is a code, and each code stands for two bytes or codes. The word `missing` takes one
-//! byte. Texts for people become 40 % shorter. The crate `kerf-macros` packs them; [`Text::bytes`] unpacks them byte by byte.
-//! Texts that are written with every line are [`Plain`].
+//! The texts are packed by byte pair encoding. A byte beyond ASCII is a code, and each code stands for two bytes or
+//! codes. The word `missing` takes one byte. Texts for people become 40 % shorter. The crate `kerf-macros` packs them;
+//! [`Text::bytes`] unpacks them byte by byte. Texts that are written with every line are [`Plain`], because unpacking
+//! takes time.
 
 use heapless::Vec;
 use kerf_macros::{pairs, small};
@@ -27,7 +28,7 @@ impl Text {
         Self(packed)
     }
 
-    /// Number of bytes. Cost on AVR: that of reading it.
+    /// Returns the number of bytes. Cost on AVR: that of reading the text.
     #[inline(never)]
     #[small]
     pub fn len(self) -> usize {
@@ -39,7 +40,7 @@ impl Text {
         self.0.is_empty()
     }
 
-    /// The bytes of the text, one by one. Cost on AVR: about 60 cycles a byte.
+    /// Returns the bytes of the text, one by one. Cost on AVR: about 60 cycles a byte.
     pub fn bytes(self) -> Bytes {
         Bytes { packed: self.0, pending: Vec::new() }
     }
