@@ -1,10 +1,10 @@
-//! What handlers in assembly need of the runtime.
+//! The interface of the runtime for interrupt handlers in assembly.
 //!
 //! **Event bits**: `sbi {FLAGS}, bit` is [`Event::set`](crate::Event::set). **Software interrupt**: a store of
 //! [`PENDED`] to [`PEND`] is [`interrupt::pend`](crate::interrupt::pend).
 //!
-//! **Holding the interrupt executor off.** A handler that lets other interrupts in with `sei` can be interrupted by the software interrupt,
-//! which may run for long. Two ways to keep it out, both entered with interrupts off:
+//! **Holding the interrupt executor off.** A handler that allows other interrupts with `sei` can be interrupted by the
+//! software interrupt, which may run for long. There are two ways to keep it out. Both are entered with interrupts off:
 //!
 //! - set bit [`HOLD`] of [`FLAGS`], and clear it at the end; if [`HELD`] is set then, clear [`HELD`] and pend. This is
 //!   for a handler that no other user of the bit interrupts.

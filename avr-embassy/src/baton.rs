@@ -29,7 +29,7 @@ pub struct Baton<T> {
 }
 
 impl<T> Baton<T> {
-    /// Makes it in stage 0.
+    /// Creates it in stage 0.
     pub const fn new(value: T) -> Self {
         Self { stage: SharedByte::new(0), value: Value::new(value) }
     }

@@ -16,7 +16,7 @@ mod imp {
     unsafe impl Sync for SharedByte {}
 
     impl SharedByte {
-        /// Makes it with a value.
+        /// Creates it with a value.
         pub const fn new(value: u8) -> Self {
             Self(UnsafeCell::new(value))
         }
@@ -48,7 +48,7 @@ mod imp {
     pub struct SharedByte(AtomicU8);
 
     impl SharedByte {
-        /// Makes it with a value.
+        /// Creates it with a value.
         pub const fn new(value: u8) -> Self {
             Self(AtomicU8::new(value))
         }
@@ -89,7 +89,7 @@ mod wide {
     pub struct SharedIndex(AtomicU16);
 
     impl SharedIndex {
-        /// Makes it with a value.
+        /// Creates it with a value.
         pub const fn new(value: u16) -> Self {
             Self(AtomicU16::new(value))
         }

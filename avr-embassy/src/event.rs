@@ -83,8 +83,9 @@ impl Event {
     /// Waits until `ready` returns a value. Asks now, and after each time that the event happens. Cost: see
     /// [`Waiter::wake_after`].
     ///
-    /// An event is meant for one waiting task. If a second task waits, the two keep waking each other: both get on,
-    /// at the cost of polls. The future keeps `ready` and a byte; an `async fn` would keep its arguments twice.
+    /// An event is meant for one waiting task. If a second task waits, the two keep waking each other: both make
+    /// progress, at the cost of polls. The future keeps `ready` and a byte; an `async fn` would keep its arguments
+    /// twice.
     pub fn wait<R>(
         self,
         thread: Thread,
@@ -129,8 +130,8 @@ impl Waiter {
         Self(Cell::new(None))
     }
 
-    /// Keeps a task for [`Waiter::wake`]. If another task is kept, that one is woken now; it asks again and comes
-    /// back here.
+    /// Stores a task for [`Waiter::wake`]. If another task is stored, that task is woken now; it asks again and is
+    /// stored again.
     ///
     /// # Panics
     /// If the waker is not that of a task of Embassy's executors.

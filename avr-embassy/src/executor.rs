@@ -12,7 +12,7 @@ use crate::{Thread, interrupt, pender, time};
 pub struct Executor(raw::Executor);
 
 impl Executor {
-    /// An executor without tasks.
+    /// Returns an executor without tasks.
     #[expect(clippy::new_without_default, reason = "as Embassy's own executors")]
     pub fn new() -> Self {
         Self(raw::Executor::new(pender::THREAD))
@@ -27,7 +27,7 @@ impl Executor {
     }
 
     /// Runs the tasks as [`Executor::run`] does. In addition, `turn` is called with the bits of the events that have
-    /// happened, each time before tasks are polled. It is for what is too small for a task.
+    /// happened, each time before tasks are polled. Use it for work that is too small for a task.
     #[inline(always)]
     pub fn run_with(
         &'static mut self,

@@ -17,7 +17,7 @@ use crate::{Interrupt, Thread, interrupt, pender};
 pub struct Runtime(&'static Executor);
 
 impl Runtime {
-    /// An executor without tasks.
+    /// Returns an executor without tasks.
     #[expect(clippy::new_without_default, reason = "each leaks")]
     pub fn new() -> Self {
         Self(Box::leak(Box::new(Executor::new(pender::THREAD))))

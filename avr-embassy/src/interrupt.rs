@@ -80,7 +80,7 @@ pub fn pend_when_idle() {
     imp::pend_when_idle();
 }
 
-/// Has [`was_idle`] tell from now on whether thread mode has had nothing left to do. Interrupt mode.
+/// From now on [`was_idle`] records whether thread mode has had nothing left to do. Interrupt mode.
 pub fn note_idle() {
     imp::note_idle();
 }
@@ -115,8 +115,8 @@ pub fn wait<R>(level: Interrupt, mut ready: impl FnMut() -> Option<R>) -> impl F
     })
 }
 
-/// Has a slot of [`wait`] hold this task from now on. Another task that the slot held is woken; it asks again and
-/// comes back.
+/// From now on a slot of [`wait`] holds this task. A task that the slot held before is woken; it asks again and is
+/// stored again.
 fn keep(kept: &mut Option<TaskRef>, waker: &Waker) {
     let task = task_from_waker(waker);
     if *kept != Some(task)

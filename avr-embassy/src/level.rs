@@ -18,7 +18,7 @@ use core::marker::PhantomData;
 pub struct Thread(PhantomData<*mut ()>);
 
 impl Thread {
-    /// Makes a token out of nothing.
+    /// Creates a token, without any proof.
     ///
     /// # Safety
     /// The token is used in thread mode only.
@@ -33,7 +33,7 @@ impl Thread {
 pub struct Interrupt(PhantomData<*mut ()>);
 
 impl Interrupt {
-    /// Makes a token out of nothing.
+    /// Creates a token, without any proof.
     ///
     /// # Safety
     /// The token is used in tasks of the interrupt executor only.

@@ -23,10 +23,11 @@
 //!
 //! # Critical sections mask nothing
 //!
-//! The `critical-section` of this crate is [`interrupt::lock`]: it keeps interrupt mode out, and **no other interrupt**. That makes wake-ups
-//! and channels between the two levels cheap, and delays no handler. The price: a handler must not enter a critical section, so it
-//! wakes no `Waker` and touches no `embassy_sync` channel. It sets an event, pends, or fills a ring; a task does the rest.
-//! Turn off the critical sections that other crates bring along (`avr-device`: feature `critical-section-impl`).
+//! The `critical-section` of this crate is [`interrupt::lock`]: it keeps interrupt mode out, and **no other
+//! interrupt**. So wake-ups and channels between the two levels are cheap, and no handler is delayed. The price: a
+//! handler must not enter a critical section, so it must wake no `Waker` and use no `embassy_sync` channel. Instead it
+//! sets an event, pends the interrupt executor, or fills a ring, and a task does the rest. Turn off the critical
+//! sections that other crates bring along (`avr-device`: feature `critical-section-impl`).
 //!
 //! # What the runtime owns
 //!

@@ -76,7 +76,7 @@ impl<T: Copy, const N: usize> Ring<T, N> {
 
     const SIZE_OK: () = assert!(N >= 2 && N <= Index::MAX as usize + 1);
 
-    /// An empty ring.
+    /// Returns an empty ring.
     pub const fn new() -> Self {
         const { Self::SIZE_OK };
         Self {
@@ -133,7 +133,7 @@ impl<T: Copy, const N: usize> Ring<T, N> {
         (head != self.tail.get()).then_some(head as u8)
     }
 
-    /// The slot taken last.
+    /// Returns the slot taken last.
     pub fn tail(&self) -> u8 {
         self.tail.get() as u8
     }
@@ -172,19 +172,19 @@ impl<T: Copy, const N: usize> Default for Ring<T, N> {
 pub struct Producer<T: 'static, const N: usize>(&'static Ring<T, N>);
 
 impl<T: Copy, const N: usize> Producer<T, N> {
-    /// Number of slots that can be filled now.
+    /// Returns the number of slots that can be filled now.
     #[inline]
     pub fn free(&self) -> usize {
         N - 1 - self.0.used()
     }
 
-    /// Number of slots the consumer has not released.
+    /// Returns the number of slots the consumer has not released.
     #[inline]
     pub fn used(&self) -> usize {
         self.0.used()
     }
 
-    /// The slot filled last.
+    /// Returns the slot filled last.
     #[inline]
     pub fn filled(&self) -> u8 {
         self.0.head.get() as u8
@@ -420,7 +420,7 @@ impl<T: Copy, const N: usize> Deref for Prefilled<T, N> {
 pub struct Consumer<T: 'static, const N: usize>(&'static Ring<T, N>);
 
 impl<T: Copy, const N: usize> Consumer<T, N> {
-    /// Number of values waiting.
+    /// Returns the number of values waiting.
     #[inline]
     pub fn len(&self) -> usize {
         self.0.used()
@@ -432,7 +432,7 @@ impl<T: Copy, const N: usize> Consumer<T, N> {
         self.0.head.get() == self.0.tail.get()
     }
 
-    /// The slot taken last.
+    /// Returns the slot taken last.
     #[inline]
     pub fn taken(&self) -> u8 {
         self.0.tail()

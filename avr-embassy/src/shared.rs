@@ -88,7 +88,7 @@ pub struct Shared<T> {
 }
 
 impl<T: Send> Shared<T> {
-    /// Makes it with a value.
+    /// Creates it with a value.
     pub const fn new(value: T) -> Self {
         Self { value: Value::new(value), taken: SharedByte::new(0) }
     }

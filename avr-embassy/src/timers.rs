@@ -1,9 +1,9 @@
 //! A short list of the times that tasks wait for.
 //!
-//! A task has one entry, its earliest time. When it is woken then, it asks again for the times that it still waits
-//! for. If more than `N` tasks wait, a task beyond that number is woken at once, looks at its timer and asks again:
-//! this costs cycles and sleep, and no time is missed. Times are milliseconds since reset, modulo 2^32; a task that
-//! waits for more than 24 days is woken early, and asks again.
+//! A task has one entry, its earliest time. When it is woken then, it registers the times that it still waits for. If
+//! more than `N` tasks wait, a task beyond that number is woken at once, checks its timer and registers again. This
+//! costs cycles and sleep, but no time is missed. Times are milliseconds since reset, modulo 2^32; a task that waits
+//! for more than 24 days is woken early, and registers again.
 //!
 //! Embassy's own queue keeps an entry of 16 bytes in every task. Here the list takes 6 bytes for each of `N` tasks.
 

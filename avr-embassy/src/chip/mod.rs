@@ -28,8 +28,8 @@ macro_rules! handlers {
             unsafe { crate::interrupt::handler() }
         }
 
-        /// Does nothing. Whoever starts the tick or the interrupt executor calls it, so that a linker without LTO
-        /// takes the handlers along: they are in the same object file. With LTO the call vanishes.
+        /// Does nothing. The code that starts the tick or the interrupt executor calls it, so that a linker without LTO
+        /// links the handlers, which are in the object file of this function. With LTO the call vanishes.
         #[inline(never)]
         pub fn link() {}
     };

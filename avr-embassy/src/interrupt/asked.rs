@@ -1,4 +1,4 @@
-//! Requests of interrupt mode for the moment when thread mode has nothing left to do. The same on every chip.
+//! Requests of interrupt mode for the moment when thread mode has nothing left to do. This code serves every chip.
 
 use crate::byte::SharedByte;
 

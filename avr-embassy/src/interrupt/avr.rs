@@ -32,7 +32,8 @@ pub fn pend() {
     unsafe { (PEND as *mut u8).write_volatile(PENDED) };
 }
 
-/// Notes that one of the executor's tasks was woken. The ceiling is closed now; the executor runs when it opens.
+/// Records that one of the executor's tasks was woken. The ceiling is closed now, so the executor runs when the ceiling
+/// opens.
 #[inline(always)]
 pub fn woken() {
     MISSED.set(1);

@@ -50,7 +50,7 @@ impl<T: Copy> ConsumerView<T> {
         index.wrapping_add(1) & self.last
     }
 
-    /// Number of values waiting.
+    /// Returns the number of values waiting.
     pub fn len(&self) -> usize {
         let ring = self.ring();
         usize::from(ring.head.get().wrapping_sub(ring.tail.get()) & self.last)
@@ -62,7 +62,7 @@ impl<T: Copy> ConsumerView<T> {
         ring.head.get() == ring.tail.get()
     }
 
-    /// The slot taken last.
+    /// Returns the slot taken last.
     pub fn taken(&self) -> u8 {
         self.ring().tail()
     }

@@ -46,7 +46,7 @@ impl ConsumerView<u8> {
 }
 
 impl Window<'_> {
-    /// How many bytes wait.
+    /// Returns the number of bytes that wait.
     pub fn len(&self) -> u8 {
         self.len
     }
