@@ -2,23 +2,25 @@
 //!
 //! Raise a cap only together with the reason for it.
 
-/// Bytes of flash. The cap is what today's capabilities take on the board of the lathe, which leaves out grbl's
-/// dialect (21,000), help and built-in jobs (3,800). Turning takes 25,000 of it: G76 takes 6,000, for its words, its
-/// geometry and powers of floats; G33.1 takes 3,300; X leaving the cut within what is queued already takes 600. The
-/// chip has 253,952 bytes beside its largest boot loader, 8 KiB. The rest is no reserve for new features: they have
-/// to make room. Calls through a pointer reach 128 KiB; the linker leads calls that go further through jumps at the
-/// beginning of the image (`.trampolines`). The last 300 bytes are for the board of the printer: the watchdog checks
-/// whether ticks interrupt, G-code waits for the end of a jog, motors with very fine steps merge no lines, and exec
-/// makes a usual segment where a long one does not fit (200). Another 100 are for two limits: that of a move which is
-/// too short for a ramp, and those of an arc whose path is measured in degrees.
+/// Bytes of flash. The cap is the size of the image for the board of the lathe with today's capabilities. That image
+/// leaves out grbl's dialect (21,000), help and built-in jobs (3,800). Turning takes 25,000 of it: G76 takes 6,000, for
+/// its words, its geometry and powers of floats; G33.1 takes 3,300; the retract of X within moves that are already
+/// queued takes 600. The chip has 253,952 bytes beside its largest boot loader, 8 KiB. The difference is no reserve for
+/// new features: they have to make room. Calls through a pointer reach 128 KiB; the linker routes longer calls through
+/// jumps at the beginning of the image (`.trampolines`). The last 300 bytes are for the board of the printer: the
+/// watchdog checks whether ticks interrupt, G-code waits for the end of a jog, motors with very fine steps merge no
+/// lines, and exec makes a normal segment where a long one does not fit (200). Another 100 are for two limits: that of
+/// a move which is too short for a ramp, and those of an arc whose path is measured in degrees.
 pub const FLASH: u64 = 253_800;
-/// Bytes of `.data`: constants that landed in RAM. Tables and text belong in program memory. In the image with an SD
-/// card the messages of `embedded-sdmmc`, which nobody reads, take 240 of it; the other images have less than 400.
+/// Bytes of `.data`: constants that the compiler has put into RAM. Tables and text belong in program memory. In the
+/// image with an SD card the messages of `embedded-sdmmc`, which are never shown, take 240 of it; the other images have
+/// less than 400.
 pub const DATA: u64 = 500;
-/// Bytes of `.data` and `.bss` together, of the chip's 8192. The velocities beside the keys of the look-ahead take
-/// 130 bytes. [`FREE_STACK`] remains beside the cap. On the board of the lathe surface speed takes the last of it,
-/// the flag that says whether lines are merged takes 8 more, because statics end at a multiple of 8, and the
-/// place of the last probing on the axes that do not probe, and whether the last line moves, take 16 together.
+/// Bytes of `.data` and `.bss` together, of the chip's 8192. The velocities beside the keys of the look-ahead take 130
+/// bytes. [`FREE_STACK`] remains beside the cap. The image for the board of the lathe reaches the cap: surface speed
+/// has taken the last free bytes. The flag that says whether lines are merged takes 8 more, because statics end at a
+/// multiple of 8. The position of the last probing on the axes that do not probe, and whether the last line moves, take
+/// 16 together.
 pub const STATIC_RAM: u64 = 6_088;
 /// Bytes that must remain between the statics and the deepest stack found by analysis.
 pub const FREE_STACK: i64 = 400;

@@ -1,4 +1,4 @@
-//! Keeps the documents true: whatever they name in `code` must exist.
+//! Checks that everything that the documents name in `code` exists.
 //!
 //! A code span with a slash, or with the ending of a file, is a path from the repository's root or from `src`. A span
 //! that reads like a name of Rust (`Name::method`, `field.other`) must consist of words of the sources. Two

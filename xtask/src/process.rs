@@ -52,8 +52,8 @@ pub fn pass_through(command: &mut Command) -> Result<ExitCode> {
     Ok(code.map_or(ExitCode::FAILURE, ExitCode::from))
 }
 
-/// Replaces this process by the program where the system supports it. Then ending this process by its number ends the
-/// program, and nothing stays behind.
+/// Replaces this process by the program where the system supports it. Killing the process by its number then ends the
+/// program, and no child is left.
 pub fn become_program(command: &mut Command) -> Result<ExitCode> {
     #[cfg(unix)]
     {

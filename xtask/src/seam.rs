@@ -1,4 +1,4 @@
-//! Dialects stay behind their interface: only the table of dialects in the firmware knows a dialect by name.
+//! Checks that only the table of dialects in the firmware knows a dialect by name.
 //!
 //! Tools for the host may know dialects: they print the numbers and texts of TinyG.
 

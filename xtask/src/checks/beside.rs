@@ -1,4 +1,4 @@
-//! Runs a command of this program beside the stages, in a process of its own.
+//! Runs a command of this program in parallel to the stages, in a process of its own.
 
 use std::fs::{self, File};
 use std::path::PathBuf;
@@ -8,8 +8,8 @@ use anyhow::{Context, Result, ensure};
 
 use crate::process::{root, shown};
 
-/// A command that runs beside the stages. Its output goes to a file and is shown when it has ended, because it would
-/// otherwise mix with the output of the stages.
+/// A command that runs in parallel to the stages. Its output goes to a file and is shown when it has ended, because it
+/// would otherwise mix with the output of the stages.
 pub struct Beside {
     command: Command,
     child: Child,

@@ -27,7 +27,7 @@ struct Stage {
     run: fn() -> Result<()>,
 }
 
-/// Stages that need no image. Images are built beside them: most of that time is a link, which takes one core.
+/// Stages that need no image. Images are built in parallel: most of that time is a link, which takes one core.
 const WITHOUT_IMAGES: &[Stage] = &[
     Stage { name: "format", run: format },
     Stage { name: "lints", run: lints },
@@ -36,8 +36,8 @@ const WITHOUT_IMAGES: &[Stage] = &[
     Stage { name: "tests of simulated boards, built", run: build_simulator_tests },
 ];
 
-/// Stages that need the images. Beside them the senders are installed, which mostly waits for the network, and the
-/// page is built.
+/// Stages that need the images. In parallel the senders are installed, which mostly waits for the network, and the page
+/// is built.
 const WITH_IMAGES: &[Stage] = &[
     Stage { name: "an image without capabilities", run: without_capabilities },
     Stage { name: "sizes and stack of every board", run: size_all },
@@ -118,8 +118,8 @@ fn has_component(subcommand: &str, component: &str) -> bool {
     found
 }
 
-/// Runs the tests on the host: with the fuzzers' checks, done once; with the crates that make the page and that
-/// simulate; and with the firmware without capabilities, which must refuse what it lacks.
+/// Runs the tests on the host: with the checks of the fuzzers, run once; with the crates of the page and of the
+/// simulator; and with the firmware without capabilities, which must refuse what it lacks.
 fn host_tests() -> Result<()> {
     run_child(&mut tests(&HOST_TARGETS))?;
     run_child(&mut tests(&["--doc"]))?;

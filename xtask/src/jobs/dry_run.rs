@@ -7,7 +7,7 @@ const FASTEST: f64 = 800.0;
 
 /// The result of a dry run.
 pub struct DryRun {
-    /// Number of lines without comments.
+    /// Number of lines without the comment lines.
     pub lines: usize,
     /// Number of arcs.
     pub arcs: usize,

@@ -119,8 +119,8 @@ impl Sender {
     }
 }
 
-/// Runs all senders with a job of half the usual time, because the conversations are tested. Whole jobs are tested
-/// with the simulator.
+/// Runs all senders with half of the normal job, because the conversations are tested. Whole jobs are tested with the
+/// simulator.
 pub fn run_short() -> Result<()> {
     run(&SendersArgs { job: Some(root().join("examples/engraving.gcode")), ..Default::default() })
 }

@@ -66,7 +66,7 @@ fn number(line: &mut impl Line, name: &str) -> Result<f64, String> {
     body.get(name).and_then(Json::number).ok_or_else(|| format!("no {name}"))
 }
 
-/// Verbosity and units before the conversation.
+/// The verbosity and the units that were in force before the conversation.
 struct Before {
     verbosity: Option<String>,
     inches: bool,

@@ -1,4 +1,4 @@
-//! Decides how to install missing tools, separately from installing them.
+//! Plans how missing tools are installed, separately from the installation.
 
 use std::io::{IsTerminal, Write};
 use std::process::{Command, Stdio};
@@ -9,7 +9,7 @@ use crate::process::{self, probe, which};
 /// The command by which rustup installs a toolchain that can build for AVR.
 pub const RUSTUP: &str = "rustup toolchain install nightly --profile minimal --component rust-src";
 
-/// What this computer and this user can do.
+/// The means of installation that this computer and this user have.
 #[derive(Clone, Copy, Debug)]
 pub struct Means {
     apt: bool,
@@ -19,7 +19,7 @@ pub struct Means {
 }
 
 impl Means {
-    /// Finds the means of this computer.
+    /// Finds the means of installation on this computer.
     pub fn here() -> Means {
         let apt = which("apt-get").is_some();
         let root = probe(Command::new("id").arg("-u")).as_deref() == Some("0");

@@ -3,7 +3,7 @@
 //! | module | purpose |
 //! |---|---|
 //! | [`build`] | compiles the module, collects the files, compares their size with the cap |
-//! | [`serve`] | a file server for the own computer |
+//! | [`serve`] | a file server for this computer |
 //! | [`browser`] | finds a browser and opens the page |
 //! | [`tests`] | the page in headless Chromium: a stage of `cargo xtask test` |
 //!

@@ -1,5 +1,4 @@
-//! A file server for the own computer: GET of the files of one folder, over HTTP/1.1, with a connection for each
-//! request.
+//! A file server for this computer: GET of the files of one folder, over HTTP/1.1, with a connection for each request.
 //!
 //! It listens at the loopback address only. A path that leads out of the folder, or to no file, gives 404; a request
 //! other than GET gives 405. A browser that sends nothing blocks only a thread of its own.
@@ -15,7 +14,7 @@ const LONGEST: u64 = 16_384;
 pub fn forever(listener: &TcpListener, folder: &Path) {
     for stream in listener.incoming().flatten() {
         let folder = folder.to_owned();
-        // A browser that has gone away needs no answer.
+        // An error means that the browser has closed the connection, so nothing is left to do.
         std::thread::spawn(move || answer(stream, &folder).ok());
     }
 }

@@ -80,7 +80,7 @@ fn a_prologue_that_is_called_leaves_more_on_the_stack() {
     let rest =
         ["out\t0x3d, r28", "rjmp\t.+2\t; 0x1c", "nop", "push\tr30", "push\tr31", "push\tr0", "ret"];
     let flow = follow(&code(&[&calls[..], &takes, &rest].concat()), 0, &marks);
-    // Two registers, a frame of five and the return address. Behind that it gets no deeper.
+    // Two registers, a frame of five and the return address. After that it gets no deeper.
     assert_eq!(flow.frame, 2 + 5 + 3);
     assert!(flow.calls.is_empty());
     let two = ["ldi\tr26, 0x2c", "ldi\tr27, 0x01", "rcall\t.+2\t; 0x8", "ret"];
