@@ -1,4 +1,5 @@
-//! Thread mode gets its turns however hard the mathematics of a ramp is: a question during the ramp is answered.
+//! Thread mode gets its turns however much CPU time the computation of a ramp takes: a question during the ramp is
+//! answered.
 
 use kerf::boards::MEGA2560_GRBL;
 use kerf_sim::bench::{curve, spiral};
@@ -118,8 +119,8 @@ fn requests_on_both_ports_are_answered_in_arcs_at_the_highest_step_rate() {
                 "jm {jerk}, radius {radius}: {:.1} ms, {:.1} ms on the second port",
                 ms[0], ms[1]
             );
-            // Steps and exec take nine tenths of the CPU, and a report 12 ms of the line of USB: docs/protocol.md. The slowest of 24,000
-            // questions took 19.7.
+            // Steps and exec take nine tenths of the CPU, and a report takes 12 ms on the line of USB:
+            // docs/protocol.md. The slowest of 24,000 questions took 19.7 ms.
             assert!(ms.iter().all(|ms| *ms <= 20.0), "jm {jerk}, radius {radius}: {ms:?} ms");
         }
     }
@@ -158,8 +159,9 @@ fn a_sender_of_short_moves_that_is_always_ahead_does_not_hold_up_the_other_port(
     ] {
         let ms = longest_beside_stream(&job, acceleration);
         println!("{what}: {:.1} ms, {:.1} ms on the second port", ms[0], ms[1]);
-        // The slowest of 1,500 questions took 18.4 and 22.4 ms on the curve, which takes all of the CPU, and 8.0 and 14.5 ms on the spiral. While short
-        // moves came before everything else, the second port waited for more than 500 ms on both.
+        // The slowest of 1,500 questions took 18.4 and 22.4 ms on the curve, which takes all of the CPU, and 8.0 and
+        // 14.5 ms on the spiral. While short moves had precedence over everything else, the second port waited for more
+        // than 500 ms on both.
         assert!(ms.iter().all(|ms| *ms <= most), "{what}: {ms:?} ms");
     }
 }

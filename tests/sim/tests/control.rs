@@ -1,4 +1,5 @@
-//! Control gets through whatever data does, on the simulated chip, with the crowds of `tests/control.rs`.
+//! Control lines and real-time characters are handled in time whatever data does, on the simulated chip, with the
+//! crowds of `tests/control.rs`.
 
 use kerf::boards::MEGA2560_GRBL;
 use kerf_sim::Machine;

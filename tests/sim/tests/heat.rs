@@ -52,7 +52,7 @@ impl Printer {
         (share(Kind::Semitec, degrees) * 5_000.0 + noise * 8.0).round().clamp(0.0, 5_000.0) as u32
     }
 
-    /// Runs for so many ms, and calls `look` after each.
+    /// Runs for `ms` milliseconds, and calls `look` after each.
     fn run(&mut self, ms: u64, mut look: impl FnMut(&Self)) {
         let Heaters { heaters: [hot_end, bed], fan } = heaters();
         for _ in 0..ms {

@@ -499,7 +499,7 @@ fn run_for_quarter(machine: &mut Machine) {
     machine.run_until(machine.cycle() + machine.cycles(1) / 4).unwrap();
 }
 
-/// A lathe whose X leaves the cut by 2 mm, also with 200 steps/mm and 500 mm/s2.
+/// A lathe whose X retracts from the cut by 2 mm, also with 200 steps/mm and 500 mm/s2.
 fn retracting(marks: u32, rpm: f64) -> (Machine, Host) {
     let (mut machine, mut host) = lathe(marks, rpm, |_| {});
     for line in [
@@ -517,8 +517,8 @@ fn retracting(marks: u32, rpm: f64) -> (Machine, Host) {
     (machine, host)
 }
 
-/// Stops the spindle dead in the cut. Returns, for each depth, the ms from the stop until X is so far out. Checks
-/// that the position is known to the step and leads back.
+/// Stops the spindle abruptly in the cut. Returns, for each depth, the ms from the stop until X has retracted by that
+/// depth. Checks that the position is known to the step and that the axes return to it.
 fn dies<const N: usize>(
     (machine, host): &mut (Machine, Host),
     later_ms: f64,
@@ -561,7 +561,7 @@ fn dies<const N: usize>(
 
 #[test]
 fn with_a_retract_a_spindle_that_stops_dead_has_x_leave_within_two_pulses_and_20_ms() {
-    // X leaves the cut of a pass. X is as light as most cross slides, or as slow as Z.
+    // X retracts from the cut of a pass. X is as light as most cross slides, or as slow as Z.
     for (accel, depths) in [(1_000, [0.1, 0.2, 0.3]), (500, [0.05, 0.1, 0.3])] {
         for (marks, rpm) in [(1, 300.0), (4, 300.0), (4, 1_000.0), (100, 600.0), (100, 1_000.0)] {
             let mut lathe = retracting(marks, rpm);

@@ -111,9 +111,8 @@ fn drivers_are_told_their_settings() {
     for line in ["{drr2:1.4,drh2:0.05}", "{drc4:0}", "{3mi:64}", "{drs1:255}"] {
         set(&mut board, &mut host, line);
     }
-    // Address 2 belongs to motor 2, address 1 to motor 3. Changed values do not wait for their turn: two datagrams
-    // follow the last answer, each of a millisecond, and before them the flash is written, in pieces of a part of a
-    // millisecond.
+    // Address 2 belongs to motor 2, address 1 to motor 3. Changed values do not wait for their turn: two datagrams of a
+    // millisecond each follow the last answer. Before them the flash is written, in pieces of a part of a millisecond.
     host.run_for_ms(&mut board, 5).unwrap();
     let told = take_told(&mut board, &mut rest);
     for wanted in [

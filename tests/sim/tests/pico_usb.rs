@@ -21,7 +21,7 @@ fn booted() -> Emulated {
     board
 }
 
-/// Sends a text on a port, and returns what is heard there within so many milliseconds.
+/// Sends a text on a port, and returns what is heard there within `ms` milliseconds.
 fn ask(board: &mut Emulated, port: usize, text: &str, ms: u64) -> String {
     board.send_to(port, text.as_bytes());
     board.run_for_ms(ms).unwrap();

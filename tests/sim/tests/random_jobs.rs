@@ -1,8 +1,9 @@
-//! Random jobs on the image: lines and arcs of all sizes with four axes, under random jerk limits and at random feeds; and with
-//! two axes at high step rates, with holds and overrides at random times; and many lines shorter than a step between fast ones. None
-//! has a pause, and each ends exactly.
+//! Random jobs on the image: lines and arcs of all sizes with four axes, under random jerk limits and at random feeds;
+//! jobs with two axes at high step rates, with holds and overrides at random times; and jobs with many lines shorter
+//! than a step between fast ones. No job has a pause, and each ends on its exact steps.
 //!
-//! `KERF_SEED` and `KERF_CASES` choose the jobs: `KERF_CASES=1000` for a thousand; `KERF_TOLD=1000` tells of all that fail.
+//! `KERF_SEED` and `KERF_CASES` choose the jobs: `KERF_CASES=1000` runs a thousand. `KERF_TOLD=1000` reports up to a
+//! thousand failures.
 
 use std::fmt::Write;
 
@@ -14,16 +15,16 @@ use proptest::strategy::ValueTree;
 use crate::common::firmware;
 use crate::seeds;
 
-/// Jobs unless asked otherwise: half a minute on two cores.
+/// Default number of jobs: half a minute on two cores.
 const CASES: u64 = 50;
 
-/// Of those with holds and overrides: some seconds.
+/// Default number of jobs with holds and overrides: some seconds.
 const DISTURBED: u64 = 12;
 
-/// Of those with lines shorter than a step: a quarter of a minute.
+/// Default number of jobs with lines shorter than a step: a quarter of a minute.
 const BRIEF: u64 = 100;
 
-/// A place to go to, as offsets of X, Y, Z (mm) and A (degrees).
+/// A move by offsets of X, Y, Z (mm) and A (degrees).
 #[derive(Clone, Debug)]
 enum Move {
     Line { way: [f64; 4], feed: f64 },
@@ -32,18 +33,18 @@ enum Move {
 
 #[derive(Clone, Debug)]
 struct Job {
-    /// Millions of mm/min3; 1,000,000 is none.
+    /// Jerk limit, millions of mm/min3; 1,000,000 means no limit.
     jerk: f64,
-    /// mm/s2.
+    /// Acceleration limit, mm/s2.
     accel: f64,
     /// Steps of X and Y in a mm.
     per_mm: f64,
     moves: Vec<Move>,
-    /// Real-time characters, and when they are said, ms after the first line.
+    /// Real-time characters, and when they are sent, ms after the first line.
     said: Vec<(u64, u8)>,
 }
 
-/// Evenly over the decades.
+/// Numbers of which all decades are equally likely.
 fn decades(from: f64, to: f64) -> impl Strategy<Value = f64> {
     (from.ln()..to.ln()).prop_map(f64::exp)
 }
@@ -68,14 +69,14 @@ fn arc() -> impl Strategy<Value = Move> {
     let rise = prop_oneof![3 => Just(0.0), 1 => -1.0..1.0f64];
     (decades(0.2, 30.0), 0.0..std::f64::consts::TAU, turn, rise, decades(300.0, 12_000.0)).prop_map(
         |(radius, from, turn, rise, feed)| {
-            // Large circles only in part: they would take most of the time.
+            // Of large circles only parts, because whole ones would take most of the time.
             let turn = turn / (radius / 10.0).max(1.0);
             Move::Arc { radius, from, turn, rise, feed }
         },
     )
 }
 
-/// Moves one by one, and curves of many short ones.
+/// Single moves, and curves of many short moves.
 fn any_job() -> impl Strategy<Value = Job> {
     let jerk = prop_oneof![Just(1e6), Just(500.0), Just(5_000.0), Just(50_000.0)];
     let mixed = prop::collection::vec(prop_oneof![2 => line(), 1 => arc()], 10..40);
@@ -96,7 +97,7 @@ fn any_job() -> impl Strategy<Value = Job> {
     })
 }
 
-/// Arcs, lines, and curves of short lines with X and Y at one feed.
+/// Arcs, lines, and curves of short lines, with X and Y at one feed.
 fn fast_moves() -> impl Strategy<Value = Vec<Move>> {
     let feed = 0.0;
     let angle = || 0.0..std::f64::consts::TAU;
@@ -124,7 +125,7 @@ fn fast_moves() -> impl Strategy<Value = Vec<Move>> {
     prop::collection::vec(parts, 10).prop_map(|parts| parts.concat())
 }
 
-/// Holds that are resumed, and overrides of the feed, for half a minute.
+/// Holds that are resumed, and feed overrides, for half a minute.
 fn anything_said() -> impl Strategy<Value = Vec<(u64, u8)>> {
     let hold = (3..400u64, 5..300u64).prop_map(|(wait, hold)| vec![(wait, b'!'), (hold, b'~')]);
     let feeds = prop::sample::select(vec![0x90u8, 0x91, 0x91, 0x92, 0x92]);
@@ -139,12 +140,12 @@ fn anything_said() -> impl Strategy<Value = Vec<(u64, u8)>> {
     })
 }
 
-/// Motors at 15,000 to 80,000 steps a second, or as fast as two can.
+/// Jobs with motors at 15,000 to 80,000 steps a second, or at the highest rate of two motors.
 fn fast_job() -> impl Strategy<Value = Job> {
     let per_mm = prop::sample::select(vec![80.0, 160.0, 320.0, 640.0, 1280.0]);
     let rate = prop::sample::select(vec![15e3, 25e3, 35e3, 45e3, 60e3, 80e3f64]);
     let accel = prop::sample::select(vec![200.0, 500.0, 2_000.0f64]);
-    // Times the acceleration; or none.
+    // The jerk limit as a multiple of the acceleration; `None` for no limit.
     let jerk = prop::sample::select(vec![Some(5.0), Some(20.0), None]);
     (per_mm, rate, accel, jerk, fast_moves(), anything_said()).prop_map(
         |(per_mm, rate, accel, jerk, mut moves, said)| {
@@ -157,7 +158,8 @@ fn fast_job() -> impl Strategy<Value = Job> {
     )
 }
 
-/// Chains of lines, most of them shorter than a step, straight or in zigzag, between long ones, all as fast as the axes can.
+/// Chains of lines, most of them shorter than a step, straight or in zigzag, between long lines. All are as fast as the
+/// axes allow.
 fn brief_moves() -> impl Strategy<Value = Vec<Move>> {
     let mm = prop::sample::select(vec![0.001, 0.002, 0.003, 0.005, 0.01, 0.02, 0.03f64]);
     let slope = prop::sample::select(vec![0.0, 0.05, 0.3, 1.0f64]);
@@ -172,13 +174,13 @@ fn brief_moves() -> impl Strategy<Value = Vec<Move>> {
     prop::collection::vec(chain, 6).prop_map(|chains: Vec<Vec<Move>>| chains.concat())
 }
 
-/// On machines of all resolutions and accelerations.
+/// Jobs on machines of all resolutions and accelerations.
 fn brief_job() -> impl Strategy<Value = Job> {
     let per_mm = prop::sample::select(vec![80.0, 125.0, 160.0, 320.0, 640.0, 1280.0]);
     let accel = prop::sample::select(vec![500.0, 2_000.0f64]);
     let jerk = prop::sample::select(vec![Some(30.0), Some(200.0), None]);
     (per_mm, accel, jerk, brief_moves()).prop_map(|(per_mm, accel, jerk, moves)| {
-        // From 1,000,000 on it is none.
+        // From 1,000,000 on there is no jerk limit.
         let jerk = jerk.map_or(1e6, |times| (times * accel).min(1e6));
         Job { jerk, accel, per_mm, moves, said: Vec::new() }
     })
@@ -224,7 +226,7 @@ impl Job {
     }
 }
 
-/// Plays the job of a seed.
+/// Runs the job of a seed.
 fn play(seed: u64, any: impl Strategy<Value = Job>) -> Result<(), String> {
     let (tree, _) = seeds::case(seed, &any);
     let job = tree.current();

@@ -93,8 +93,8 @@ fn exec_that_has_no_pause_does_not_pile_up() {
     try_to_play(&mut begun(), &ops).unwrap_or_else(|why| panic!("{why}"));
 }
 
-/// The reader is woken together with a task that works for long before it. The reader may then reach the place of the
-/// kill before the control task has noticed the kill.
+/// The reader is woken together with a task that then works for long before the reader runs. The reader may then reach
+/// the place of the kill before the control task has noticed the kill.
 #[test]
 fn a_kill_in_a_comment_is_one_whatever_is_under_way() {
     const COMMENT: &str = "(of which so much has come when something else is under way for a while";

@@ -112,7 +112,7 @@ fn a_reset_stops_the_spindle() {
     assert_eq!(machine.pulses().share, 0.0);
 }
 
-/// Runs for so many milliseconds with a spindle that follows the pulses.
+/// Runs for `ms` milliseconds with a spindle that follows the pulses.
 fn run_spindle(machine: &mut Machine, ms: u64) {
     for _ in 0..ms {
         machine.run_for_ms(1).unwrap();

@@ -1,4 +1,4 @@
-//! What the firmware and the meter report when exec is held up in mid-motion, and when motion ends for another
+//! The reports of the firmware and of the meter when exec is held up in mid-motion, and when motion ends for another
 //! reason.
 
 use kerf::boards::MEGA2560_GRBL;

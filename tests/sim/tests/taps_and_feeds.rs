@@ -88,7 +88,7 @@ fn a_spindle_that_does_not_turn_round_ends_a_tap_within_the_way_of_a_second() {
     }
 }
 
-/// Stops the spindle dead when the tap is `deep`. Returns how far Z goes on, mm.
+/// Stops the spindle abruptly when the tap is `deep`. Returns how far Z moves on, mm.
 fn jams(lathe: &mut Lathe, deep: f64) -> f64 {
     lathe.begin(TAP, Z, deep);
     lathe.machine.tamper(|mechanics, now| mechanics.force_spindle(0.0, now));

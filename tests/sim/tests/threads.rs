@@ -67,7 +67,7 @@ const WORDS: [Words; 22] = [
     words(&["g20 g91 g43.1 z0.1"], "g21 g90 g33 z-8.54 k1", [0.0, -6.0], 1.0),
 ];
 
-/// Ends whatever a line before may have begun, and goes back to 0, 0.
+/// Ends whatever an earlier line may have begun, and goes back to 0, 0.
 const AFTER: [&str; 7] = [
     "g21 g90 g8 g94",
     "g92.1 g49",

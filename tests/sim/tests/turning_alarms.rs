@@ -1,6 +1,6 @@
-//! Each fault of a spindle, and each stop, within a pass or before it, on the images of both dialects. The tests
-//! check the exception, alarm or error, that X is out of the cut where that is set, the position to the step, answers
-//! meanwhile, and the recovery.
+//! Every fault of a spindle, and every stop, within a pass or before it, on the images of both dialects. The tests
+//! check the exception, alarm or error; that X has retracted where a retract is set; the position to the step; the
+//! answers meanwhile; and the recovery.
 //!
 //! Faults that leave the machine unchanged are tested in sequence in one run of the simulator.
 
@@ -17,7 +17,7 @@ const BOARDS: [&Board; 2] = [&MEGA2560_LATHE, &MEGA2560_GRBL_LATHE];
 const XMIN: usize = 0;
 /// Longest time from a question to its answer, ms.
 const ANSWERED_MS: f64 = 20.0;
-/// Length of a thread, mm, and the distance by which X leaves the cut.
+/// Length of a thread, mm, and the distance by which X retracts from the cut.
 const LENGTH: f64 = 12.0;
 const RETRACT: f64 = 2.0;
 /// End of the thread, in steps.

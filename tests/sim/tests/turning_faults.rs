@@ -1,7 +1,7 @@
-//! Faults at random moments of a thread, on the image. The spindle stops, reverses, slows down, or races; pulses are
-//! missing or too many; the pass is held, ended, or reset; and both ports ask meanwhile. Each fault comes at a random
-//! moment of the pass, after the first step. The machine reports the exception of the fault and no other alarm, comes
-//! to rest where it says that it is, and goes on from there.
+//! Faults at random moments of a thread, on the image. The spindle stops, reverses, slows down, or becomes too fast;
+//! pulses are missing or too many; the pass is held, ended, or reset; and both ports ask questions meanwhile. Each
+//! fault comes at a random moment of the pass, after the first step. The machine reports the exception of the fault and
+//! no other alarm, comes to rest where it says that it is, and then works as before.
 //!
 //! `KERF_SEED` and `KERF_CASES` choose the cases.
 
@@ -111,7 +111,7 @@ impl Case {
         (self.length() * self.share / (self.rpm / 60.0) * 1e6) as u64
     }
 
-    /// Whether X leaves the cut.
+    /// Whether X retracts from the cut.
     fn leaves(&self) -> bool {
         self.retract != 0.0 && self.retract.abs() > 0.01 && !self.taper
     }

@@ -1,4 +1,5 @@
-//! The watchdog resets a firmware that hangs, and no other. The tests also check what is known after the reset.
+//! The watchdog resets a firmware that hangs, and does not reset one that works. The tests also check what is known
+//! after the reset.
 
 use kerf::boards::MEGA2560_GRBL;
 use kerf_sim::{Host, LINES_IN_FLIGHT, Machine};
