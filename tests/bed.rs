@@ -351,7 +351,7 @@ fn play(ops: &[Op], shared: bool) {
 /// Time of a G29, and a little more.
 const LEVELING_MS: u64 = 5_500;
 
-/// Ends G29 so many ms after its beginning.
+/// Ends G29 `ms` milliseconds after its beginning.
 fn end_leveling(ms: u64, by: &str) {
     let mut printer = Printer::homed();
     printer.send("G29 L0 R20 F0 B20 Z2");
@@ -384,7 +384,7 @@ fn whatever_ends_g29_early_leaves_no_plane() {
     }
 }
 
-/// Makes the machine do something else, by a line on the second port, so many ms after the beginning of G29.
+/// Makes the machine do something else, by a line on the second port, `ms` milliseconds after the beginning of G29.
 fn interfere(ms: u64, line: &str) {
     let mut printer = Printer::homed();
     printer.send("G29 L0 R20 F0 B20 Z2");

@@ -198,7 +198,7 @@ proptest! {
             let mut block = Move::default();
             match builder.line(&line, &dynamics, &config, &mut block) {
                 Built::Nothing => prop_assert_eq!(from, to),
-                // The builder is as if it had not been called: the next move begins where this one did.
+                // The state of the builder has not changed: the next move begins where this one did.
                 Built::Merge => {
                     prop_assert!(may_merge);
                     for (m, at) in motors.iter().enumerate() {
@@ -206,7 +206,7 @@ proptest! {
                     }
                     continue;
                 }
-                // Nothing has changed: the builder is as if it had not been called.
+                // The state of the builder has not changed.
                 Built::Parts(parts) => {
                     let steps =
                         |m: usize| (i64::from(config.steps(m, &to)) - motors[m]).unsigned_abs();

@@ -1,5 +1,5 @@
-//! Control gets through whatever data does, on the host. `tests/support/crowd.rs` says which ports are crowded and
-//! how; `tests/sim/tests/control.rs` runs the same tests with the image.
+//! Control lines and real-time characters are handled in time whatever data does, on the host. `tests/support/crowd.rs`
+//! says which ports are crowded and how; `tests/sim/tests/control.rs` runs these tests with the image.
 
 use kerf::hal::imp::Machine;
 

@@ -112,7 +112,7 @@ fn what_the_pages_name_exists() {
     assert!(missing.is_empty(), "not there:\n{}", missing.join("\n"));
 }
 
-/// No page has a sentence that is no longer true.
+/// No page has a sentence that is known to be outdated.
 #[test]
 fn no_page_tells_what_is_no_longer_so() {
     let gone = [

@@ -1,8 +1,8 @@
-//! Motors whose steps, over the length that lines are merged to, are more than a block holds.
+//! Motors that make more steps than a block holds within the length up to which lines are merged.
 
 use kerf::hal::imp::Machine;
 
-/// Returns where motor 1, of 12,800 steps a mm, ends, and how far it has been.
+/// Returns the end position and the highest position of motor 1, which has 12,800 steps a mm.
 fn driven(last: &str) -> (i64, i64) {
     let machine = Machine::boot(115_200).expect("one machine for each thread");
     machine.run_ms(100);

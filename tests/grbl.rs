@@ -1,4 +1,4 @@
-//! grbl's dialect with a sender that counts characters: whatever it does, nothing is lost.
+//! grbl's dialect with a sender that counts characters. No line is lost, whatever the sender does.
 
 use std::collections::VecDeque;
 use std::thread;

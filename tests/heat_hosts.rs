@@ -1,5 +1,5 @@
-//! Printing hosts and broken sensors while a printer heats, at many moments. Whatever must be off is off, and hosts
-//! get through.
+//! Printing hosts and broken sensors while a printer heats, at many moments. Every output that must be off is off, and
+//! hosts get their answers.
 
 use kerf::capability::Capability;
 use kerf::hal::imp::Machine;

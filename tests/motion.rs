@@ -8,7 +8,7 @@ use crate::jobs::{Planned, Pressed, any_job, plan, plan_pressed, run};
 use crate::keeps::{STRETCH, check_changes, check_corners, check_limits};
 use crate::optimum::rest_to_rest;
 
-/// The time is no longer than with a stop at every corner.
+/// Checks that the time is no longer than with a stop at every corner.
 fn check_time(planned: &[Planned]) {
     let total: f64 = planned.iter().map(|p| f64::from(p.stretch.seconds)).sum();
     let mut blocks: Vec<&Planned> = planned.iter().collect();
@@ -22,12 +22,12 @@ fn check_time(planned: &[Planned]) {
     );
 }
 
-/// So many stretches each, one after the other and from the first again, with so little of the CPU.
+/// Runs of stretches, each with its shortage of CPU time. After the last run the first one comes again.
 fn any_pressed() -> impl Strategy<Value = Vec<(usize, Pressed)>> {
     let flags = (any::<bool>(), any::<bool>(), any::<bool>());
     let pressed = flags.prop_map(|(coarse, hurry, tight)| Pressed { coarse, hurry, tight });
     let runs = prop::collection::vec((1..30usize, pressed), 1..8);
-    // In a hurry velocities are kept, however low: it has an end.
+    // The last run has no shortage. In a hurry velocities are kept, however low, so a hurry has to end.
     (runs, 20..60usize).prop_map(|(mut runs, last)| {
         runs.push((last, Pressed::default()));
         runs
@@ -63,7 +63,7 @@ proptest! {
         check_time(&planned);
     }
 
-    /// However little of the CPU there is, velocity and acceleration keep to their limits.
+    /// With any shortage of CPU time, velocity and acceleration keep to their limits.
     #[test]
     fn a_pressed_cpu_keeps_the_limits(job in any_job(), runs in any_pressed()) {
         let planned = plan_pressed(&job, |stretch| pressed_at(&runs, stretch));

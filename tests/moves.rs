@@ -177,7 +177,7 @@ fn moves_stop_for_a_dwell() {
     assert!((more - 0.5).abs() < 0.003, "{more} s");
 }
 
-/// Motors are where the governor is, at all times. A stretch carries over less than a step.
+/// Motors are where the governor is, at all times. A stretch carries less than a step over to the next one.
 #[test]
 fn segments_follow_the_plan() {
     for (jerk, velocity) in [(0.0, 1.0f32), (0.0, 60.0), (1e5, 1.0), (1e5, 60.0), (1e6, 200.0)] {

@@ -17,7 +17,7 @@ const INCH: f64 = 0.002;
 /// Tolerance for sums of many offsets that are written in both units.
 const SUMS: f64 = 0.01;
 
-/// The machine of the other interpreter: the usual one, but it executes lines with a slash.
+/// The machine of the other interpreter: the default one, but it executes lines with a slash.
 struct Other;
 
 impl Setup for Other {

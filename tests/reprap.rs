@@ -1,4 +1,4 @@
-//! The RepRap dialect with a printing host: whatever happens to its lines on their way, each is executed once.
+//! The RepRap dialect with a printing host. Each line is executed once, whatever happens to it on the way.
 
 use std::thread;
 
@@ -10,7 +10,7 @@ struct Host {
     heard: String,
     lines: Vec<String>,
     seed: u32,
-    /// One in so many lines is damaged on its way; 0 for none.
+    /// One in this many lines is damaged on its way; 0 for none.
     damages: u32,
     resent: usize,
 }

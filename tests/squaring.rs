@@ -1,5 +1,5 @@
-//! Axes with two motors and a switch for each. However askew the motors stand, homing makes them square. Whatever
-//! ends homing early, no motor jumps in the next move.
+//! Axes with two motors and a switch for each. Homing squares the axis, however askew the motors stand. If homing ends
+//! early, no motor jumps in the next move.
 
 use kerf::boards::inputs::{X_MIN, Y_MIN};
 use kerf::hal::imp::Machine;

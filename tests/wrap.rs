@@ -1,5 +1,5 @@
-//! The millisecond count wraps after 49.7 days, at 2^32 ms, and nothing is late then. The clock of each machine here
-//! starts 3 s before the wrap.
+//! The millisecond count wraps after 49.7 days, at 2^32 ms, without making anything late. The clock of each machine
+//! here starts 3 s before the wrap.
 
 use kerf::hal::imp::{Machine, gpio};
 

@@ -1,5 +1,5 @@
-//! Crowded ports: ports that are full of lines, stopped by their senders, or both. Control must get through all the
-//! same.
+//! Crowded ports: ports that are full of lines, stopped by their senders, or both. Control lines and real-time
+//! characters must still be handled in time.
 //!
 //! Each test starts with a machine that has just booted. They run on the host and on the simulated chip.
 
@@ -98,12 +98,12 @@ impl<S: Side> Crowd<S> {
         self.heard.iter_mut().for_each(String::clear);
     }
 
-    /// Whether a port sends this text within so many ms.
+    /// Whether a port sends this text within `ms` milliseconds.
     pub fn hears(&mut self, port: usize, text: &str, ms: u64) -> bool {
         self.comes(ms, |crowd| crowd.heard[port].contains(text))
     }
 
-    /// Whether a port sends a whole line that contains this text within so many ms.
+    /// Whether a port sends a whole line that contains this text within `ms` milliseconds.
     fn hears_line(&mut self, port: usize, text: &str, ms: u64) -> bool {
         self.comes(ms, |crowd| {
             let mut lines = crowd.heard[port].split_inclusive('\n');
@@ -111,7 +111,7 @@ impl<S: Side> Crowd<S> {
         })
     }
 
-    /// Whether a condition becomes true within so many ms.
+    /// Whether a condition becomes true within `ms` milliseconds.
     fn comes(&mut self, ms: u64, is_so: impl Fn(&Self) -> bool) -> bool {
         (0..=ms).any(|_| {
             let is_so = is_so(self);
@@ -210,7 +210,7 @@ pub fn xon_gets_through<S: Side>(boot: impl Fn() -> S + Sync) {
     }
 }
 
-/// A kill or a flush on one port drops what has come on the other port, wherever it waits.
+/// A kill or a flush on one port drops all that has arrived on the other port, wherever it waits.
 pub fn all_that_has_come_is_dropped<S: Side>(boot: impl Fn() -> S + Sync) {
     for (cut, ends) in [("\x04", false), ("!%", true)] {
         alone(&boot, |mut crowd| {
@@ -362,8 +362,8 @@ pub fn nothing_starves_control<S: Side>(boot: impl Fn() -> S + Sync) {
     }
 }
 
-/// Programs end with a percent sign. A percent sign that waits in the ring when a hold begins drops nothing; one that
-/// comes during the hold does.
+/// Programs end with a percent sign. A percent sign that waits in the ring when a hold begins has no effect; one that
+/// comes during the hold drops the queue.
 pub fn a_percent_sign_before_a_hold_is_none<S: Side>(boot: impl Fn() -> S + Sync) {
     for (flush, steps) in [("", 12 * 128), ("%", 0)] {
         alone(&boot, |mut crowd| {

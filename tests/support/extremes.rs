@@ -48,8 +48,8 @@ struct Motor {
     angle: f64,
     travel: f64,
     micro: f64,
-    /// Whether the direction is unknown: the host counts steps as they are meant, but the chip's pins have them the
-    /// other way round.
+    /// Whether the direction may be inverted. The host counts steps before pins are inverted, but the chip's pins show
+    /// the inverted direction.
     turned: bool,
 }
 
@@ -131,7 +131,7 @@ impl Motion {
     }
 }
 
-/// A machine and its settings.
+/// A machine, and its settings.
 pub struct Bench<S> {
     side: S,
     motion: Motion,
@@ -214,7 +214,7 @@ impl<S: Side> Bench<S> {
         Ok(true)
     }
 
-    /// Moves an axis to and fro, and compares the steps with the distances.
+    /// Moves an axis forth and back, and compares the steps with the distances.
     pub fn move_axis(&mut self, axis: usize) -> Outcome<()> {
         for way in WAYS {
             for code in ["g0", "g1 f1000"] {

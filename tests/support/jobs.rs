@@ -165,18 +165,18 @@ pub fn plan_changed(
     plan_with(job, held, change, |_| Pressed::default())
 }
 
-/// How little of the CPU there is.
+/// How little CPU time is left.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Pressed {
     /// Slices are twice as long.
     pub coarse: bool,
-    /// Slices are twice as long, and the governor looks at nothing that may wait.
+    /// Slices are twice as long, and the governor skips scans that can wait.
     pub hurry: bool,
     /// Accelerations that are about to end do so without another scan.
     pub tight: bool,
 }
 
-/// Runs a job through queue and governor alone; `pressed` tells before each stretch how little of the CPU there is.
+/// Runs a job through queue and governor alone. `pressed` says before each stretch how little CPU time is left.
 pub fn plan_pressed(job: &Job, pressed: impl FnMut(usize) -> Pressed) -> Vec<Planned> {
     plan_with(job, |_, _| false, |_, _| {}, pressed)
 }

@@ -1,4 +1,4 @@
-//! The rules that everything a governor plans must keep.
+//! The limits that everything a governor plans must keep.
 
 use kerf::motion::exec::{BLOCK_S_MIN, SEGMENT_S};
 
@@ -23,7 +23,7 @@ fn states(planned: &[Planned]) -> Vec<State> {
     for (of, p) in planned.iter().enumerate() {
         let state = State { clock: p.after_clock, place: p.after_place, velocity: p.after, of };
         let last = states.last_mut().expect("it begins with one");
-        // The rest of a slice leads to the state that is known already, except for rounding.
+        // The remainder of a slice leads to the state that is known already, except for rounding.
         if state.clock - last.clock > 2e-6 {
             states.push(state);
         }

@@ -39,7 +39,7 @@ pub struct Scale {
     pub wait: u64,
 }
 
-/// Inputs that are worked by hand: no axis has a switch there.
+/// Inputs that are actuated by hand: no axis has a switch there.
 pub const BY_HAND: [usize; 4] = [Y_MIN, PROBE, DOOR, STOP];
 
 /// A conversation.

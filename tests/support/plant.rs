@@ -1,4 +1,4 @@
-//! Heaters that tests simulate: where the heat goes, and what the sensor feels.
+//! Simulated heaters for tests: the flow of heat, and the temperature of the sensor.
 
 /// A heater with its sensor. Heat flows from the heater into the block and from the block to the air, and the sensor
 /// follows the block.

@@ -6,8 +6,8 @@
 
 use kerf::boards::inputs::{PROBE, X_MIN, Y_MIN, Z_MAX};
 
-/// The switches that the machine works itself: X has one at its lower end, Z at its upper end. Y has one out of its
-/// reach, which is worked by hand. None of them opens when it is worked.
+/// The switches that the motors actuate: X has one at its lower end, Z at its upper end. Y has one beyond its reach,
+/// which is actuated by hand. None of them opens when it is actuated.
 pub const SWITCHES: [(usize, i64, bool); 4] = [
     (X_MIN, -7_680, false),
     (Z_MAX, 7_680, false),
@@ -77,12 +77,12 @@ impl PositionModel {
         for (m, axis) in self.axes.iter_mut().enumerate() {
             let homes = homes_all || line.contains("g28.2") && line.contains(AXES[m]);
             axis.homed |= homes;
-            // A switch that is worked by hand may be anywhere.
+            // A switch that is actuated by hand may be at any place.
             axis.doubted |= homes && HOMED[m].is_none() || line.contains("g28.3");
         }
     }
 
-    /// Takes note that a switch is worked by hand. Meanwhile other switches are seen later than usual.
+    /// Takes note that a switch is actuated by hand. Meanwhile changes of other switches are noticed later.
     pub fn disturb(&mut self) {
         self.disturbed = true;
     }

@@ -162,7 +162,7 @@ pub struct Rig {
     /// The change of overrides that the last block with a request asks for.
     pub change: Option<Change>,
     pub segments: u64,
-    /// A motor that may be ahead of its line, and is not checked.
+    /// A motor that may be ahead of its line. It is not checked.
     pub leads: Option<usize>,
     /// How far the segments have moved each motor, phase units.
     travel: [i64; MOTORS],

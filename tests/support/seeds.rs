@@ -65,7 +65,7 @@ fn wanted(name: &str) -> Option<u64> {
     std::env::var(name).ok().and_then(|n| n.parse().ok())
 }
 
-/// Prints something even if the test passes.
+/// Prints a text even if the test passes.
 pub fn tell(what: &str) {
     let _ = writeln!(stderr(), "{what}");
 }

@@ -181,7 +181,7 @@ impl<S: Side> Session<S> {
         self.send(0, b"~");
     }
 
-    /// Works an input by hand.
+    /// Actuates an input by hand.
     fn work(&mut self, input: usize, closed: bool) {
         self.closed = self.closed & !(1 << input) | u16::from(closed) << input;
         self.position_model.disturb();

@@ -67,7 +67,7 @@ pub fn a_stop_acts_once<S: Side>(boot: impl Fn() -> S + Sync) {
     }
 }
 
-/// An alarm acts at once, even behind bytes that are no line or that lack a line end: in the pool, and in the ring
+/// An alarm acts at once, even behind bytes that form no line or that lack a line end: in the pool, and in the ring
 /// behind a full pool.
 pub fn a_stop_acts_behind_what_is_no_line<S: Side>(boot: impl Fn() -> S + Sync) {
     let full = "{xvm:n}\n".repeat(22);

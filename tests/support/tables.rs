@@ -1,6 +1,6 @@
 //! Keeps tables readable: no cell is long.
 
-/// Longest cell of a table, in characters. Longer cells are not read.
+/// Longest cell of a table, in characters. People do not read longer cells.
 pub const CELL: usize = 160;
 
 /// Splits a text: the sentences that a cell has room for, and the rest.

@@ -43,8 +43,8 @@ impl Course {
         Self { epoch: 0, axis: 0, base: steps[0], way: 0, exact: true, stirs, watch: None, steps }
     }
 
-    /// Takes note that lines may have been dropped, or surely have been. `goes_on` are the axes whose lines may still
-    /// be executed, and `turns` says whether the spindle may still be started.
+    /// Takes note that lines may have been dropped, or certainly have been. `goes_on` are the axes whose lines may
+    /// still be executed, and `turns` says whether the spindle may still be started.
     pub fn cut(&mut self, now: u64, cut: Cut, goes_on: [bool; AXES.len()], turns: bool) {
         self.stirs[self.axis] = true;
         self.epoch += 1;
@@ -82,7 +82,7 @@ impl Course {
         }
     }
 
-    /// Checks, at time `now`, that nothing moves that was killed.
+    /// Checks, at time `now`, that nothing moves whose motion was killed.
     pub fn see(&mut self, now: u64, steps: [i64; 4], spindle: bool) -> Result<(), String> {
         self.steps = steps;
         let Some(watch) = self.watch.as_mut().filter(|watch| now >= watch.from) else {

@@ -4,7 +4,7 @@
 /// What a line does.
 #[derive(Clone, Debug)]
 pub enum What {
-    /// Moves by so many [`CELL`]s at a feed, mm/min; 0 means a traverse.
+    /// Moves by a number of [`CELL`]s at a feed, mm/min; 0 means a traverse.
     Move(i8, u16),
     /// A move in JSON (`gc`), with its number (`tid`) before the block or behind it.
     Wrapped(i8, u16, bool),
@@ -74,7 +74,7 @@ pub enum Kind {
 #[derive(Clone, Debug, PartialEq)]
 pub enum Effect {
     None,
-    /// An axis has moved, or will move, by so many steps.
+    /// An axis has moved, or will move, by a number of steps.
     Move(usize, i64),
     /// A spindle turns.
     Spindle,

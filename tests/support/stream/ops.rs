@@ -41,7 +41,7 @@ pub struct Setup {
 pub enum Op {
     /// Lines for the stream of the main port (true) or of the other.
     Feed(bool, Vec<Template>),
-    /// Characters in the stream of a port, after so many more bytes of the stream.
+    /// Characters in the stream of a port, after this many more bytes of the stream.
     Characters(usize, &'static [u8], u8),
     /// The sender of a port stops the machine's answers (true) or lets them come.
     Hold(usize, bool),

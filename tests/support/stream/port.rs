@@ -30,7 +30,7 @@ pub struct Port {
     by_characters: bool,
     pub by_pin: bool,
     pub queue: VecDeque<Template>,
-    /// Characters to be inserted, each after so many further bytes.
+    /// Characters to be inserted, each after this many further bytes.
     pub inserts: VecDeque<(usize, &'static [u8])>,
     /// Whether a question is to be asked.
     pub asks: bool,
@@ -171,7 +171,7 @@ impl Port {
         }
     }
 
-    /// Whether a line of so many bytes may be begun.
+    /// Whether a line of this many bytes may be begun.
     fn may_begin(&self, bytes: usize) -> bool {
         let used = self.ledger.bytes() + self.placed;
         let margin = self.margin.min(self.limit() / 3);
@@ -179,7 +179,7 @@ impl Port {
         fits && self.flows() && (self.count != Count::Lines || self.ledger.lines() < LINES)
     }
 
-    /// Whether there is room for so many bytes that are no line of the stream.
+    /// Whether there is room for this many bytes that do not belong to a line of the stream.
     fn has_margin(&self, bytes: usize) -> bool {
         self.count == Count::Flow || self.ledger.bytes() + self.placed + bytes <= self.limit()
     }
