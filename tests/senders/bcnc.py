@@ -1,15 +1,15 @@
-"""bCNC: bcnc.py PORT JOB CONTROLLER, one of GRBL1 and G2Core."""
+"""bCNC: bcnc.py PORT JOB CONTROLLER, where CONTROLLER is GRBL1 or G2Core."""
 
 import sys
 import time
 
-from steps import ensure, main, session, step, until  # first: what bCNC prints is no step
+from steps import ensure, main, session, step, until  # first: redirects what bCNC prints
 from bcnc_sender import Bcnc, VERSION
 
 PORT, JOB, CONTROLLER = sys.argv[1:]
 GRBL = CONTROLLER == "GRBL1"
 FAR = 40
-# Where the plate is when Z is homed, at its top.
+# The position of the plate when Z has been homed at its top.
 PLATE = -51.8
 
 bcnc = Bcnc(PORT, CONTROLLER)
@@ -28,7 +28,7 @@ def idle_at(place):
 
 
 def hear():
-    """The first line with this beginning that comes from the board from now on."""
+    """Returns a function that finds the first line from the board, from now on, with a given beginning and end."""
     begin = len(bcnc.heard)
     return lambda text, end="": next(
         (line for line in bcnc.heard[begin:] if line.startswith(text) and line.endswith(end)), None
@@ -42,17 +42,17 @@ def ask(line, answer):
 
 
 def connect():
-    """Opens the port, which resets the board, as DTR does; it finds its dialect by itself."""
+    """Opens the port, which resets the board, as DTR does. The board finds the dialect by itself."""
     bcnc.openClose()
     if GRBL:
         until(lambda: state() == "Idle")
-        # The greeting is gone when it begins to listen.
+        # The greeting has passed before bCNC listens.
         heard = hear()
         bcnc.softReset()
         until(lambda: heard("Grbl 1.1h"))
         bcnc.viewBuild()
         return f"{until(lambda: heard('[VER:'))}, controller {bcnc.controller}"
-    # It reads lines as they are, and does not know XOFF.
+    # bCNC does not remove XOFF from lines, so flow control is switched off.
     ask('{"EX":0}', '{"r":{"ex":0}')
     bcnc.viewState()
     until(lambda: state() == "Idle")
@@ -62,12 +62,12 @@ def connect():
 def close():
     bcnc.openClose()
     ensure(bcnc.serial is None, "it is open")
-    time.sleep(0.3)  # The simulated board looks now and then whether somebody has the port open.
+    time.sleep(0.3)  # The simulated board checks from time to time whether the port is open.
     return "port closed"
 
 
 def setting(value=None):
-    """The top speed of X, read or written."""
+    """Reads the highest velocity of X, or sets it first."""
     if value is not None:
         ask(f"$110={value}" if GRBL else f'{{"XVM":{value}}}', "ok" if GRBL else '{"r":{"xvm":')
     if GRBL:
@@ -96,7 +96,8 @@ def jog():
 
 
 def slide(name, value):
-    """Moves a slider, and again while the machine has another value: it counts from the last report, and if that was old, stops beside the value."""
+    """Moves a slider, and repeats that until the machine has the value. bCNC counts from the last report, so with an
+    old report it ends at another value."""
     bcnc.put(f"_Ov{name}", value)
     moved = 0
 
@@ -113,7 +114,8 @@ def slide(name, value):
 
 
 def overrides():
-    """Its sliders, one at a time, for it forgets the others. Characters above 7F it sends as UTF-8: two bytes."""
+    """Moves bCNC's sliders one at a time, because it forgets the others. It sends characters above 7F in UTF-8, as two
+    bytes."""
     for name, value in [("Feed", 113), ("Rapid", 50), ("Spindle", 88), ("Feed", 100), ("Rapid", 100), ("Spindle", 100)]:
         slide(name, value)
     return "113, 50, 88 % and back"
@@ -135,7 +137,7 @@ def probe():
     heard = hear()
     bcnc.sendGCode("G38.2 Z-70 F800")
     if GRBL:
-        # Its own `$#` lists the last contact too, of which there is none.
+        # bCNC's own `$#` also lists the last contact, so a line without contact may come first.
         at = float(until(lambda: heard("[PRB:", ":1]")).split(",")[2])
     else:
         at = until(lambda: heard('{"prb":') or heard('{"r":{"prb":'))
@@ -146,8 +148,8 @@ def probe():
 
 
 def stop():
-    """The button "Stop" in the middle of a long move: a hold, and a reset in it."""
-    # Up from the plate, which a sender of its user would not forget.
+    """Presses the button "Stop" in the middle of a long move: a hold, and then a reset."""
+    # Z moves up from the plate, as a user would do first.
     bcnc.sendGCode("G90 G0 Z0")
     until(lambda: state() == "Idle" and abs(bcnc.get("mz")) < 0.0005)
     bcnc.start([f"G1 X{FAR} F60", "G1 X0"])
@@ -191,7 +193,7 @@ def hold():
 
 
 def finish():
-    """It takes a job for ended when the machine is in another state than these."""
+    """Waits for the end of the job. bCNC may consider the job ended before the machine is idle."""
     lines = bcnc._runLines
     until(lambda: not_refused() and not bcnc.running)
     until(lambda: state() == "Idle")

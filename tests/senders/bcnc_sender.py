@@ -1,5 +1,5 @@
-"""bCNC without its window: its `Sender`, which has the serial line, the controllers and the stream, with the few
-things that the window does for it."""
+"""bCNC without its window. Its class `Sender` has the serial line, the controllers and the stream. This module replaces
+the few functions of the window that `Sender` uses."""
 
 import builtins
 import contextlib
@@ -15,7 +15,7 @@ VERSION = "0.9.16"
 
 
 def _find():
-    """Makes bCNC's modules importable, which import each other by bare names."""
+    """Makes bCNC's modules importable. They import each other by bare names."""
     no_window.install()
     builtins._ = lambda text: text
     folder = os.path.dirname(importlib.util.find_spec("bCNC").origin)
@@ -31,21 +31,21 @@ from CNC import CNC, WAIT  # noqa: E402
 
 
 class Bcnc(Sender.Sender):
-    """A bCNC that a program works with instead of a person."""
+    """A bCNC that a program operates instead of a person."""
 
     def __init__(self, port, controller):
         Utils.loadConfiguration(True)
         super().__init__()
         self.port = port
         self.controllerSet(controller)
-        # Lines of the board that it has passed to its terminal, and those of them that it shows in red.
+        # Lines of the board that bCNC has shown in its terminal, and those of them that it shows in red.
         self.heard = []
         self.errors = []
         self.refused = None
         monitor = threading.Thread(target=self._monitor, daemon=True)
         monitor.start()
 
-    # What the window does when the sender has news of the state of its buttons; here it has none.
+    # The window's functions for changes of its buttons. They do nothing, because there is no window.
     def enable(self):
         pass
 
@@ -55,14 +55,14 @@ class Bcnc(Sender.Sender):
         pass
 
     def openClose(self, _=None):
-        """The button "Open", which is "Close" while the port is open."""
+        """Presses the button "Open", which is "Close" while the port is open."""
         if self.serial is None:
             self.open(self.port, 115200)
         else:
             self.close()
 
     def _monitor(self):
-        """What the window looks at several times a second."""
+        """Does what the window does several times a second."""
         while True:
             with contextlib.suppress(Sender.Empty):
                 while True:
@@ -81,19 +81,19 @@ class Bcnc(Sender.Sender):
         print(kind, text)
 
     def _settle(self):
-        """Waits until what it asks by itself has been answered. It asks when the machine comes to rest, and counts the
-        answers to the lines of the job if the job has begun meanwhile: it then takes the job for ended too early."""
+        """Waits until bCNC's own questions have been answered. bCNC asks them when the machine comes to rest. If a job
+        has begun meanwhile, it counts these answers for the job, and ends the job too early."""
         count = None
         while not self.queue.empty() or count != len(self.heard):
             count = len(self.heard)
             time.sleep(1)
 
     def start(self, lines=None):
-        """The button "Start": sends the file that is loaded, or these lines."""
+        """Presses the button "Start": sends the loaded file, or these lines."""
         assert self.serial and not self.running
         self._settle()
         self.cleanAfter = True
-        # So many tell its thread that there are lines still to come.
+        # This large number tells bCNC's thread that more lines will come.
         self._runLines = sys.maxsize
         self._gcount = 0
         self.initRun()
@@ -111,7 +111,7 @@ class Bcnc(Sender.Sender):
 
     @staticmethod
     def get(name):
-        """One of its variables."""
+        """Returns one of bCNC's variables."""
         return CNC.vars[name]
 
     @staticmethod

@@ -1,15 +1,15 @@
-"""grbl-streamer, the library: grbl-streamer.py PORT JOB"""
+"""The library grbl-streamer: grbl-streamer.py PORT JOB"""
 
 import importlib.metadata
 import sys
 import time
 
-from steps import ensure, main, session, step, until  # first: what the library prints is no step
+from steps import ensure, main, session, step, until  # first: redirects what the library prints
 import grbl_streamer
 
 PORT, JOB = sys.argv[1:]
 FAR = 40
-# Where the plate is when Z is homed, at its top.
+# The position of the plate when Z has been homed at its top.
 PLATE = -51.8
 
 heard = []
@@ -20,7 +20,7 @@ wanted = False
 
 
 def tell(event, *data):
-    """What the library tells; lines of the board that are no `ok` come by `on_read`."""
+    """Takes an event of the library. Lines of the board other than `ok` come as `on_read`."""
     global done, wanted
     if event == "on_read":
         heard.append(data[0])
@@ -37,7 +37,7 @@ def tell(event, *data):
 
 
 class Slow(grbl_streamer.Interface):
-    """Opens the port and waits for the board, which DTR resets: what comes before it listens is lost by a real one."""
+    """Opens the port and waits for the board, which DTR resets. A real board loses what comes before it listens."""
 
     def start(self, queue):
         super().start(queue)
@@ -68,7 +68,7 @@ def hear():
 
 
 def connect():
-    """Opens the port, which resets the board, as DTR does; then it sends a reset and waits for the greeting."""
+    """Opens the port, which resets the board, as DTR does. Then sends a reset and waits for the greeting."""
     grbl.cnect(PORT, 115200)
     until(grbl.is_connected)
     grbl.poll_start()
@@ -78,7 +78,7 @@ def connect():
 
 
 def quiet():
-    """Waits until its own questions are asked and answered, which it begins with each start and each rest."""
+    """Waits until the library's own questions have been answered. It asks them at each start and at each rest."""
     until(lambda: not (grbl.hash_state_requested or grbl.gcode_parser_state_requested))
     said = hear()
     grbl.get_gcode_parser_state()
@@ -89,7 +89,7 @@ def quiet():
 def close():
     grbl.disconnect()
     ensure(not grbl.is_connected(), "it is open")
-    time.sleep(0.3)  # The simulated board looks now and then whether somebody has the port open.
+    time.sleep(0.3)  # The simulated board checks from time to time whether the port is open.
     return "port closed"
 
 
@@ -102,9 +102,9 @@ def setting():
 def run():
     """Runs the job on the thread on which the library hears the board.
 
-    The library fills the board's buffer there at each `ok`, and has no lock: a second thread
-    that fills it takes up a line which then neither of them writes. The `ok` to a question
-    brings that thread here.
+    At each `ok` the library fills the board's buffer on that thread, without a lock. If a
+    second thread fills the buffer at the same time, a line may be lost. The `ok` to a
+    question makes that thread call `job_run`.
     """
     global wanted
     wanted = True
@@ -113,7 +113,7 @@ def run():
 
 
 def send(lines):
-    """Sends lines line by line and waits until all are answered."""
+    """Sends lines one by one, and waits until all are answered."""
     grbl.incremental_streaming = True
     grbl.job_new()
     grbl.write(lines)
@@ -125,7 +125,7 @@ def send(lines):
 
 def settings():
     before = setting()
-    # The library asks by itself as well, so that the next answer may be to an earlier question.
+    # The library asks by itself as well, so the next answer may belong to an earlier question.
     send(["$110=700"])
     until(lambda: setting() == 700)
     close()
@@ -145,7 +145,7 @@ def jog():
 
 
 def overrides():
-    """It has none of grbl's, but changes F in what it sends."""
+    """Changes the feed. The library does not use grbl's overrides; it changes F in the lines that it sends."""
     grbl.set_feed_override(True)
     grbl.request_feed(480)
     said = hear()
@@ -170,7 +170,7 @@ def home():
 def probe():
     said = hear()
     send(["G38.2 Z-70 F800"])
-    # Its own `$#` lists the last contact too, of which there is none.
+    # The library's own `$#` also lists the last contact, so a line without contact may come first.
     result = until(lambda: said("[PRB:", ":1]"))
     at = float(result.split(",")[2])
     ensure(abs(at - PLATE) < 0.01, result)
@@ -178,7 +178,7 @@ def probe():
 
 
 def stop():
-    """A reset in the middle of a long move."""
+    """Sends a reset in the middle of a long move."""
     send(["G90", "G0 Z0"])
     until(lambda: state() == "Idle")
     grbl.job_new()

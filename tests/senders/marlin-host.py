@@ -1,20 +1,21 @@
-"""marlin-host, a client in Marlin's words: marlin-host.py PORT JOB
+"""marlin-host, a client for Marlin: marlin-host.py PORT JOB
 
-It has one line in flight and gives up at each `Error:`, so that what slicers write and a board does not have must be no error."""
+It has one line in flight and gives up at each `Error:`. So lines of slicers that the board does not support must not be
+answered with an error."""
 
 import importlib.metadata
 import sys
 import threading
 import time
 
-from steps import ensure, main, step, until  # first: what the library prints is no step
+from steps import ensure, main, step, until  # first: redirects what the library prints
 import printing
 from marlin_host import MarlinHost, SerialTransport
 
 PORT, JOB = sys.argv[1:]
 FAR = 40
 
-# What slicers send besides moves, with words that this board has nothing for.
+# Lines that slicers send besides moves, and that this board does not support.
 PASSED_OVER = """\
 M862.3 P "MK3S"
 M73 P0 R54
@@ -36,7 +37,7 @@ host = None
 
 
 def ask(line, text):
-    """What is told before `ok`."""
+    """Sends a line. Returns the line before `ok` that contains the text."""
     lines = [told.raw for told in host.query(line)]
     return next((told for told in lines if text in told), "ok" if text == "ok" else None)
 
@@ -65,7 +66,7 @@ def place():
 
 
 def stop():
-    """M112 in the middle of a long move; then it asks for a new connection."""
+    """Sends M112 in the middle of a long move, and connects again, as the library requires."""
     host.send(f"G1 X{FAR} F60")
     until(lambda: place()["X"] > 1)
     host.emergency_stop()
@@ -87,7 +88,7 @@ def passed_over():
 
 
 def heat():
-    """`ok` comes when it is hot."""
+    """Heats. `ok` comes when the temperature is reached."""
     host.send("M109 S60")
     hot = host.temperatures()["T"]
     ensure(hot > 58, f"answered at {hot}")
@@ -96,7 +97,7 @@ def heat():
 
 
 def pause():
-    """Pauses in the middle of a print of its own: the machine comes to rest, and goes on."""
+    """Pauses in the middle of a print: the machine comes to rest, and then continues."""
     done = []
     print_it = lambda: done.extend(host.stream(printing.there_and_back(50)))
     thread = threading.Thread(target=print_it, daemon=True)
@@ -133,7 +134,7 @@ def test():
     step("settings", 20, lambda: printing.settings(ask))
     step("stop", 60, stop)
     step("passed over", 20, passed_over)
-    # Nothing is hot here.
+    # Allows cold extrusion, because nothing is hot.
     step("cold", 20, lambda: ask("M302 P1", "ok"))
     step("heat", 60, heat)
     step("pause", 60, pause)

@@ -1,5 +1,5 @@
-"""A `tkinter` without windows, so that modules of bCNC which draw them can be imported on a machine that has no
-display and no Tk: each name is a class that does nothing."""
+"""A `tkinter` without windows: each name is a class that does nothing. With it, modules of bCNC that draw windows can
+be imported on a machine without a display and without Tk."""
 
 import sys
 import types
@@ -18,7 +18,7 @@ class _Windows(types.ModuleType):
 
 
 def install():
-    """Has `import tkinter` find it."""
+    """Makes `import tkinter` find this module."""
     for name in ["tkinter", "tkinter.font", "tkinter.colorchooser", "tkinter.messagebox", "tkinter.ttk"]:
         sys.modules[name] = _Windows(name)
         if "." in name:

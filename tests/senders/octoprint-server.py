@@ -1,4 +1,4 @@
-"""OctoPrint, its server, by its API over HTTP: octoprint-server.py PORT JOB"""
+"""The server of OctoPrint, through its API over HTTP: octoprint-server.py PORT JOB"""
 
 import http.client
 import json
@@ -20,7 +20,7 @@ FAR = 40
 HERE = os.path.abspath("octoprint-home")
 KEY = secrets.token_hex(16)
 
-# What OctoPrint would ask of a new user, and what it does besides printing, is left out.
+# The configuration skips the questions to a new user, and disables functions that are not for printing.
 CONFIG = f"""\
 accessControl: {{autologinLocal: true}}
 api: {{key: {KEY}}}
@@ -44,7 +44,7 @@ def free_port():
 
 
 def call(path, body=None, kind="application/json"):
-    """Asks the server: GET, or POST of a body. None where it says that this cannot be now."""
+    """Sends a request to the server: GET, or POST of a body. Returns None if the server says: not possible now."""
     if isinstance(body, dict):
         body = json.dumps(body).encode()
     request = urllib.request.Request(f"{url}/api/{path}", body, {"X-Api-Key": KEY, "Content-Type": kind})
@@ -71,7 +71,7 @@ def state():
 
 
 def heard():
-    """What came from the board, as the server has written it down."""
+    """Returns the lines from the board, from the log of the server."""
     try:
         with open(os.path.join(HERE, "logs", "serial.log"), encoding="utf-8", errors="replace") as log:
             return [line.split("Recv: ", 1)[1].strip() for line in log if "Recv: " in line]
@@ -131,12 +131,12 @@ def connect():
 
 
 def temperatures():
-    """It asks by itself."""
+    """Waits for a temperature. OctoPrint asks for it by itself."""
     return f"hot end {until(hot_end)}"
 
 
 def heat():
-    """By the button for the hot end's temperature."""
+    """Heats by the control for the hot end's temperature."""
     target = lambda degrees: call("printer/tool", {"command": "target", "targets": {"tool0": degrees}})
     target(60)
     until(lambda: hot_end() > 58)
@@ -158,7 +158,7 @@ def progress():
 
 
 def pause():
-    """Pauses in the middle of a print of its own: the machine comes to rest, and goes on."""
+    """Pauses in the middle of a print: the machine comes to rest, and then continues."""
     upload("pause.gcode", "".join(f"{line}\n" for line in printing.there_and_back(300)))
     until(lambda: progress() > 200)
     call("job", {"command": "pause", "action": "pause"})
@@ -174,7 +174,7 @@ def pause():
 
 
 def cancel():
-    """Gives up a print of its own in the middle, and goes back to where it began."""
+    """Cancels a print in the middle, and goes back to where the print began."""
     upload("cancel.gcode", "".join(f"{line}\n" for line in printing.there_and_back(300)))
     until(lambda: progress() > 400)
     there = progress()
@@ -187,7 +187,7 @@ def cancel():
 
 
 def stop():
-    """M112: OctoPrint leaves the port as well; the machine is in an alarm until it is connected to again."""
+    """Sends M112. OctoPrint closes the port as well, and the machine is in an alarm until OctoPrint connects again."""
     send("M112")
     until(lambda: state().startswith(("Offline", "Closed", "Error")))
     what = state()
@@ -198,7 +198,7 @@ def stop():
 def prints():
     with open(JOB, encoding="ascii") as job:
         text = job.read()
-    # Nothing is hot here.
+    # Allows cold extrusion, because nothing is hot.
     ask("M302 P1", "ok")
     begin = len(heard())
     upload("print.gcode", text)

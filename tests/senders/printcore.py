@@ -1,12 +1,12 @@
-"""printcore of printrun, the library: printcore.py PORT JOB
+"""printcore, the library of printrun: printcore.py PORT JOB
 
-The simulated board's line damages one line in a hundred that has a number: it is sent again."""
+The line to the simulated board damages one in a hundred of the lines with a number. Damaged lines are sent again."""
 
 import importlib.metadata
 import sys
 import time
 
-from steps import ensure, main, step, until  # first: what the library prints is no step
+from steps import ensure, main, step, until  # first: redirects what the library prints
 import printing
 from printrun.gcoder import LightGCode
 from printrun.printcore import printcore
@@ -52,7 +52,7 @@ def temperatures():
 
 
 def stop():
-    """M112 in the middle of a long move."""
+    """Sends M112 in the middle of a long move."""
     host.send_now("G90")
     host.send_now(f"G1 X{FAR} F60")
     until(lambda: place()["X"] > 1)
@@ -68,7 +68,7 @@ def stop():
 
 
 def heat():
-    """Heats, and waits until it is hot; M105 is answered meanwhile."""
+    """Heats, and waits until the temperature is reached. M105 is answered meanwhile."""
     said = hear()
     host.send_now("M104 S60")
     host.send_now("M109 S60")
@@ -86,7 +86,7 @@ def degrees(line):
 def prints():
     with open(JOB, encoding="ascii") as job:
         lines = [line.strip() for line in job]
-    # Nothing is hot here.
+    # Allows cold extrusion, because nothing is hot.
     ask("M302 P1", "ok")
     begin = len(heard)
     ensure(host.startprint(LightGCode(lines)), "it does not begin")
@@ -101,7 +101,7 @@ def prints():
 
 
 def pause():
-    """Pauses in the middle of a print of its own: the machine comes to rest, and goes on."""
+    """Pauses in the middle of a print: the machine comes to rest, and then continues."""
     host.startprint(LightGCode(printing.there_and_back(300)))
     until(lambda: host.queueindex > 10)
     host.pause()
@@ -117,7 +117,7 @@ def pause():
 
 
 def cancel():
-    """Gives up a print of its own in the middle, and goes back to where it began."""
+    """Cancels a print in the middle, and goes back to where the print began."""
     host.startprint(LightGCode(printing.there_and_back(300)))
     until(lambda: host.queueindex > 20)
     host.cancelprint()

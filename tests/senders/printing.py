@@ -1,10 +1,11 @@
-"""What drivers of printing hosts have in common. `ask(line, text)` sends a line and returns what comes with the text in it."""
+"""Functions that all drivers of printing hosts use. `ask(line, text)` sends a line and returns a line with the text in
+it."""
 
 from steps import ensure
 
 
 def settings(ask):
-    """Steps and limits of a printer."""
+    """Sets the steps and limits of a printer. Returns the answer to M503."""
     for line in ["M92 X80 Y80 Z400 E93", "M203 X150 Y150 Z10 E50", "M201 X1000 Y1000 Z100 E5000"]:
         ask(line, "ok")
     text = ask("M503", "M92")
@@ -13,17 +14,17 @@ def settings(ask):
 
 
 def place(ask):
-    """Where each axis is, by its letter."""
+    """Returns the position of each axis, by its letter."""
     words = ask("M114", "Count").split()
     return {word[0]: float(word[2:]) for word in words[:4]}
 
 
 def settle(send, ask, name="all carried out"):
-    """Waits until all that has been sent is carried out: M118 waits behind M400, whose ok begins as that of any line."""
+    """Waits until all lines have been executed. M118 waits behind M400, whose own `ok` looks like that of any line."""
     send("M400")
     ask(f"M118 {name}", name)
 
 
 def there_and_back(moves):
-    """The lines of a print that ends where it begins."""
+    """Returns the lines of a print that ends where it begins."""
     return ["G91"] + ["G1 X0.5 F1200", "G1 X-0.5"] * moves + ["G90"]

@@ -1,12 +1,12 @@
-"""The steps of a test of a sender in Python, told as `steps.js` tells them: a line each, `step`, `passed` or
-`failed`, its name, details, parted by tabs."""
+"""The steps of a test of a sender in Python. They are reported as in `steps.js`, a line each: `step`, `passed` or
+`failed`, the name and details, separated by tabs."""
 
 import os
 import sys
 import threading
 import time
 
-# What a sender itself prints is no step.
+# Output of the sender itself goes to standard error, because it is not a step.
 _out = os.fdopen(os.dup(1), "w")
 os.dup2(2, 1)
 
@@ -16,14 +16,14 @@ def tell(result, name, details):
 
 
 class Late(Exception):
-    """A step takes longer than it may."""
+    """A step exceeds its time limit."""
 
 
 _end = None
 
 
 def step(name, seconds, run):
-    """Runs a step and tells what came of it; what it returns are details for people."""
+    """Runs a step and reports its result. The details that it returns are for people."""
     global _end
     _end = time.monotonic() + seconds
     watchdog = threading.Timer(seconds + 10, _give_up, [name])
@@ -42,7 +42,7 @@ def step(name, seconds, run):
 
 
 def until(condition):
-    """Waits until the condition holds; the step's own limit ends a wait that would never end."""
+    """Waits until the condition holds. The time limit of the step ends a wait that would never end."""
     while not (value := condition()):
         if time.monotonic() > _end:
             raise Late
@@ -59,8 +59,8 @@ _stop = None
 
 
 def main(test, stop=None):
-    """Runs the test and ends the process, also when nobody waits for it any more: then its standard input ends. `stop` ends
-    what the test has started, however the process ends."""
+    """Runs the test and ends the process. The process also ends when its standard input ends, because then no program
+    waits for it any more. `stop` ends what the test has started, however the process ends."""
     global _stop
     _stop = stop
     watcher = threading.Thread(target=lambda: (sys.stdin.read(), leave(1)), daemon=True)
@@ -70,7 +70,7 @@ def main(test, stop=None):
 
 
 def session(*, connect, settings, jog, home, probe, stop, close, start, hold, finish, overrides=None):
-    """Runs the steps that every sender has: from the first connection to the end of the whole job, over a reconnection."""
+    """Runs the steps that every sender has, from the first connection to the end of the job, with a reconnection."""
     step("connect", 20, connect)
     step("settings", 180, settings)
     step("jog", 180, jog)
