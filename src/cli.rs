@@ -21,7 +21,8 @@ struct Args {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Dry run: carry a job out on the host, and say which lines are refused, how far the axes go, and how long it takes
+    /// Dry run: carry a job out on the host, and say which lines are refused, how far the axes go, and how long it
+    /// takes
     Check {
         /// The job; `-` for standard input
         file: PathBuf,

@@ -232,8 +232,8 @@ fn steps_are_even_whatever_ticks_become() {
     }
 }
 
-/// The steps of the dominant motor stay even over the ends of lines of 0.2 to 5 mm, in lockstep and out of it. Lines end
-/// in 1/16 step: where ticks are longer, a step may be late by as much.
+/// The steps of the dominant motor stay even over the ends of lines of 0.2 to 5 mm, in lockstep and out of it. Lines
+/// end in 1/16 step: where ticks are longer, a step may be late by as much.
 #[test]
 fn steps_are_even_over_the_ends_of_lines() {
     let mut random = Random(11);

@@ -75,7 +75,8 @@ pub fn pend() {
     imp::pend();
 }
 
-/// Asks for the interrupt executor to run when thread mode has nothing left to do: for work that may wait. Interrupt mode.
+/// Asks for the interrupt executor to run when thread mode has nothing left to do: for work that may wait. Interrupt
+/// mode.
 pub fn pend_when_idle() {
     imp::pend_when_idle();
 }

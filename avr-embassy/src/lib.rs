@@ -1,5 +1,6 @@
-//! Embassy on 8-bit AVR with two levels of tasks: a thread-mode executor, an interrupt-mode executor that preempts it, a time driver,
-//! event bits that a handler sets in one instruction, and rings between levels that never mask interrupts.
+//! Embassy on 8-bit AVR with two levels of tasks: a thread-mode executor, an interrupt-mode executor that preempts it,
+//! a time driver, event bits that a handler sets in one instruction, and rings between levels that never mask
+//! interrupts.
 //!
 //! On top of it programs use Embassy as they know it: `#[embassy_executor::task]`, [`embassy_time`], [`embassy_sync`],
 //! `embassy-futures`. The README has examples and what everything costs in cycles.
@@ -43,12 +44,13 @@
 //!
 //! - **Events** that repeat before the main loop looks merge into one. None is lost.
 //! - **A ring** that is full refuses: [`Producer::push`](ring::Producer::push) gives the value back.
-//! - **Timers** of more than 4 tasks at once (features `timers-8`, `timers-16`): the tasks beyond that number are polled
-//!   all the time until there is room. No time is missed, but the CPU does not sleep.
+//! - **Timers** of more than 4 tasks at once (features `timers-8`, `timers-16`): the tasks beyond that number are
+//!   polled all the time until there is room. No time is missed, but the CPU does not sleep.
 //! - **A timer** is as late as the longest poll of a thread-mode task. Work that must be on time is done by a handler
 //!   of the program that pends a task of interrupt mode.
 //! - **Requests** to interrupt mode merge while it cannot run, and are served right after.
-//! - **A second task** that waits for an event, or in [`interrupt::wait`], takes turns with the first: both go on, at the cost of polls.
+//! - **A second task** that waits for an event, or in [`interrupt::wait`], takes turns with the first: both go on, at
+//!   the cost of polls.
 //!
 //! # Host
 //!

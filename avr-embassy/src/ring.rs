@@ -201,8 +201,8 @@ impl<T: Copy, const N: usize> Producer<T, N> {
     /// newest slot of a full ring.
     #[inline(always)]
     fn write(&mut self, index: Index, value: T) {
-        // SAFETY: a slot behind `head` is the producer's until `head` moves onto it, and the consumer stays away from the
-        // newest slot of a full ring (`Ring::settled`).
+        // SAFETY: a slot behind `head` is the producer's until `head` moves onto it, and the consumer stays away from
+        // the newest slot of a full ring (`Ring::settled`).
         unsafe { self.0.slot(index).write(value) };
     }
 
@@ -462,8 +462,8 @@ impl<T: Copy, const N: usize> Consumer<T, N> {
         }
     }
 
-    /// Returns the oldest values, as many as lie side by side; empty only if none waits. The newest value of a full ring
-    /// is not among them, because the producer may replace it.
+    /// Returns the oldest values, as many as lie side by side; empty only if none waits. The newest value of a full
+    /// ring is not among them, because the producer may replace it.
     #[inline]
     pub fn waiting(&self) -> &[T] {
         // Read once: the producer may move it meanwhile.

@@ -1,8 +1,8 @@
 //! The card as blocks of 512 bytes, by SPI (SD Physical Layer, simplified, chapter 7).
 //!
-//! A command waits for its answer for some bytes. A block is asked for (CMD17) and comes when the card has it, 100 ms later at most: [`Device::read`]
-//! waits for that if it [is patient](set_patient), else says [`Fault::Later`] and is to be asked for the same block again. The card stays
-//! selected meanwhile.
+//! A command waits for its answer for some bytes. A block is asked for (CMD17) and comes when the card has it, 100 ms
+//! later at most: [`Device::read`] waits for that if it [is patient](set_patient), else says [`Fault::Later`] and is to
+//! be asked for the same block again. The card stays selected meanwhile.
 
 use core::cell::Cell;
 use core::fmt;

@@ -1,12 +1,12 @@
 //! An SD card: its files, and the one that is being printed.
 //!
-//! Owned by thread mode; the parser task alone calls it. FAT16 and FAT32 are `embedded-sdmmc`'s, which keeps one block of 512 bytes; blocks come
-//! from the `device`. Files are those of the root, by their short names.
+//! Owned by thread mode; the parser task alone calls it. FAT16 and FAT32 are `embedded-sdmmc`'s, which keeps one block
+//! of 512 bytes; blocks come from the `device`. Files are those of the root, by their short names.
 //!
-//! A line of the file that is printed is read where it lies, up to its end or to the end of a block. If a block has to come first, the card is
-//! asked for it, and `Line::Later` says so: nobody waits for the card then, but for the 1.5 ms in which the block is handed over. All
-//! else, which an idle machine is asked for, waits for its blocks, for 100 ms each at most. What goes wrong is [`CardError`](crate::status::Status::CardError), and
-//! ends a print.
+//! A line of the file that is printed is read where it lies, up to its end or to the end of a block. If a block has to
+//! come first, the card is asked for it, and `Line::Later` says so: nobody waits for the card then, but for the 1.5 ms
+//! in which the block is handed over. All else, which an idle machine is asked for, waits for its blocks, for 100 ms
+//! each at most. What goes wrong is [`CardError`](crate::status::Status::CardError), and ends a print.
 
 #[cfg(feature = "sd")]
 mod device;

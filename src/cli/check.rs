@@ -1,5 +1,5 @@
-//! `kerf check`: a dry run of a job. The firmware itself carries it out on the host, in mocked time: what it refuses, how far the
-//! axes go, and how long it takes are what the machine would do.
+//! `kerf check`: a dry run of a job. The firmware itself carries it out on the host, in mocked time: what it refuses,
+//! how far the axes go, and how long it takes are what the machine would do.
 
 use std::collections::VecDeque;
 use std::fmt::{self, Display, Formatter};
@@ -21,8 +21,8 @@ const PASSED_OVER: u8 = 3;
 
 /// A job is timed for this many bits a second.
 const BAUD: u32 = 115_200;
-/// More lines than this in some second, and the board may be the limit: its CPU is not reckoned with here. The queue alone takes 64 when it
-/// has run empty; 400 a second the board follows within 1 %.
+/// More lines than this in some second, and the board may be the limit: its CPU is not reckoned with here. The queue
+/// alone takes 64 when it has run empty; 400 a second the board follows within 1 %.
 const MOST_LINES: usize = 64 + 400;
 /// How much longer a job may take then, percent.
 const SLOWER: u32 = 8;

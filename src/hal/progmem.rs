@@ -73,7 +73,8 @@ pub unsafe trait Named: Copy {
     const WIDTH: usize;
 }
 
-/// Lets rows of this type be [found](crate::progmem::Slice::find) by the name in their field `token`: `named! { Row, 4 }`.
+/// Lets rows of this type be [found](crate::progmem::Slice::find) by the name in their field `token`:
+/// `named! { Row, 4 }`.
 #[macro_export]
 macro_rules! named {
     ($row:ty, $width:literal) => {

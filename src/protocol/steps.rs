@@ -43,8 +43,8 @@ pub fn steps(axis: u8, machine: &mut impl Machine) -> i32 {
     turned(machine, motor, turn)
 }
 
-/// Sets the steps per millimetre of an axis: `put` gets the travel per turn of each of its motors. If one of them is out
-/// of range, no motor is changed.
+/// Sets the steps per millimetre of an axis: `put` gets the travel per turn of each of its motors. If one of them is
+/// out of range, no motor is changed.
 #[inline(never)]
 #[small]
 pub fn set_steps<M: Machine>(

@@ -12,8 +12,8 @@
 //!
 //! The EEPROM is a ring of records. Each record holds the value of one item ([`record`]), and the newest record of an
 //! item is the valid one. A new record goes into a slot whose content is no longer needed, and becomes valid with its
-//! last byte. So at any power failure an item has either its old or its new value. Writing goes round the ring, so
-//! that all cells wear alike. Records that are still valid are copied to another slot before their own slot is overwritten.
+//! last byte. So at any power failure an item has either its old or its new value. Writing goes round the ring, so that
+//! all cells wear alike. Records that are still valid are copied to another slot before their own slot is overwritten.
 //!
 //! Behind the log is a program of the user ([`program`]).
 //!

@@ -92,7 +92,8 @@ enum Command {
     Flash(firmware::FlashArgs),
     /// Save the settings of a machine to a file, or load them
     Settings(settings::SettingsArgs),
-    /// Write the files of a release to target/dist: a .hex for each board, the settings as a schema, licences, checksums
+    /// Write the files of a release to target/dist: a .hex for each board, the settings as a schema, licences,
+    /// checksums
     Dist,
     /// Write the example jobs anew
     Jobs,

@@ -22,7 +22,8 @@ pub struct RunArgs {
     /// The board to simulate; mega2560-grbl, or mega2560-lathe with `--machine lathe`
     #[arg(long, value_enum)]
     board: Option<Board>,
-    /// The machine whose settings are the defaults. The lathe has a spindle with an encoder, and its threads are checked
+    /// The machine whose settings are the defaults. The lathe has a spindle with an encoder, and its threads are
+    /// checked
     #[arg(long, value_enum, default_value_t)]
     machine: Machine,
     /// A setting to send before the job, as a sender would: '{"xvm":800}'; @FILE sends each line of a file

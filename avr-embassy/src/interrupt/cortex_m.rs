@@ -45,8 +45,8 @@ pub fn woken() {
     pend();
 }
 
-/// Starts the interrupt executor: `init` spawns its first tasks, and the result spawns more, from any task. `None` if it
-/// has been started before.
+/// Starts the interrupt executor: `init` spawns its first tasks, and the result spawns more, from any task. `None` if
+/// it has been started before.
 ///
 /// The tasks are polled as soon as interrupts are on. The program sets the priority of the interrupt, below that of
 /// all handlers.

@@ -67,8 +67,8 @@ impl<T: Copy> ConsumerView<T> {
         self.ring().tail()
     }
 
-    /// Returns the oldest values, as many as lie side by side; empty only if none waits. The newest value of a full ring
-    /// is not among them, because the producer may replace it.
+    /// Returns the oldest values, as many as lie side by side; empty only if none waits. The newest value of a full
+    /// ring is not among them, because the producer may replace it.
     #[inline(always)]
     pub fn waiting(&self) -> &[T] {
         // Read once: the producer may move it meanwhile.

@@ -317,8 +317,8 @@ fn flow(block: &[u8], machine: &mut impl Machine, out: &mut impl Out) -> Step {
     }
 }
 
-/// M302: S is the temperature from which filament may be moved. S0 or P1 allow any temperature. Without S and P the limit is
-/// reported.
+/// M302: S is the temperature from which filament may be moved. S0 or P1 allow any temperature. Without S and P the
+/// limit is reported.
 #[inline(never)]
 #[small]
 fn extrude_cold(block: &[u8], machine: &mut impl Machine, out: &mut impl Out) -> Step {

@@ -7,7 +7,8 @@ use kerf_sim::{Host, LINES_IN_FLIGHT, Machine};
 
 use crate::common::{booted, firmware, set};
 
-/// The longest wait for an answer, ms of AVR time, with arcs of 1 mm at this jerk limit (millions of mm/min^3) and feed.
+/// The longest wait for an answer, ms of AVR time, with arcs of 1 mm at this jerk limit (millions of mm/min^3) and
+/// feed.
 fn longest(jerk: u32, feed: u32) -> f64 {
     let (mut machine, mut host) = booted(&MEGA2560_GRBL);
     for axis in ["x", "y"] {

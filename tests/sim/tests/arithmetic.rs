@@ -185,7 +185,8 @@ fn edges() -> Vec<u32> {
     all
 }
 
-/// Floats with exponents and mantissas at their edges, of both signs: zeros, subnormal numbers, infinities and NaN among them.
+/// Floats with exponents and mantissas at their edges, of both signs: zeros, subnormal numbers, infinities and NaN
+/// among them.
 fn floats() -> Vec<u32> {
     const EXPONENTS: [u32; 15] =
         [0, 1, 2, 23, 64, 125, 126, 127, 128, 150, 157, 158, 252, 254, 255];
