@@ -1,8 +1,8 @@
-//! What a status means, and what to do about it, for people: `docs/codes.md`, and what `check` says of a line.
+//! The cause and the remedy of each status, for people: `docs/codes.md`, and the output of `kerf check`.
 
 use crate::status::Status::{self, *};
 
-/// For each status why it comes and what to do. `Status::Again` is missing: it never leaves the machine.
+/// For each status its cause and its remedy. `Status::Again` is missing, because it is never sent.
 const ADVICE: &[(Status, &str, &str)] = &[
     (Ok, "The line has run or is queued.", "Nothing."),
     (
@@ -376,12 +376,12 @@ const ADVICE: &[(Status, &str, &str)] = &[
     (ProbeTooShort, "The probing move is shorter than 0.254 mm.", "Make it longer."),
 ];
 
-/// Why a status comes, and what to do about it.
+/// Returns the cause and the remedy of a status.
 pub fn advice(status: Status) -> Option<(&'static str, &'static str)> {
     ADVICE.iter().find(|(of, ..)| *of == status).map(|(_, cause, cure)| (*cause, *cure))
 }
 
-/// All statuses that a sender may get to see, in their order.
+/// Returns all statuses that a sender may receive, in their order.
 pub fn statuses() -> impl Iterator<Item = Status> {
     ADVICE.iter().map(|(status, ..)| *status)
 }

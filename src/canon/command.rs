@@ -1,4 +1,4 @@
-//! The canonical commands, and how they are written.
+//! The canonical commands, and their text form.
 
 use core::fmt::{Display, Formatter, Result};
 use std::string::String;
@@ -9,50 +9,50 @@ use crate::gcode::modal::{MotionMode, Turn};
 use crate::gcode::overrides::{Override, Overrides};
 use crate::units::{AXES, AXIS_LETTERS, Length, PerAxis};
 
-/// A canonical command. Places are machine coordinates.
+/// A canonical command. Positions are machine coordinates.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Canon {
-    /// Straight to a place.
+    /// A straight traverse to a position.
     Traverse(PerAxis<Length>),
-    /// Straight to a place at the feed rate.
+    /// A straight move to a position at the feed rate.
     Feed(PerAxis<Length>),
-    /// Along a circle to a place. A full circle has no extra turn.
+    /// An arc to a position. A full circle has no extra turn.
     Arc(PerAxis<Length>, Arc, Turns),
-    /// Straight to a place, unless the probe stops it; by one of the modes of probing.
+    /// A straight move to a position unless the probe stops it, in one of the probing modes.
     Probe(PerAxis<Length>, MotionMode),
-    /// How fast the next moves feed.
+    /// The feed rate of the moves that follow.
     Rate(Feed),
-    /// Whether the next moves end at rest.
+    /// Whether the moves that follow end at standstill.
     ExactStop(bool),
-    /// A straight move in step with the spindle, with the way of the axis that moves farthest in a turn.
+    /// A straight move in step with the spindle, and the distance in a turn of the axis that moves farthest.
     Thread(PerAxis<Length>, Length),
-    /// Stand still, for milliseconds.
+    /// Stands still for this many milliseconds.
     Dwell(u32),
-    /// How the spindle turns.
+    /// The direction and speed of the spindle.
     Spindle(Spindle),
-    /// Mist goes on or off.
+    /// Switches mist on or off.
     Mist(bool),
-    /// Flood goes on or off.
+    /// Switches flood on or off.
     Flood(bool),
-    /// A tool is in the spindle.
+    /// The tool that is in the spindle.
     Tool(u8),
-    /// What rates and speeds are multiplied by.
+    /// The factors of rates and speeds.
     Overrides(Overrides),
-    /// The place is called this.
+    /// Sets the coordinates of the present position.
     SetPosition(PerAxis<Length>),
-    /// Axes go to their switches, as bits; whether that sets their position.
+    /// Homes axes (as bits); the flag says whether that sets their position.
     Home(u8, bool),
-    /// For who looks at the machine.
+    /// A message for the operator.
     Message(String),
-    /// Heaters and the fan are to be so.
+    /// Sets heaters or the fan.
     Heat(Heat),
-    /// The program stops.
+    /// Program stop.
     Stop,
-    /// The program ends.
+    /// Program end.
     End,
 }
 
-/// Turns begun, below zero if clockwise.
+/// The number of turns begun, negative if clockwise.
 pub type Turns = i32;
 
 impl Display for Canon {
@@ -138,7 +138,7 @@ fn switched(on: bool) -> &'static str {
     if on { "ON" } else { "OFF" }
 }
 
-/// Coordinates with commas between.
+/// Coordinates, separated by commas.
 struct Place<'a>(&'a PerAxis<Length>);
 
 impl Display for Place<'_> {

@@ -1,4 +1,4 @@
-//! A program from its first line to its last, or to one that is refused.
+//! Reads a program from its first line to its last, or to the first line that is refused.
 
 use core::fmt::{Display, Formatter};
 use std::string::String;
@@ -11,12 +11,12 @@ use crate::gcode::setup::Setup;
 use crate::protocol::tinyg::{number, status_text};
 use crate::status::Status;
 
-/// The text of a status, as the machine tells it.
+/// Returns the text of a status, as the machine reports it.
 pub fn text(status: Status) -> String {
     status_text(status).into_iter().flat_map(|text| text.bytes()).map(char::from).collect()
 }
 
-/// The status that the machine tells as this number.
+/// Returns the status with this number; `None` if there is none.
 pub fn by_number(code: u8) -> Option<Status> {
     statuses().find(|status| number(*status) == code)
 }
@@ -26,14 +26,14 @@ pub fn by_number(code: u8) -> Option<Status> {
 pub struct Refusal {
     /// The number of the line in the program, from 1.
     pub number: usize,
-    /// Why.
+    /// The reason.
     pub status: Status,
     /// The line.
     pub text: String,
 }
 
 impl Refusal {
-    /// What `status` says of a line.
+    /// Returns the refusal of a line with `status`.
     pub fn new(number: usize, status: Status, line: &[u8]) -> Self {
         Self { number, status, text: String::from_utf8_lossy(line).trim_end().into() }
     }
@@ -49,7 +49,7 @@ impl Display for Refusal {
 
 impl core::error::Error for Refusal {}
 
-/// The commands of a whole program.
+/// Returns the commands of a whole program, or the first line that is refused.
 pub fn commands(program: &str, setup: impl Setup) -> Result<Vec<Canon>, Refusal> {
     let mut reader = Reader::new(setup);
     let mut commands = Vec::new();

@@ -1,4 +1,4 @@
-//! From lines to canonical commands.
+//! Converts lines to canonical commands.
 
 use std::collections::VecDeque;
 use std::string::String;
@@ -13,18 +13,18 @@ use crate::gcode::steps::{Step, Steps};
 use crate::status::Status;
 use crate::units::{AXES, Length, PerAxis};
 
-/// Reads a program line by line; as an iterator it gives the commands of the line that was read last.
+/// Reads a program line by line. As an iterator it returns the commands of the line that was read last.
 pub struct Reader<S> {
     setup: S,
     interpreter: Interpreter,
     commands: Commands,
     steps: Steps,
-    /// Where the machine is.
+    /// The present position.
     place: PerAxis<Length>,
-    /// What the moves before had.
+    /// The feed and the mode of the moves so far.
     rate: Option<Feed>,
     exact_stop: bool,
-    /// What runs.
+    /// The direction of the spindle, the coolants and the overrides in force.
     turn: Turn,
     coolant: u8,
     overrides: Overrides,
@@ -33,7 +33,7 @@ pub struct Reader<S> {
 }
 
 impl<S: Setup> Reader<S> {
-    /// At start-up.
+    /// Returns a reader at start-up.
     pub fn new(setup: S) -> Self {
         let mut interpreter = Interpreter::new();
         interpreter.start(&setup);
@@ -52,12 +52,12 @@ impl<S: Setup> Reader<S> {
         }
     }
 
-    /// The interpreter, as the last line has left it.
+    /// Returns the interpreter, in its state after the last line.
     pub fn interpreter(&self) -> &Interpreter {
         &self.interpreter
     }
 
-    /// Reads a line without its terminator. The commands of the line before are to have been taken.
+    /// Reads a line without its terminator. All commands of the line before must have been taken.
     pub fn read(&mut self, line: &[u8]) -> Result<(), Status> {
         self.steps = Steps::default();
         self.ready.clear();
@@ -81,7 +81,7 @@ impl<S: Setup> Reader<S> {
             Step::Thread => self.pass(),
             Step::AwaitSpindle => {}
             Step::Arc | Step::Probe | Step::Home | Step::Jog | Step::Check => self.motion(),
-            // No line of a file asks for it.
+            // No line of a file causes this step.
             #[cfg(feature = "bed-plane")]
             Step::FollowBed(_) => {}
             Step::Heat(heat) => self.ready.push_back(Canon::Heat(heat)),
@@ -108,7 +108,7 @@ impl<S: Setup> Reader<S> {
         }
     }
 
-    /// The lines of a pass.
+    /// Adds the lines of a pass.
     fn pass(&mut self) {
         let (start, mut line) = (self.place, 0);
         while let Some((target, lead)) = self.steps.pass(&self.commands.motion, &self.place, line) {
@@ -120,7 +120,7 @@ impl<S: Setup> Reader<S> {
         }
     }
 
-    /// A move, and before it what it is to be like.
+    /// Adds a move, and before it the mode and the rate if they have changed.
     fn go(&mut self, command: Canon, target: PerAxis<Length>, feed: Option<Feed>) {
         if self.exact_stop != self.commands.exact_stop {
             self.exact_stop = self.commands.exact_stop;
@@ -138,7 +138,7 @@ impl<S: Setup> Reader<S> {
 
     fn spindle(&mut self, spindle: Spindle) {
         self.turn = spindle.turn;
-        // Off is off at any speed.
+        // The speed of a stopped spindle is left out.
         let spindle = if spindle.turn == Turn::Off { Spindle::default() } else { spindle };
         self.ready.push_back(Canon::Spindle(spindle));
     }
@@ -162,7 +162,7 @@ impl<S: Setup> Reader<S> {
         self.ready.push_back(Canon::Overrides(self.overrides));
     }
 
-    /// The machine is left with everything off.
+    /// Adds the end of a program: everything is switched off.
     fn end(&mut self) {
         if self.turn != Turn::Off {
             self.spindle(Spindle::default());
@@ -176,7 +176,8 @@ impl<S: Setup> Reader<S> {
     }
 }
 
-/// A turn that is begun counts: an arc has one and those beyond it, as has a full circle.
+/// Returns the number of turns, of which the last may be incomplete: an arc without extra turns has one, and so has a
+/// full circle.
 fn turns(arc: &Arc) -> Turns {
     let turns = 1 + Turns::from(arc.extra_turns);
     if arc.clockwise { -turns } else { turns }

@@ -1,8 +1,8 @@
-//! The card as blocks of 512 bytes, by SPI (SD Physical Layer, simplified, chapter 7).
+//! The card as a device with blocks of 512 bytes, accessed by SPI (SD Physical Layer, simplified, chapter 7).
 //!
-//! A command waits for its answer for some bytes. A block is asked for (CMD17) and comes when the card has it, 100 ms
-//! later at most: [`Device::read`] waits for that if it [is patient](set_patient), else says [`Fault::Later`] and is to
-//! be asked for the same block again. The card stays selected meanwhile.
+//! The answer to a command comes within some bytes. A block is requested (CMD17) and comes at most 100 ms later.
+//! [`Device::read`] waits for the block if it [is patient](set_patient). Otherwise it returns [`Fault::Later`], and has
+//! to be called again for this block. The card stays selected meanwhile.
 
 use core::cell::Cell;
 use core::fmt;
@@ -12,12 +12,12 @@ use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
 use crate::hal::byte::SharedByte;
 use crate::hal::{card, time::millis};
 
-/// What is wrong.
+/// Why a block is not available.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Fault {
-    /// Nothing: the block is on its way.
+    /// No fault: the block has been requested and has not come yet.
     Later,
-    /// The card does not answer, or refuses.
+    /// The card does not answer, or refuses the command.
     Failed,
 }
 
@@ -29,38 +29,39 @@ impl fmt::Display for Fault {
 
 impl core::error::Error for Fault {}
 
-/// How long a card may take for a block, and until it is ready, ms.
+/// The longest time until a requested block comes, and until the card is ready after power-up, ms.
 const BLOCK_MS: u32 = 100;
 const READY_MS: u32 = 1_000;
-/// How long it may write, ms.
+/// The longest time of a write, ms.
 const WRITE_MS: u32 = 250;
-/// Bytes in which an answer comes, and looks for a block at once.
+/// The number of bytes within which an answer comes, and the number of bytes that are checked for a block at once.
 const ANSWER: u8 = 10;
 const LOOKS: u8 = 8;
-/// A block begins.
+/// The byte that begins a block.
 const START: u8 = 0xFE;
-/// Answers.
+/// Bits of an answer.
 const IDLE: u8 = 1;
 const ILLEGAL: u8 = 4;
-/// Tries with CMD0.
+/// The number of attempts with CMD0.
 const TRIES: u8 = 10;
 
-/// Whether a block is not waited for. Beside the card, for `embedded-sdmmc` forgets its block when it lends the card.
+/// Whether reads do not wait for a block. Not part of the device, because `embedded-sdmmc` forgets its cached block
+/// when it lends the device.
 static HASTE: SharedByte = SharedByte::new(0);
 
-/// Whether blocks are waited for from now on. Thread mode.
+/// Sets whether reads wait for blocks from now on. Thread mode.
 pub fn set_patient(patient: bool) {
     HASTE.set((!patient).into());
 }
 
-/// How far the card is.
+/// The state of the card.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Stage {
-    /// Nothing has been said to it.
+    /// No command has been sent to it.
     Fresh,
-    /// It has been told to get ready, at that time, ms; whether it knows high capacity.
+    /// It has been asked at this time (ms) to initialize; the flag says whether it supports high capacity.
     Wakes(u32, bool),
-    /// It is ready.
+    /// The card is ready.
     Ready,
 }
 
@@ -68,9 +69,9 @@ enum Stage {
 #[derive(Debug)]
 pub struct Device {
     stage: Stage,
-    /// Blocks are counted, not bytes.
+    /// Whether addresses count blocks, not bytes.
     is_high: bool,
-    /// The block that is on its way, and since when.
+    /// The block that has been requested, and the time of the request, ms.
     awaited: Cell<Option<(u32, u32)>>,
 }
 
@@ -80,7 +81,7 @@ impl Device {
         Self { stage: Stage::Fresh, is_high: false, awaited: Cell::new(None) }
     }
 
-    /// A try to get the card ready. Whether it is.
+    /// Makes one attempt to initialize the card. Returns whether it is ready.
     pub fn begin(&mut self) -> Result<bool, Fault> {
         let done = match self.stage {
             Stage::Fresh | Stage::Ready => self.reset(),
@@ -99,7 +100,7 @@ impl Device {
         self.awaited.set(None);
         card::release();
         card::set_fast(false);
-        // 74 clocks with nothing selected.
+        // 80 clock cycles while no device is selected; the card needs 74.
         (0..10).for_each(|_| _ = card::exchange(0xFF));
         if !(0..TRIES).any(|_| command(0, 0) == IDLE) {
             return Err(Fault::Failed);
@@ -133,16 +134,16 @@ impl Device {
         if self.is_high { block } else { block << 9 }
     }
 
-    /// Asks for a block, unless it is on its way already. Since when it is, ms.
+    /// Requests a block, unless it has been requested already. Returns the time of the request, ms.
     fn ask(&self, block: u32) -> Result<u32, Fault> {
         match self.awaited.get() {
             Some((awaited, since)) if awaited == block => return Ok(since),
-            // Nobody wants that any more: the card begins anew.
+            // Another block was requested before and is not wanted any more. The card has to be initialized again.
             Some(_) => return Err(Fault::Failed),
             None => {}
         }
         if HASTE.get() != 0 && card::is_wanted() {
-            // A sensor on the same lines comes first.
+            // A sensor on the SPI has priority.
             return Err(Fault::Later);
         }
         if self.stage != Stage::Ready || command(17, self.address(block)) != 0 {
@@ -165,7 +166,7 @@ impl Device {
             }
         }
         card::read(&mut place.contents);
-        // Its checksum.
+        // The checksum, which is not checked.
         card::exchange(0xFF);
         card::exchange(0xFF);
         Ok(())
@@ -192,7 +193,7 @@ impl Device {
         Ok(())
     }
 
-    /// After a command: the card is let go, and one that failed has to begin anew.
+    /// Ends a command: deselects the card, unless a block is still to come.
     fn end(&self, done: Result<(), Fault>) -> Result<(), Fault> {
         if done != Err(Fault::Later) {
             self.awaited.set(None);
@@ -207,7 +208,7 @@ impl BlockDevice for Device {
 
     #[inline(never)]
     fn read(&self, blocks: &mut [Block], first: BlockIdx) -> Result<(), Fault> {
-        // The cache has one.
+        // The cache of `embedded-sdmmc` has one block.
         let Some(place) = blocks.first_mut() else { return Ok(()) };
         self.end(self.fetch(first.0, place))
     }
@@ -223,7 +224,7 @@ impl BlockDevice for Device {
     }
 }
 
-/// Sends a command; the first byte of its answer, 0xFF if none comes.
+/// Sends a command. Returns the first byte of its answer, 0xFF if none comes.
 #[inline(never)]
 #[small]
 fn command(number: u8, argument: u32) -> u8 {
@@ -231,7 +232,7 @@ fn command(number: u8, argument: u32) -> u8 {
     card::exchange(0xFF);
     card::exchange(0x40 | number);
     argument.to_be_bytes().iter().for_each(|byte| _ = card::exchange(*byte));
-    // A checksum counts only until the card knows that SPI is spoken.
+    // The checksum counts only until the card is in SPI mode.
     card::exchange(match number {
         0 => 0x95,
         8 => 0x87,
@@ -240,7 +241,7 @@ fn command(number: u8, argument: u32) -> u8 {
     (0..ANSWER).map(|_| card::exchange(0xFF)).find(|byte| *byte & 0x80 == 0).unwrap_or(0xFF)
 }
 
-/// The rest of an answer.
+/// Reads the other four bytes of an answer.
 #[small]
 fn word() -> u32 {
     (0..4).fold(0, |word, _| word << 8 | u32::from(card::exchange(0xFF)))

@@ -1,4 +1,4 @@
-//! The files, and the lines of the one that is printed.
+//! The files of a card, and the lines of the file that is printed.
 
 use embedded_sdmmc::{
     Mode, RawDirectory, RawFile, RawVolume, TimeSource, Timestamp, VolumeIdx, VolumeManager,
@@ -9,13 +9,13 @@ use super::device::{Device, Fault, set_patient};
 use super::{Entry, NAME_MAX};
 use crate::status::Status;
 
-/// The longest line, without comment.
+/// The longest line, without its comment.
 pub const LINE_MAX: usize = 80;
 
 type Manager = VolumeManager<Device, NoClock, 1, 1, 1>;
 type Error = embedded_sdmmc::Error<Fault>;
 
-/// A board has no clock: files keep their times.
+/// The board has no clock, so files keep their times.
 #[derive(Debug)]
 struct NoClock;
 
@@ -32,40 +32,41 @@ impl TimeSource for NoClock {
     }
 }
 
-/// What reading a line has come to.
+/// The result of reading a part of a line.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Line {
-    /// The line is there. It may be empty.
+    /// The line is complete. It may be empty.
     Whole,
-    /// It goes on behind what has been read.
+    /// The line continues after the part that has been read.
     More,
-    /// The rest of it is not there yet.
+    /// The block with the rest of the line has not come yet.
     Later,
-    /// The file is at its end.
+    /// The end of the file.
     End,
-    /// The file cannot be read on.
+    /// The file cannot be read.
     Failed,
-    /// The line is longer than [`LINE_MAX`]; it has been passed over.
+    /// The line is longer than [`LINE_MAX`] and has been skipped.
     Long,
 }
 
-/// See the module's text.
+/// The card and its open file: see the [parent module](super).
 pub struct Card {
     manager: Manager,
     root: Option<(RawVolume, RawDirectory)>,
     file: Option<RawFile>,
-    /// Lines are taken from the file.
+    /// Whether lines are taken from the file.
     prints: bool,
-    /// The rest of the line is a comment, or too long.
+    /// Whether the rest of the line is skipped, because it is a comment or too long.
     skips: bool,
     is_long: bool,
-    /// Another place in a file is read from: what has been read of a line counts for nothing.
+    /// Whether reading continues at another place in the file, so that the part of a line that has been read is
+    /// dropped.
     jumps: bool,
 }
 
 #[small]
 impl Card {
-    /// Nothing is known of a card.
+    /// Returns a card that has not been initialized.
     pub fn new() -> Self {
         Self {
             manager: Manager::new_with_limits(Device::new(), NoClock, 1),
@@ -78,7 +79,7 @@ impl Card {
         }
     }
 
-    /// Begins with the card, M21. [`Status::Again`]: it is not ready yet.
+    /// Initializes the card, M21. [`Status::Again`]: it is not ready yet.
     #[inline(never)]
     pub fn begin(&mut self) -> Status {
         self.release();
@@ -95,7 +96,7 @@ impl Card {
         status(opened)
     }
 
-    /// Forgets the card, M22.
+    /// Releases the card, M22.
     #[inline(never)]
     pub fn release(&mut self) {
         self.close();
@@ -105,7 +106,7 @@ impl Card {
         }
     }
 
-    /// Closes the file that is chosen, if one is: the print is at its end.
+    /// Closes the selected file, if there is one: the print has ended.
     pub fn close(&mut self) {
         (self.prints, self.jumps) = (false, true);
         if let Some(file) = self.file.take() {
@@ -113,7 +114,7 @@ impl Card {
         }
     }
 
-    /// Chooses a file, M23.
+    /// Selects a file, M23.
     #[inline(never)]
     pub fn open(&mut self, name: &[u8]) -> Status {
         self.close();
@@ -129,7 +130,7 @@ impl Card {
         }
     }
 
-    /// Deletes a file, M30, unless it is the one that is chosen.
+    /// Deletes a file, M30, unless it is selected.
     #[inline(never)]
     pub fn delete(&mut self, name: &[u8]) -> Status {
         let Some((_, root)) = self.root else { return Status::CardError };
@@ -138,7 +139,7 @@ impl Card {
         status(done)
     }
 
-    /// Lines are taken from the file from now on, M24; or no longer, M25.
+    /// Sets whether lines are taken from the file: M24, M25.
     pub fn print(&mut self, prints: bool) -> Status {
         if prints && self.file.is_none() {
             return Status::CardError;
@@ -147,12 +148,12 @@ impl Card {
         Status::Ok
     }
 
-    /// Whether lines are taken.
+    /// Whether lines are taken from the file.
     pub fn prints(&self) -> bool {
         self.prints
     }
 
-    /// Goes to a byte of the file, M26.
+    /// Moves to a byte of the file, M26.
     pub fn seek(&mut self, at: u32) -> Status {
         let Some(file) = self.file else { return Status::CardError };
         (self.skips, self.is_long, self.jumps) = (false, false, true);
@@ -160,13 +161,13 @@ impl Card {
         status(done)
     }
 
-    /// The next byte of the file, and how many it has.
+    /// Returns the position of the next byte of the file, and the length of the file. `None` without a file.
     pub fn progress(&self) -> Option<(u32, u32)> {
         let file = self.file?;
         Some((self.manager.file_offset(file).ok()?, self.manager.file_length(file).ok()?))
     }
 
-    /// The file of that number in the root. `Err`: the card cannot be read.
+    /// Returns the file with this number in the root directory. `Err`: the card cannot be read.
     #[inline(never)]
     pub fn entry(&mut self, number: u8) -> Result<Option<Entry>, Status> {
         let Some((_, root)) = self.root else { return Err(Status::CardError) };
@@ -186,7 +187,7 @@ impl Card {
         done.map(|()| found).map_err(|_| Status::CardError)
     }
 
-    /// Reads on in the line that is being printed. Cost: 3,000 cycles, with a block 25,000 more.
+    /// Reads the next part of the line that is being printed. Cost: 3,000 cycles, with a new block 25,000 more.
     #[inline(never)]
     pub fn line(&mut self, line: &mut Vec<u8, LINE_MAX>) -> Line {
         let Some(file) = self.file else { return Line::Failed };
@@ -245,7 +246,7 @@ impl Default for Card {
     }
 }
 
-/// Bytes that are read at once.
+/// The most bytes that are read at once.
 const PIECE: usize = 40;
 const BLOCK: u32 = 512;
 
@@ -266,7 +267,8 @@ fn named(name: &embedded_sdmmc::ShortFileName, size: u32) -> Entry {
     entry
 }
 
-/// A short name as text. Not by the standard library, whose table of UTF-8 would be in RAM.
+/// Returns a short name as text. The function of the standard library is not used, because its table of UTF-8 would be
+/// in RAM.
 #[small]
 fn text(name: &[u8]) -> Option<String<NAME_MAX>> {
     let mut text = String::new();

@@ -1,12 +1,12 @@
-//! An SD card: its files, and the one that is being printed.
+//! An SD card: its files, and the file that is being printed.
 //!
-//! Owned by thread mode; the parser task alone calls it. FAT16 and FAT32 are `embedded-sdmmc`'s, which keeps one block
-//! of 512 bytes; blocks come from the `device`. Files are those of the root, by their short names.
+//! Owned by thread mode; only the parser task calls it. `embedded-sdmmc` reads FAT16 and FAT32 and keeps one block of
+//! 512 bytes; `device` reads the blocks. Only files in the root directory are visible, by their short names.
 //!
-//! A line of the file that is printed is read where it lies, up to its end or to the end of a block. If a block has to
-//! come first, the card is asked for it, and `Line::Later` says so: nobody waits for the card then, but for the 1.5 ms
-//! in which the block is handed over. All else, which an idle machine is asked for, waits for its blocks, for 100 ms
-//! each at most. What goes wrong is [`CardError`](crate::status::Status::CardError), and ends a print.
+//! A line of the printed file is read in place, up to its end or to the end of a block. If another block is needed
+//! first, it is requested from the card, and `Line::Later` says so. So no task waits for the card, except for the 1.5
+//! ms in which the block is transferred. All other operations, which run while the machine is idle, wait for their
+//! blocks, at most 100 ms for each. A failure is [`CardError`](crate::status::Status::CardError), and ends a print.
 
 #[cfg(feature = "sd")]
 mod device;
@@ -16,31 +16,31 @@ mod files;
 #[cfg(feature = "sd")]
 pub use files::{Card, LINE_MAX, Line};
 
-/// Bytes of a short name, with its point.
+/// The length of a short name in bytes, with its point.
 pub const NAME_MAX: usize = 12;
 
-/// A file of the list.
+/// A file in the list of files.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Entry {
-    /// Its name; what is behind is 0.
+    /// The name, padded with zeros.
     pub name: [u8; NAME_MAX],
-    /// Bytes.
+    /// The length in bytes.
     pub size: u32,
 }
 
-/// What a card is asked for.
+/// An operation on the card.
 #[derive(Clone, Copy, Debug)]
 pub enum Op<'a> {
-    /// To be got ready, M21. [`Again`](crate::status::Status::Again): it is not yet.
+    /// Initializes the card, M21. [`Again`](crate::status::Status::Again): it is not ready yet.
     Begin,
-    /// To be forgotten, M22.
+    /// Releases the card, M22.
     Release,
-    /// To choose a file, M23.
+    /// Selects a file, M23.
     Open(&'a [u8]),
-    /// To print it, M24; or no longer, M25.
+    /// Starts to print the file, M24, or pauses, M25.
     Print(bool),
-    /// To go to a byte of it, M26.
+    /// Moves to a byte of the file, M26.
     Seek(u32),
-    /// To delete a file, M30.
+    /// Deletes a file, M30.
     Delete(&'a [u8]),
 }

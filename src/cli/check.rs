@@ -1,5 +1,5 @@
-//! `kerf check`: a dry run of a job. The firmware itself carries it out on the host, in mocked time: what it refuses,
-//! how far the axes go, and how long it takes are what the machine would do.
+//! `kerf check`: a dry run of a job. The firmware itself runs the job on the host, in mocked time. So refused lines,
+//! the travel of the axes and the time are those of the machine.
 
 use std::collections::VecDeque;
 use std::fmt::{self, Display, Formatter};
@@ -8,33 +8,34 @@ use kerf::canon::{advice, by_number, text as text_of};
 use kerf::config::machines;
 use kerf::hal::imp::Machine;
 
-/// Lines that a sender has on their way.
+/// The number of lines that a sender has in flight.
 const IN_FLIGHT: usize = 4;
-/// Longest wait for an answer, and for rest at the end: more than any move takes, ms.
+/// Longest wait for an answer, and for standstill at the end, ms: more than any move takes.
 const LONGEST_MS: u64 = 24 * 3_600_000;
-/// Time between two questions whether the machine rests, ms.
+/// Time between two questions whether the machine is at rest, ms.
 const POLL_MS: u64 = 20;
 const MOTORS: usize = 4;
 const AXES: [&str; 3] = ["x", "y", "z"];
-/// Status of a line that was passed over.
+/// Status of a line that was skipped.
 const PASSED_OVER: u8 = 3;
 
-/// A job is timed for this many bits a second.
+/// The rate of the serial line for which the job is timed, bits a second.
 const BAUD: u32 = 115_200;
-/// More lines than this in some second, and the board may be the limit: its CPU is not reckoned with here. The queue
-/// alone takes 64 when it has run empty; 400 a second the board follows within 1 %.
+/// If more lines than this are answered in some second, the board may be slower than the dry run, which does not
+/// simulate the board's CPU. An empty queue takes 64 lines at once. At 400 lines a second the board's time agrees
+/// within 1 %.
 const MOST_LINES: usize = 64 + 400;
-/// How much longer a job may take then, percent.
+/// How much longer the job may take in that case, percent.
 const SLOWER: u32 = 8;
 
-/// Statuses of exceptions after which a job goes on: a stop, a tool without a length.
+/// Statuses of exceptions after which a job continues: a stop, a tool without a length.
 const NOTES: [u8; 2] = [38, 180];
 
-/// What is asked.
+/// The input of a dry run.
 pub struct Question<'a> {
-    /// The machine's profile.
+    /// The name of the machine's profile.
     pub machine: &'a str,
-    /// Settings sent before the job.
+    /// Settings that are sent before the job.
     pub settings: &'a [String],
     /// The work zero in machine coordinates, if it is known.
     pub zero: Option<[f64; 3]>,
@@ -47,7 +48,7 @@ pub struct Refused {
     status: u8,
 }
 
-/// How far an axis goes, in mm from the work zero, and how far it may.
+/// The travel of an axis in the job, in mm from the work zero, and the travel that is allowed.
 pub struct Extent {
     axis: &'static str,
     from: f64,
@@ -57,27 +58,27 @@ pub struct Extent {
     zero: Option<f64>,
 }
 
-/// What has come of a job.
+/// The result of a dry run.
 pub struct Answer {
     lines: usize,
     refused: Vec<Refused>,
-    /// What could not be tried, with the line that was answered last.
+    /// Parts of the job that could not be tried, each with the number of the last answered line.
     notes: Vec<(usize, String)>,
     extents: Vec<Extent>,
     ms: u64,
-    /// The most lines that were answered in a second.
+    /// The most lines that were answered in one second.
     busiest: usize,
 }
 
-/// A motor, as far as it matters here.
+/// The properties of a motor that are needed here.
 #[derive(Clone, Copy)]
 struct Motor {
     axis: usize,
-    /// Millimetres of a step.
+    /// The length of a step, mm.
     step: f64,
 }
 
-/// The machine, and what has been seen of it.
+/// The machine, and the recorded data about its run.
 struct Run {
     machine: Machine,
     heard: String,
@@ -93,7 +94,7 @@ impl Run {
         Some(Self { machine: Machine::boot(BAUD)?, heard, ms, lowest: none, highest: none })
     }
 
-    /// A millisecond passes.
+    /// Lets a millisecond pass.
     fn pass(&mut self) {
         let (machine, lowest, highest) = (&self.machine, &mut self.lowest, &mut self.highest);
         machine.run_until(1, || {
@@ -119,7 +120,7 @@ impl Run {
         Some(line)
     }
 
-    /// The answer to a line.
+    /// Sends a line and returns its answer.
     fn ask(&mut self, line: &str) -> Result<String, String> {
         self.send(line);
         for _ in 0..LONGEST_MS {
@@ -134,7 +135,7 @@ impl Run {
     }
 }
 
-/// The status of an answer; `None` of what answers no line.
+/// Returns the status of an answer; `None` if the line answers nothing.
 fn status(heard: &str) -> Option<u8> {
     let (body, footer) = heard.split_once(",\"f\":[1,")?;
     let is_answer = body.starts_with("{\"r\":") && !body.contains("SYSTEM READY");
@@ -143,33 +144,33 @@ fn status(heard: &str) -> Option<u8> {
     (is_answer && !is_unasked).then_some(status)
 }
 
-/// The status of an exception.
+/// Returns the status of an exception.
 fn exception(heard: &str) -> Option<u8> {
     let (_, rest) = heard.strip_prefix("{\"er\":")?.split_once("\"st\":")?;
     rest.split([',', '}']).next()?.parse().ok()
 }
 
-/// A number of an answer.
+/// Returns the number behind a name in an answer.
 fn value(heard: &str, name: &str) -> Result<f64, String> {
     let after = heard.split_once(&format!("\"{name}\":")).map(|(_, rest)| rest);
     let digits = after.and_then(|rest| rest.split([',', '}']).next());
     digits.and_then(|d| d.parse().ok()).ok_or_else(|| format!("no {name} in {heard}"))
 }
 
-/// Whether a line homes: there are no switches here.
+/// Whether a line homes. The dry run has no switches.
 fn homes(line: &str) -> bool {
     let line: String = line.chars().filter(|c| !c.is_whitespace()).collect();
     let line = line.to_ascii_uppercase();
     line.contains("G28.2") || line.contains("G28.4")
 }
 
-/// The lines that a sender sends: no blank ones, and no `%`.
+/// Returns the lines that a sender sends, each with its number: blank lines and `%` are left out.
 fn sent(text: &str) -> impl Iterator<Item = (usize, &str)> {
     let lines = (1..).zip(text.lines().map(str::trim));
     lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('%'))
 }
 
-/// Carries a job out. An error says why it could not begin.
+/// Runs a job. The error says why it could not begin.
 pub fn check(text: &str, question: &Question) -> Result<Answer, String> {
     let machine = machines::ALL.iter().position(|m| m.name == question.machine);
     let known = || machines::ALL.map(|machine| machine.name).join(", ");
@@ -180,13 +181,13 @@ pub fn check(text: &str, question: &Question) -> Result<Answer, String> {
     for line in question.settings {
         run.ask(line)?;
     }
-    // Nobody is there who could go on after a stop, and reports would take the line.
+    // Stops do not wait, because there is no operator. Reports are off, because they would take time on the line.
     run.ask("{psw:0,sl:0,sv:0,qv:0,jv:3,ej:1}")?;
     let mut motors = Vec::new();
     for m in 1..=MOTORS {
         let heard = run.ask(&format!("{{{m}:n}}"))?;
         let of = |name| value(&heard, name);
-        // Steps are counted before the pins, so that the motor's direction is of no account.
+        // Steps are counted before pins are inverted, so the motor's direction does not matter.
         let step = of("tr")? * of("sa")? / 360.0 / of("mi")?;
         motors.push(Motor { axis: of("ma")? as usize, step });
     }
@@ -194,7 +195,7 @@ pub fn check(text: &str, question: &Question) -> Result<Answer, String> {
     for axis in AXES {
         let heard = run.ask(&format!("{{{axis}:n}}"))?;
         let of = |name| value(&heard, name);
-        // Where homing leaves it.
+        // The position after homing.
         let homed = if matches!(of("sx")? as u8, 1 | 3) { of("tm")? } else { of("tn")? };
         travels.push((of("tn")?, of("tm")?, homed));
     }
@@ -223,19 +224,19 @@ pub fn check(text: &str, question: &Question) -> Result<Answer, String> {
     Ok(Answer { lines, refused, notes, extents, ms: run.ms - began, busiest })
 }
 
-/// What has become of the lines.
+/// The results of streaming the lines.
 #[derive(Default)]
 struct Streamed {
     lines: usize,
     refused: Vec<Refused>,
     notes: Vec<(usize, String)>,
     busiest: usize,
-    /// When those of the last second were answered, ms.
+    /// The times at which the lines of the last second were answered, ms.
     answered: VecDeque<u64>,
 }
 
 impl Streamed {
-    /// A line has been answered now.
+    /// Takes note that a line has been answered now.
     fn answered_at(&mut self, ms: u64) {
         self.answered.push_back(ms);
         while self.answered.front().is_some_and(|at| at + 1_000 <= ms) {
@@ -245,7 +246,7 @@ impl Streamed {
     }
 }
 
-/// Sends the lines as a sender does that counts them.
+/// Sends the lines as a sender does that counts answers.
 fn stream(run: &mut Run, text: &str) -> Result<Streamed, String> {
     let mut done = Streamed::default();
     let (mut last, mut silent) = (0, 0);
@@ -275,7 +276,7 @@ fn stream(run: &mut Run, text: &str) -> Result<Streamed, String> {
                     done.answered_at(run.ms);
                     let Some(Some((line, text))) = waits.pop_front() else { continue };
                     last = line;
-                    // What an alarm refuses is told by the note about it.
+                    // A note reports the alarm, so the lines that it refuses are not listed.
                     if !matches!(status, 0 | PASSED_OVER | 203) {
                         done.refused.push(Refused { line, text: text.to_string(), status });
                     }
@@ -296,7 +297,7 @@ fn stream(run: &mut Run, text: &str) -> Result<Streamed, String> {
     }
 }
 
-/// The text of a status.
+/// Returns the status with its text.
 fn says(code: u8) -> String {
     format!("status {code} {}", by_number(code).map(text_of).unwrap_or_default())
 }
@@ -304,7 +305,7 @@ fn says(code: u8) -> String {
 impl Extent {
     fn fits(&self) -> bool {
         let (lower, upper) = self.travel;
-        // Ends that are the same are none.
+        // If both ends are equal the axis has no limits.
         let slack = 0.01;
         lower == upper
             || match self.zero {
@@ -315,18 +316,18 @@ impl Extent {
 }
 
 impl Answer {
-    /// How long it takes, in seconds.
+    /// Returns the time that the job takes, s.
     #[allow(dead_code)]
     pub fn seconds(&self) -> f64 {
         self.ms as f64 / 1e3
     }
 
-    /// Whether the board may take longer than the plan.
+    /// Whether the board may take longer than the dry run says.
     pub fn is_rushed(&self) -> bool {
         self.busiest > MOST_LINES
     }
 
-    /// Whether the machine would carry it out.
+    /// Whether the machine would run the whole job.
     pub fn is_good(&self) -> bool {
         self.refused.is_empty() && self.extents.iter().all(Extent::fits)
     }

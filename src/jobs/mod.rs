@@ -1,9 +1,9 @@
-//! Jobs in program memory, started by `{test:n}`: to try a machine out without a sender's file; and, as number
-//! [`STORED`], the program that the user keeps in EEPROM.
+//! Jobs in program memory, started by `{test:n}`, with which a machine can be tried without a sender's file. Number
+//! [`STORED`] is the program that the user has stored in EEPROM.
 //!
-//! The parser task takes their lines in turn with those of the sender (`tasks::parser`): data lines wait until the job
-//! is over, control lines do not. A line that is refused ends the job. A job is a row of pieces of text, each
-//! of some lines and carried out so many times, so that a thousand moves need no more memory than one.
+//! The parser task takes their lines in turn with the lines of the sender (`tasks::parser`): data lines wait until the
+//! job is over, control lines do not. A refused line ends the job. A job is a list of pieces of text. Each piece has
+//! some lines and is repeated a number of times, so that a thousand moves take no more memory than one.
 
 mod texts;
 
@@ -19,27 +19,27 @@ pub const LINE_MAX: usize = 48;
 /// The number of the program in EEPROM.
 pub const STORED: u8 = 100;
 
-/// The number of the lines that are carried out after a start.
+/// The number of the job that runs the start-up lines.
 const STARTUP: u8 = STORED + 1;
 
-/// The round of a job that is over; no piece has as many.
+/// The value of `round` in a job that is over. No piece is repeated as often.
 const OVER: u8 = u8::MAX;
 
 /// A piece of a job.
 #[derive(Clone, Copy)]
 pub struct Piece {
-    /// Lines, parted by line feeds.
+    /// The lines, separated by line feeds.
     text: Plain,
-    /// How many times they are carried out.
+    /// How many times the lines are run.
     times: u8,
 }
 
-/// Where a job has come to.
+/// The progress of a job.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Job {
-    /// The number of the job; 0 is none.
+    /// The number of the job; 0 for none.
     number: u8,
-    /// Of the program in EEPROM, the higher byte of `at`.
+    /// The index of the piece. For the program in EEPROM, the higher byte of `at`.
     piece: u8,
     round: u8,
     at: u8,
@@ -47,40 +47,40 @@ pub struct Job {
 
 #[small]
 impl Job {
-    /// The job of that number, from its start; number 0 is none. `None` for one that does not exist; whether there is a
-    /// program in EEPROM is for the caller to see.
+    /// Returns the job with this number, at its beginning; number 0 is no job. `None` if there is no such job. The
+    /// caller checks whether there is a program in EEPROM.
     pub fn new(number: u8) -> Option<Self> {
         let exists = matches!(number, 0 | STORED) || texts::piece(number, 0).is_some();
         exists.then_some(Self { number, ..Self::default() })
     }
 
-    /// The lines that are carried out after a start; `None` if there is none.
+    /// Returns the job of the start-up lines; `None` if there are none.
     pub fn of_startup(memory: &impl Memory) -> Option<Self> {
         let any = (0..STARTUPS).any(|n| program::startup_len(memory, n) != 0);
         any.then(|| Self { number: STARTUP, ..Self::default() })
     }
 
-    /// The number of the startup line that comes next; `None` for another job.
+    /// Returns the number of the next start-up line; `None` for another job.
     pub fn startup(&self) -> Option<u8> {
         (self.number == STARTUP).then_some(self.piece)
     }
 
-    /// Whether start-up lines are still to be taken.
+    /// Whether start-up lines remain to be taken.
     pub fn starts_up(&self) -> bool {
         self.startup().is_some() && !self.is_over()
     }
 
-    /// Whether there is none.
+    /// Whether there is no job.
     pub fn is_none(&self) -> bool {
         self.number == 0
     }
 
-    /// All of its lines have been taken.
+    /// Ends the job: no further line is taken.
     pub fn end(&mut self) {
         self.round = OVER;
     }
 
-    /// Whether they have; what they asked for may still be under way.
+    /// Whether all lines have been taken. What they have requested may still be under way.
     pub fn is_over(&self) -> bool {
         self.round == OVER
     }
@@ -90,7 +90,8 @@ impl Job {
         self.number
     }
 
-    /// Reads the next line; false at the end. Not by value: a line moved is twice its size of stack.
+    /// Reads the next line; false at the end. Not returned by value, because moving a line takes twice its size on the
+    /// stack.
     pub fn next_line(&mut self, memory: &impl Memory, line: &mut Vec<u8, LINE_MAX>) -> bool {
         if self.number == STORED {
             return self.stored_line(memory, line);
@@ -106,7 +107,7 @@ impl Job {
                 if byte == b'\n' {
                     return true;
                 }
-                // A test holds the lines to their length.
+                // A test checks the length of the lines.
                 let _ = line.push(byte);
             }
             self.at = 0;
@@ -121,7 +122,7 @@ impl Job {
 
 #[small]
 impl Job {
-    /// An empty line has none: it does nothing.
+    /// Reads a start-up line. An empty line has no effect.
     fn startup_line(&mut self, memory: &impl Memory, line: &mut Vec<u8, LINE_MAX>) -> bool {
         let n = self.piece;
         self.piece += 1;

@@ -1,4 +1,4 @@
-//! The jobs, by number: those of TinyG's kinds that a machine can run.
+//! The built-in jobs, by number: those of TinyG's jobs that a machine can run.
 
 use super::Piece;
 use crate::capability::Capability;
@@ -8,7 +8,7 @@ use crate::progmem;
 macro_rules! pieces {
     ($count:literal: $($number:literal: $times:literal x $text:literal)+) => {
         progmem! {
-            /// With the number of its job; those of a job follow each other.
+            /// Each piece with the number of its job. The pieces of a job are adjacent.
             static PIECES: [(u8, Piece); $count] = [
                 $(($number, Piece { text: plain!($text), times: $times })),+
             ];
@@ -46,7 +46,7 @@ pieces!(27:
     51: 1 x "G90\nM30\n"
 );
 
-/// Piece `index` of job `number`.
+/// Returns piece `index` of job `number`.
 #[small]
 pub fn piece(number: u8, index: u8) -> Option<Piece> {
     Capability::Jobs.check().ok()?;
