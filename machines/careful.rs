@@ -1,8 +1,8 @@
-//! A machine that nobody has told Kerf anything about: TinyG's screws, and ramps that stall no stepper and need no patience.
+//! A machine with unknown properties: TinyG's screws, and ramps that are slow enough for every stepper but not tedious.
 
 use super::{MachineProfile, set};
 
-/// The machine that an image is built for unless another is asked for.
+/// The machine that an image is built for by default.
 pub const CAREFUL: MachineProfile = MachineProfile {
     name: "careful",
     about: "a machine that nothing is known of",
@@ -16,7 +16,7 @@ pub const CAREFUL: MachineProfile = MachineProfile {
         // Z is 0 at the top, where it homes
         set("z", "tn", -75.0),
         set("z", "tm", 0.0),
-        // A table that turns: words are degrees
+        // A rotary table: words are degrees
         set("a", "am", 1.0),
         set("abc", "vm", 7_200.0),
         set("abc", "fr", 7_200.0),

@@ -34,7 +34,7 @@ pub const fn with(pending: u8, character: u8) -> u8 {
 
 /// Returns the bit of a real-time character, 0 for any other byte.
 ///
-/// The receive interrupt of the AVR contains the same function in assembly (`hal/avr/uart/interrupts.rs`). The
+/// The receive interrupt of the AVR contains this function in assembly (`hal/avr/uart/interrupts.rs`). The
 /// transcripts run on both and check that the two agree.
 #[inline(always)]
 pub const fn bit(byte: u8) -> u8 {

@@ -451,7 +451,7 @@ fn a_bed_is_tuned_as_well() {
     assert!(until(&mut printer, "PID Autotune finished!", 1_200_000), "{}", printer.said);
     printer.run(500, |_| {});
     assert!(printer.said.contains("echo:  M304 P"), "{}", printer.said);
-    // The result is not used, because nobody has asked for that.
+    // The result is not used, because no U1 was given.
     assert!(printer.ask("M304").contains("M304 P0.00 I0.00 D0.00"), "{}", printer.said);
 }
 

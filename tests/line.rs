@@ -76,7 +76,7 @@ fn a_memory_full_of_rubbish_is_told() {
     assert_eq!(greeting_with(vec![0xFF; 4_096]), format!("{WHO}{ready}"));
 }
 
-/// Pseudo-random numbers, the same on every computer: xorshift64*.
+/// Pseudo-random numbers that do not depend on the computer: xorshift64*.
 struct Dice(u64);
 
 impl Dice {

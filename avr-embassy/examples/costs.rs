@@ -1,4 +1,4 @@
-//! What the runtime costs, in cycles, measured with timer 1: the numbers of the README.
+//! Measures the costs of the runtime with timer 1, in cycles: the numbers of the README.
 //!
 //! The numbers are in `COSTS` when `FINISHED` is 1, in the order of the constants below.
 #![no_std]
@@ -37,7 +37,7 @@ static FINISHED: AtomicU8 = AtomicU8::new(0);
 const CALLED: Event = Event::new::<0>();
 const ANSWERED: Event = Event::new::<1>();
 static CALL: Signal<CriticalSectionRawMutex, ()> = Signal::new();
-/// When the task that was called had its turn.
+/// The time at which the called task had its turn.
 static ANSWERED_AT: AtomicU16 = AtomicU16::new(0);
 static BYTES: Ring<u8, 64> = Ring::new();
 
@@ -84,7 +84,7 @@ async fn called(thread: Thread) {
     }
 }
 
-/// Returns how many cycles something takes that is done at once.
+/// Returns the cycles that `act` takes.
 #[inline(always)]
 fn cycles(act: impl FnOnce()) -> u16 {
     let began = now();

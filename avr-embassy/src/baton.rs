@@ -6,7 +6,7 @@
 use crate::byte::SharedByte;
 use crate::value::Value;
 
-/// The stage while somebody uses the value.
+/// The stage while the value is in use.
 const IN_USE: u8 = u8::MAX;
 
 /// A value and its stage: 0 at first, at most 254. The program decides what each stage means.
@@ -34,7 +34,7 @@ impl<T> Baton<T> {
         Self { stage: SharedByte::new(0), value: Value::new(value) }
     }
 
-    /// Returns the stage; 255 while somebody uses the value. Any level.
+    /// Returns the stage; 255 while the value is in use. Any level.
     #[inline(always)]
     pub fn stage(&self) -> u8 {
         self.stage.get()

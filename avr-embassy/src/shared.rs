@@ -1,7 +1,7 @@
 //! State that thread mode and interrupt mode both change: thread mode under the ceiling lock, interrupt mode because
 //! it preempts.
 //!
-//! | end | who has it | why nobody else has the value meanwhile |
+//! | end | owner | why no other code uses the value meanwhile |
 //! |---|---|---|
 //! | [`Shared::with`] | thread mode, within [`interrupt::lock`](crate::interrupt::lock) | the lock keeps interrupt mode out |
 //! | [`InterruptEnd`] | a task of interrupt mode | thread mode goes on only when that task waits, which it cannot within a closure |

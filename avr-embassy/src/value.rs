@@ -39,7 +39,7 @@ mod imp {
 mod imp {
     use std::sync::RwLock;
 
-    /// On the host the value is behind a lock that nobody ever has to wait for.
+    /// On the host the value is behind a lock, which is never contended.
     pub struct Value<T>(RwLock<T>);
 
     impl<T> Value<T> {

@@ -2,8 +2,8 @@
 //! moves follow the bed.
 //!
 //! Pure code, kept beside the settings because the planner, reports and G29 all read it. Lengths are in machine
-//! coordinates, as integers. Every caller gets the same number for the lift at a place, so nothing drifts when the
-//! lift is removed again.
+//! coordinates, as integers. Every caller gets one number for the height at a place, so nothing drifts when the
+//! height is subtracted again.
 
 use crate::capability::Capability;
 use crate::math::round;

@@ -3,7 +3,7 @@
 //!
 //! [`Interpreter::interpret`](super::Interpreter::interpret) tries the fast path first. The fast path declines any
 //! other line before the state has changed. `lexer`, `block` and `motion` then interpret the line, and say what is
-//! wrong with it. Both paths give the same result to the bit: a property test in `tests` compares them.
+//! wrong with it. The results of both paths are equal to the bit: a property test in `tests` compares them.
 //!
 //! Lines of a printing host have E instead of A, with five decimals, and G0 means G1: see [`Writer::Prints`].
 //!

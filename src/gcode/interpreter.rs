@@ -158,7 +158,7 @@ impl<T: Tables> Interpreter<T> {
     }
 
     /// Interprets the words of a jog: one feed move. The words have to give the feed rate. They may give units and a
-    /// distance mode, else those in force apply. The modal state is the same afterwards as before.
+    /// distance mode, else those in force apply. The modal state does not change.
     #[inline(never)]
     #[small]
     pub fn jog(

@@ -67,7 +67,7 @@ pub(super) use contract;
 contract! {
     /// The step timer and its interrupt, which owns the machine's only [`Dda`] and takes segments out of a ring.
     ///
-    /// At each tick the interrupt does what [`Dda::tick`] does; it waits for nobody. The ticks stop when a segment
+    /// At each tick the interrupt does what [`Dda::tick`] does, without waiting. The ticks stop when a segment
     /// ends and the ring is empty.
     trait Stepper in stepper {
         /// Sets the timer up and returns the filling end of the segment ring, which belongs to exec. Start-up, before
@@ -160,7 +160,7 @@ contract! {
         /// Returns the slot of the mark that stands for the last `%` or `^d`; `None` if no such mark waits. Thread
         /// mode. Cost: 12 for each byte that waits.
         fn last_cut(port: u8) -> Option<u8>;
-        /// Whether a `!` has come, on any port, that nobody has taken yet. Any level.
+        /// Whether a `!` has come, on any port, that has not been taken yet. Any level.
         fn asks_hold() -> bool;
         /// Takes the override requests that characters have made since the last call. Thread mode.
         fn take_asked(port: u8) -> Asked;
@@ -258,7 +258,7 @@ contract! {
         fn release();
         /// Whether a sensor waits until the card is released. The sensor then gets its turn within 40 ms. Thread mode.
         fn is_wanted() -> bool;
-        /// Sets the clock: 4 MHz if `fast`, else 250 kHz, for a card that is new. Thread mode.
+        /// Sets the clock: 4 MHz if `fast`, else 250 kHz, for a card that has not been initialized. Thread mode.
         fn set_fast(fast: bool);
         /// Sends a byte and returns the byte received meanwhile. Thread mode. Cost: 60 at 4 MHz, 550 at 250 kHz.
         fn exchange(byte: u8) -> u8;

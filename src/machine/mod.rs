@@ -15,7 +15,7 @@
 //! both a machine that slows down and one at standstill. Exec's snapshot knows which (`Snapshot::held`).
 //!
 //! The transitions of [`Hold`] follow. In an empty cell the state stays. `Flush`, `Drop` and `Kill` each have a second
-//! state with the door open. An event leads it to the same state as without the door, but with the door open.
+//! state with the door open. An event leads from it to the state in the table, with the door open.
 //!
 //! | | `Hold` | `Resume` | `Rested` | `Flush` | `Cut`, an alarm | `Kill` | `Dropped` | `DoorOpened` | `DoorShut` | `DoorShutIdle` |
 //! |---|---|---|---|---|---|---|---|---|---|---|

@@ -200,7 +200,7 @@ pub trait Remembers {
     /// stack is small where the value is made.
     fn new() -> Self;
 
-    /// Restores the defaults, after the settings have got their defaults.
+    /// Restores the defaults. Called after the settings have been set to their defaults.
     fn restore(&mut self);
 
     /// Makes the next report complete, because its reader has received no report so far.
@@ -307,7 +307,7 @@ macro_rules! dialects {
                 has
             };
 
-            /// Returns the same dialect in the state that it has after a start.
+            /// Returns this dialect in the state that it has after a start.
             #[cfg(feature = "sd")]
             pub fn fresh(self, settings: &Settings) -> Self {
                 match self {

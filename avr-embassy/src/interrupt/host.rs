@@ -9,7 +9,7 @@ use embassy_executor::{SendSpawner, Spawner};
 
 use crate::{Interrupt, pender};
 
-/// What interrupt mode has asked for, for the moment when thread mode has nothing left to do.
+/// The request of interrupt mode for the moment when thread mode has nothing left to do.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Wanted {
     Nothing,

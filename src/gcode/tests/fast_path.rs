@@ -1,4 +1,4 @@
-//! The fast path and the slow path of the interpreter give the same results.
+//! The fast path and the slow path of the interpreter give equal results.
 
 use std::string::String;
 

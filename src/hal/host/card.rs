@@ -9,7 +9,7 @@ pub fn release() {}
 /// Sets the speed of the clock.
 pub fn set_fast(_: bool) {}
 
-/// Sends a byte. Returns 0xFF, because a line that nobody drives is high.
+/// Sends a byte. Returns 0xFF, because an undriven line is high.
 pub fn exchange(_: u8) -> u8 {
     0xFF
 }

@@ -79,7 +79,7 @@ pub fn reset() {
     resets().set(true);
 }
 
-/// Starts the boot loader. On the host this is the same as [`reset`].
+/// Starts the boot loader. On the host this only does what [`reset`] does.
 pub fn boot() {
     reset();
 }

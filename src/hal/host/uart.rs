@@ -93,7 +93,7 @@ struct Line {
     asked: Asked,
     /// The byte queued last.
     last: u8,
-    /// Cycles of a byte at the firmware's rate; `sender_cycles` is the same at the sender's rate.
+    /// Cycles of a byte at the firmware's rate; `sender_cycles` are those at the sender's rate.
     byte_cycles: u64,
     rate: u32,
     sender_cycles: u64,
@@ -326,7 +326,7 @@ pub fn last_cut(port: u8) -> Option<u8> {
     last_mark(&ring)
 }
 
-/// Whether a `!` has come, on any port, that nobody has taken yet.
+/// Whether a `!` has come, on any port, that has not been taken yet.
 pub fn asks_hold() -> bool {
     (0..PORTS as u8).any(|port| with(port, |line| line.realtime & realtime::HOLD != 0))
 }

@@ -147,7 +147,7 @@ pub enum Mode {
 }
 
 impl Mode {
-    /// Returns the format of reports that nobody has asked for.
+    /// Returns the format of automatic reports.
     fn format(self, machine: &impl Machine) -> Format {
         match self {
             Mode::Json => Format::json(machine.settings()),

@@ -1,4 +1,4 @@
-//! Reports that nobody has asked for: status reports and queue reports.
+//! Automatic reports: status reports and queue reports.
 //!
 //! [`StatusReport`] is the list of what to report, with the values that were sent last. [`Report`] sends one status
 //! report in steps. [`queue_report`] sends a queue report at once. The reporting task holds the transmitter from the

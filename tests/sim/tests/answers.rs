@@ -55,7 +55,7 @@ const USUAL_BAUD: u32 = 115_200;
 /// See [`USUAL_BAUD`].
 const FAST_BAUD: u32 = 500_000;
 
-/// Returns the time that so many bytes take on the line, ms.
+/// Returns the time that `bytes` bytes take on the line, ms.
 fn bytes_ms(bytes: usize, baud: u32) -> f64 {
     bytes as f64 * 1e4 / f64::from(baud)
 }

@@ -54,7 +54,7 @@ fn who_opens_the_port_is_told_that_the_board_resets() {
     assert!(said.contains("the board resets, as a real one does"), "{said}");
 }
 
-/// Also applies to a server that somebody has started by `cargo xtask serve`, whose process it replaces.
+/// Also applies to a server that was started by `cargo xtask serve`, because it replaces that process.
 #[cfg(unix)]
 #[test]
 fn who_ends_the_process_ends_the_board_and_its_link() {

@@ -7,7 +7,7 @@ use std::fmt::Write;
 const MOVES: u32 = 2_000;
 /// Distance from its middle at which the job turns back, thousandths of a mm.
 const FAR: i32 = 15_000;
-/// One in so many moves is a travel, with the filament retracted.
+/// One in this many moves is a travel, with the filament retracted.
 const TRAVEL_EVERY: u32 = 50;
 
 const START: &str = "\
