@@ -88,7 +88,10 @@ can be read as well: [settings.md](settings.md). Names that do something: [proto
 
 /// Values of the machine: the name, or the name within its group with `x`, `1` or `e` for the group; and the meaning.
 const VALUES: [(&str, &str); 62] = [
-    ("n", "line number (N) of the last finished line; in motion, of those that move or switch something"),
+    (
+        "n",
+        "line number (N) of the last finished line; in motion, of those that move or switch something",
+    ),
     ("line", "line number (N) of the moving line"),
     ("vel", "present speed, units/min"),
     ("feed", "feed rate F, units/min"),
