@@ -418,7 +418,7 @@ impl Prep {
                 // The remainder, in no more ticks than necessary.
                 (fine, shift) = (finer(left, fits), fits);
             }
-        } else {
+        } else if self.is_in_lockstep() {
             // The end is not aligned, but the beginning is: otherwise the first step would be late.
             let at = (left as u16).wrapping_sub(u16::from(self.past) << PART_LOG2);
             (fine, shift) = self.aligned(at, (fine, shift), cycles, left);
@@ -458,10 +458,16 @@ impl Prep {
         self.limit(cycles, if self.coarse { COARSEST } else { self.paces().coarse })
     }
 
+    /// Whether all motors that move go equally far.
+    #[inline(always)]
+    fn is_in_lockstep(&self) -> bool {
+        self.minor == 0 && !self.leads()
+    }
+
     /// Returns the most ticks for a stretch of `cycles` at `pace`.
     #[inline(always)]
     fn limit(&self, cycles: u32, pace: u16) -> u16 {
-        let in_lockstep = self.minor == 0 && !self.leads();
+        let in_lockstep = self.is_in_lockstep();
         if in_lockstep && cycles > LOCKSTEP_CYCLES {
             return LOCKSTEP_TICKS;
         }
