@@ -232,6 +232,27 @@ fn steps_are_even_whatever_ticks_become() {
     }
 }
 
+/// A corner at the newest block of a full queue is seen as soon as the block is queued.
+#[test]
+fn the_newest_block_of_a_full_queue_is_seen() {
+    for jerk in [0.0, 1e5] {
+        let mut rig = Rig::new(Config::new(1_000.0, 1_000.0, jerk));
+        let (mut x, mut n) = (100.0, 1);
+        rig.line(at([x]), 200.0, n);
+        while rig.free() > 1 {
+            (x, n) = (x + 0.1, n + 1);
+            rig.line(at([x]), 200.0, n);
+        }
+        rig.line(at([0.0]), 200.0, n + 1);
+        assert_eq!(rig.free(), 0);
+        rig.finish();
+        let before = rig.emitted.iter().rfind(|emitted| emitted.line <= n).expect("segments");
+        assert!(before.velocity < 20.0, "{} mm/s into the reversal", before.velocity);
+        let fastest = rig.emitted.iter().map(|emitted| emitted.velocity).fold(0.0, f32::max);
+        assert!(fastest > 199.0, "{fastest} mm/s");
+    }
+}
+
 /// The steps of the dominant motor stay even over the ends of lines of 0.2 to 5 mm, in lockstep and out of it. Lines
 /// end in 1/16 step: where ticks are longer, a step may be late by as much.
 #[test]

@@ -121,12 +121,6 @@ impl<T: Copy, const N: usize> Ring<T, N> {
         usize::from(if head >= tail { used } else { used.wrapping_add(N as Index) })
     }
 
-    /// Returns how many of `waiting` values the consumer may look at where they lie: all but the newest of a full ring,
-    /// which [`Producer::replace_newest`] may write to.
-    fn settled(waiting: usize) -> usize {
-        if N > 2 { waiting.min(N - 2) } else { waiting }
-    }
-
     /// Returns the slot filled last, `None` if it has been taken.
     pub fn newest(&self) -> Option<u8> {
         let head = self.head.get();
@@ -201,8 +195,8 @@ impl<T: Copy, const N: usize> Producer<T, N> {
     /// newest slot of a full ring.
     #[inline(always)]
     fn write(&mut self, index: Index, value: T) {
-        // SAFETY: a slot behind `head` is the producer's until `head` moves onto it, and the consumer stays away from
-        // the newest slot of a full ring (`Ring::settled`).
+        // SAFETY: a slot behind `head` is the producer's until `head` moves onto it. For the newest slot of a full ring
+        // see `replace_newest`.
         unsafe { self.0.slot(index).write(value) };
     }
 
@@ -319,9 +313,12 @@ impl<T: Copy, const N: usize> Producer<T, N> {
 
     /// Replaces the newest value of a full ring. Returns `false` if the ring has room.
     ///
-    /// Either end may preempt the other: a consumer that has been interrupted is never looking at the newest value of a
-    /// full ring, and interrupts are off while it is replaced.
-    pub fn replace_newest(&mut self, value: T) -> bool {
+    /// Either end may preempt the other: interrupts are off while the value is replaced.
+    ///
+    /// # Safety
+    /// The consumer is a [`ConsumerView`], which never looks at the newest value of a full ring; or it keeps no
+    /// reference to it while it can be interrupted.
+    pub unsafe fn replace_newest(&mut self, value: T) -> bool {
         const { assert!(N > 2, "a ring of one value has none that is older than its newest") };
         crate::mask(|| {
             let full = self.free() == 0;
@@ -438,18 +435,16 @@ impl<T: Copy, const N: usize> Consumer<T, N> {
         self.0.tail()
     }
 
-    /// Returns what `look` makes of the value `ahead` places behind the oldest. `None` if no value waits there, and for
-    /// the newest value of a full ring, which the producer may replace.
+    /// Returns what `look` makes of the value `ahead` places behind the oldest. `None` if no value waits there.
     #[inline]
     pub fn peek<R>(&self, ahead: usize, look: impl FnOnce(&T) -> R) -> Option<R> {
-        if ahead >= Ring::<T, N>::settled(self.0.used()) {
+        if ahead >= self.0.used() {
             return None;
         }
         let tail = self.0.tail.get() as usize;
         let index = tail + 1 + ahead;
         let index = if index >= N { index - N } else { index };
-        // SAFETY: the slot is the consumer's until `tail` moves onto it and the producer wraps. It is not the one that
-        // `replace_newest` writes to.
+        // SAFETY: the slot is the consumer's until `tail` moves onto it and the producer wraps.
         Some(look(unsafe { &*self.0.slot(index as Index) }))
     }
 
@@ -462,8 +457,7 @@ impl<T: Copy, const N: usize> Consumer<T, N> {
         }
     }
 
-    /// Returns the oldest values, as many as lie side by side; empty only if none waits. The newest value of a full
-    /// ring is not among them, because the producer may replace it.
+    /// Returns the oldest values, as many as lie side by side; empty only if none waits.
     #[inline]
     pub fn waiting(&self) -> &[T] {
         // Read once: the producer may move it meanwhile.
@@ -472,11 +466,11 @@ impl<T: Copy, const N: usize> Consumer<T, N> {
         let start = next::<N>(tail);
         let len = match head {
             _ if head == tail => 0,
-            _ if head >= start => Ring::<T, N>::settled(usize::from(head - start) + 1),
+            _ if head >= start => usize::from(head - start) + 1,
             _ => N - usize::from(start),
         };
         // SAFETY: `head` has moved onto or past these slots, so they are filled, and the consumer's until `tail` moves,
-        // which takes `&mut self`. `replace_newest` writes to none of them.
+        // which takes `&mut self`.
         unsafe { core::slice::from_raw_parts(self.0.slot(start), len) }
     }
 
@@ -564,8 +558,7 @@ mod tests {
             assert_eq!(p.push(99), Err(99));
             assert!(p.slot(99).is_none());
             assert_eq!(c.len(), 3);
-            assert_eq!(c.peek(1, |v| *v), Some(round * 10 + 1));
-            assert_eq!(c.peek(2, |v| *v), None, "the newest of a full ring");
+            assert_eq!(c.peek(2, |v| *v), Some(round * 10 + 2));
             assert_eq!(c.peek(3, |v| *v), None);
             let got: Vec<u16> = core::iter::from_fn(|| c.pop()).collect();
             assert_eq!(got, [round * 10, round * 10 + 1, round * 10 + 2]);
@@ -592,21 +585,24 @@ mod tests {
     #[test]
     fn the_newest_value_of_a_full_ring_is_replaced_unseen() {
         for at in 0..8 {
-            let (mut p, mut c) = ring::<8>();
+            let (mut p, c) = ring::<8>();
+            let mut c = c.into_view();
             for v in 0..at {
                 p.push(v).expect("room");
-                c.release();
+                c.release_many(1);
             }
+            // SAFETY: the consumer is a view.
+            let replace = |p: &mut Producer<u16, 8>, by| unsafe { p.replace_newest(by) };
             p.push_all(10..16);
-            assert!(!p.replace_newest(99), "there is room");
+            assert!(!replace(&mut p, 99), "there is room");
             assert_eq!(p.push(16), Ok(()));
             let (seen, first) = (c.waiting().to_vec(), c.waiting().as_ptr());
             assert!(!seen.is_empty() && !seen.contains(&16), "{seen:?}");
-            assert!(p.replace_newest(99));
+            assert!(replace(&mut p, 99));
             // Whoever has looked at the values before finds all of them as they were.
             assert_eq!((c.waiting(), c.waiting().as_ptr()), (&seen[..], first));
             c.release_many(seen.len() as u8);
-            assert!(!p.replace_newest(98), "there is room again");
+            assert!(!replace(&mut p, 98), "there is room again");
             let rest: Vec<u16> = core::iter::from_fn(|| c.pop()).collect();
             let got: Vec<u16> = seen.into_iter().chain(rest).collect();
             assert_eq!(got, [10, 11, 12, 13, 14, 15, 99]);

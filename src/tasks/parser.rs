@@ -419,12 +419,14 @@ impl Parser {
         let links = self.links;
         // An answer that is still due does not wait for the CPU.
         set_asked(false);
-        let mut asked = false;
+        // Bit 0: this has been polled before. Bit 1: a line of a job waits for the end of a jog, as of now.
+        let mut state = u8::from(waits_for_jog(links)) << 1;
         poll_fn(move |cx| {
-            let waited = core::mem::replace(&mut asked, true);
+            let (waited, jogs) = (state & 1 != 0, state & 2 != 0);
+            state |= 1;
             let woken = links.parser_wake.poll(cx);
             let mut ready = woken.is_ready();
-            if self.deferred != Deferred::No || waits_for_jog(links) {
+            if self.deferred != Deferred::No || jogs {
                 ready |= waited;
                 wake_after(links.thread, Event::Tick, cx.waker());
             }

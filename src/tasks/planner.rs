@@ -657,6 +657,8 @@ impl Planner {
         } else {
             let motion = common::snapshot(links.thread);
             self.relocate(&motion);
+            // The lines behind that one have been dropped.
+            self.line = motion.finished;
             // The announcement of the lead may have been dropped.
             self.announcement = if Capability::Printer.is_built_in() {
                 Announcement::Lead

@@ -25,7 +25,7 @@ group! {
             "Junction acceleration: maximum centripetal acceleration in a corner. A larger value makes corners faster.";
         CT "ct": fixed(6, 4, 1_000).with(UNIT), 10_000,
             length(text!("chordal tolerance"), NONE),
-            "Chordal tolerance: maximum distance between an arc and the chords that approximate it. A chord is at least 0.02 mm long.";
+            "Chordal tolerance: maximum distance between an arc and the chords that approximate it. Chords are not made shorter than 0.02 mm for it.";
         SL "sl": int(0, 1), 0,
             bare(text!("soft limit enable")),
             "Soft limits. 1: a move of a homed axis beyond `tn` or `tm` is refused with status 220. 0: no soft limits.";

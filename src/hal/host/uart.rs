@@ -45,7 +45,8 @@ impl<const N: usize> Fill for Producer<u8, N> {
     }
 
     fn mark(&mut self, mark: u8) {
-        if !self.replace_newest(mark) {
+        // SAFETY: the reader has a view of the ring.
+        if !unsafe { self.replace_newest(mark) } {
             Fill::push(self, mark);
         }
     }

@@ -81,7 +81,8 @@ impl Filling {
 
     /// Puts a mark where there is room, else replaces the newest byte by it.
     fn mark(&mut self, mark: u8) {
-        if !either!(self, ring => ring.replace_newest(mark)) {
+        // SAFETY: the reader has a view of the ring.
+        if !either!(self, ring => unsafe { ring.replace_newest(mark) }) {
             self.push(mark);
         }
     }

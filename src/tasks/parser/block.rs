@@ -38,7 +38,7 @@ pub(super) fn has_room_for_startup(links: &Links) -> bool {
 #[inline(never)]
 #[small]
 pub(super) fn waits_for_jog(links: &Links) -> bool {
-    machine::cycle() == Cycle::Jog && !links.job.get().is_none() && is_working(links)
+    machine::cycle() == Cycle::Jog && !links.job.get().is_none()
 }
 
 /// Carries out the next line of a built-in job. A refused line is reported as an exception. The reporter reports the

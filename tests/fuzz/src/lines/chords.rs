@@ -41,10 +41,10 @@ fn radii(start: &PerAxis<Length>, target: &PerAxis<Length>, arc: &Arc) -> (f64, 
 
 /// Returns how far chord ends may lie outside a circle, in 0.1 um. They lie outside so that each chord deviates to both
 /// sides of the circle. The result is a little more than two thirds of the sagitta, for chords of this tolerance (mm),
-/// for the shortest chords of 0.05 mm, or for a seventh of a circle.
+/// for the shortest chords of 0.02 mm, or for a seventh of a circle.
 fn outside(radius: f64, tolerance: f32) -> f64 {
     let units = f64::from(tolerance) * f64::from(Length::PER_MM);
-    units.max(500.0 * 500.0 / 8.0 / radius).min(0.1 * radius)
+    units.max(200.0 * 200.0 / 8.0 / radius).min(0.1 * radius)
 }
 
 /// Whether the whole circle is within the range of lengths. Otherwise a part of it is cut off.
