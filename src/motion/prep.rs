@@ -296,8 +296,8 @@ impl Prep {
     /// Prepares the whole of a block that begins, in `cycles`, which are no more than a few milliseconds. Returns
     /// false, and no segment, when the block has no steps; its time is then carried over.
     ///
-    /// The result is that of `last` for such a block, in fewer cycles. Cost: 700, and 400 for each motor but the
-    /// dominant one.
+    /// The result is that of `last` for such a block, in fewer cycles; but in lockstep it may begin within a tick. Cost:
+    /// 700, and 400 for each motor but the dominant one.
     #[inline(never)]
     pub fn whole(&mut self, cycles: u32, exact: bool, out: &mut Segment) -> bool {
         let cycles = self.with_kept(cycles);
