@@ -104,6 +104,9 @@ fn long_slow_lines_keep_their_feed() {
             (400.0, 0.05),
             (400.0, 2.03),
             (120.0, 0.012),
+            // A stretch is less than the last bit.
+            (400.0, 0.0063),
+            (400.0, 0.00125),
         ] {
             let mut rig = Rig::new(Config::new(300.0, 5_000.0, jerk));
             rig.pins.keep_edges = true;

@@ -632,11 +632,12 @@ impl Exec {
             running.fresh = false;
             running.scale = self.prep.own() as f32 / running.left;
         }
-        let before = running.left;
-        running.left -= stretch.distance;
-        let cycles = match is_rounded(before, stretch.distance) {
-            true => rounded(before - running.left, stretch),
-            false => cycles,
+        let cycles = match is_rounded(running.left, stretch.distance) {
+            true => rounded(&mut running.left, stretch),
+            false => {
+                running.left -= stretch.distance;
+                cycles
+            }
         };
         out.left = running.left;
         let left = whole(running.left * running.scale);
@@ -701,17 +702,21 @@ fn is_rounded(left: f32, distance: f32) -> bool {
     left.to_bits() > distance.to_bits() + (BITS << 23)
 }
 
-/// Returns how long a stretch takes, CPU cycles, if it goes `distance` mm instead of its own distance. A distance of
-/// 0 takes all of its time.
+/// Takes a stretch from what is left of its line, at least one bit. Returns how long the distance takes that was taken,
+/// CPU cycles. A stretch that goes nowhere takes its own time.
 #[cold]
 #[inline(never)]
 #[small]
-fn rounded(distance: f32, stretch: &Stretch) -> u32 {
-    let seconds = match some(distance) {
-        true => stretch.seconds * (distance / stretch.distance),
-        false => stretch.seconds,
-    };
-    cycles_of(seconds)
+fn rounded(left: &mut f32, stretch: &Stretch) -> u32 {
+    let before = *left;
+    if !some(stretch.distance) {
+        return cycles_of(stretch.seconds);
+    }
+    *left -= stretch.distance;
+    if *left >= before {
+        *left = f32::from_bits(before.to_bits() - 1);
+    }
+    cycles_of(stretch.seconds * ((before - *left) / stretch.distance))
 }
 
 /// Returns the CPU cycles in `seconds`: at least 1, at most [`CYCLES_MAX`]. Cost: 250, 25 for a usual stretch.

@@ -161,8 +161,13 @@ impl Exec {
         } else {
             self.governor.sharply(running.left, least(wanted, running.cruise), running.headroom)
         };
-        thread.handed(stretch.distance);
-        self.hand_out_coarsely(&stretch, blocks, out, segment)
+        let before = self.running.left;
+        let step = self.hand_out_coarsely(&stretch, blocks, out, segment);
+        let left = if self.running.done { 0.0 } else { self.running.left };
+        if let Follows::Angle(thread) = &mut self.follows {
+            thread.handed(before - left);
+        }
+        step
     }
 
     /// Prepares a pause of 1 ms, in which the line waits for the spindle.

@@ -123,6 +123,27 @@ fn each_word_of_a_thread_cuts_to_the_step_and_in_phase() {
     }
 }
 
+/// What is left of a long line has 24 bits, and a slow line advances by few of them in a stretch.
+#[test]
+fn long_slow_threads_keep_their_lead() {
+    for (board, line, rpm) in
+        [(BOARDS[0], "g33 z-60 k1", 120.0), (BOARDS[1], "g33 z-290 k0.75", 150.0)]
+    {
+        let lead = if line.ends_with("k1") { 1.0 } else { 0.75 };
+        let mut lathe = Lathe::new(board, PULSES, |_| {});
+        lathe.turn(rpm);
+        let since = lathe.turns();
+        lathe.take("g91");
+        lathe.begin(line, Z, 25.0);
+        let cut = Cut { start: [0, 0], end: lathe.motors(), indexed: lathe.indexed(since) };
+        let phases = cut.phases(Z, lead);
+        let off = |phase: &f64| apart(*phase, -lead * behind(PULSES), lead);
+        let most = phases.iter().map(off).fold(0.0, f64::max);
+        println!("{}: {line} at {rpm} rpm: {} turns, {most:.4} mm", board.name, phases.len());
+        assert!(phases.len() >= 20 && most < STEP, "{line}: {phases:.4?}");
+    }
+}
+
 #[test]
 fn the_starts_of_a_thread_lie_a_part_of_its_lead_apart() {
     for (board, starts, lead, rpm) in
