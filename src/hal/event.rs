@@ -72,7 +72,7 @@ machine_static! {
     fn transmitted() -> Waiter = Waiter::new();
     // Exec counts up. The main loop, which never runs between exec's read and its write, clears.
     fn passed_over() -> SharedByte = SharedByte::new(0);
-    // Used by thread mode only.
+    // The ports of `set_eager`, and the upper bits of the time of the last look at them, ms. Used by thread mode only.
     fn eager() -> SharedByte = SharedByte::new(0);
     // Thread mode writes it, exec reads it.
     fn asked() -> SharedByte = SharedByte::new(0);
@@ -81,7 +81,7 @@ machine_static! {
 /// Sets the ports, as bits, on which bytes may act without the end of a line. While any byte waits on such a port,
 /// there is an [`Event::Received`] each [`EAGER_MS`]. Thread mode.
 pub fn set_eager(ports: u8) {
-    eager().set(ports);
+    eager().set(eager().get() & !EAGER_PORTS | ports);
 }
 
 /// Sets whether a sender waits for an answer that thread mode works on. Exec then leaves more of the CPU to thread
@@ -106,6 +106,10 @@ pub fn pass_over() -> u8 {
 
 /// Milliseconds between two events of [`set_eager`]: a power of two.
 const EAGER_MS: u8 = 4;
+/// The bits of `eager` that are ports.
+const EAGER_PORTS: u8 = EAGER_MS - 1;
+const _: () =
+    assert!(1 << PORTS <= EAGER_MS as usize, "the bits of the ports reach into those of the time");
 
 /// Waits until `ready` returns a value. Asks now, and again after each `event`.
 pub fn wait<R>(
@@ -150,10 +154,18 @@ pub fn next(thread: Thread, event: Event) -> impl Future<Output = ()> {
     event.bit().next(thread)
 }
 
-/// Whether a byte waits on a port where bytes may act without the end of a line.
+/// Returns the next value of `eager` if it is time for another look. The main loop may miss any number of
+/// milliseconds, always the same ones too, so it compares times and does not wait for a certain one.
+fn looked(eager: u8, ms: u8) -> Option<u8> {
+    let is_due = (eager ^ ms) & !EAGER_PORTS != 0;
+    is_due.then_some(eager & EAGER_PORTS | ms & !EAGER_PORTS)
+}
+
+/// Whether it is time for a look, and a byte waits on a port where bytes may act without the end of a line.
 fn is_eager() -> bool {
-    let eager = eager().get();
-    (0..PORTS as u8).any(|port| eager & 1 << port != 0 && imp::uart::newest(port).is_some())
+    let Some(now) = looked(eager().get(), imp::time::millis() as u8) else { return false };
+    eager().set(now);
+    (0..PORTS as u8).any(|port| now & 1 << port != 0 && imp::uart::newest(port).is_some())
 }
 
 /// Runs work that is too small for a task, in each turn of the main loop. `bits` are the events since the last turn.
@@ -167,8 +179,29 @@ pub fn turn(thread: Thread, bits: u8) {
     }
     if Event::Tick.is_in(bits) {
         imp::uart::look();
-        if imp::time::millis() as u8 & (EAGER_MS - 1) == 0 && is_eager() {
+        if is_eager() {
             super::flags::set(Event::Received);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_look_is_due_every_four_ms_whichever_milliseconds_are_missed() {
+        for step in [1u32, 2, 3, 4, 5, 7, 8, 12, 100] {
+            for first in 0..8 {
+                let (mut eager, mut last) = (0b10, first);
+                for ms in (first..first + 3_000).step_by(step as usize) {
+                    if let Some(now) = looked(eager, ms as u8) {
+                        (eager, last) = (now, ms);
+                    }
+                    assert!(ms - last < u32::from(EAGER_MS).max(step), "{step}, {first}: {ms}");
+                    assert_eq!(eager & EAGER_PORTS, 0b10);
+                }
+            }
         }
     }
 }
