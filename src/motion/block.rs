@@ -214,4 +214,16 @@ impl Line {
     pub fn velocity(&self, factors: &Factors) -> f32 {
         self.reserve.velocity(self.cruise, factors)
     }
+
+    /// Whether these motors, as bits, stand still in the line. They may have a debt to make good.
+    #[small]
+    pub fn keeps(&self, motors: u8) -> bool {
+        let mut bit = 1;
+        let mut keeps = true;
+        for way in self.way {
+            keeps &= way == 0 || motors & bit == 0;
+            bit <<= 1;
+        }
+        keeps
+    }
 }

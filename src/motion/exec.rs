@@ -240,6 +240,9 @@ impl Exec {
             if self.prep.relax(segment) {
                 return Step::Segment;
             }
+            if standstill && self.ends_pass(blocks) {
+                return Step::Again;
+            }
             out.held = standstill;
             return if standstill { Step::Held } else { Step::Standstill };
         }
@@ -478,7 +481,7 @@ impl Exec {
             QueuedAction::PerTurn(on) if Capability::Lathe.is_built_in() => self.go_by_speed(*on),
             QueuedAction::Lead(lead) if Capability::Lathe.is_built_in() => {
                 if let Follows::Angle(thread) = &mut self.follows {
-                    thread.set_lead(*lead);
+                    self.governor.rescale(thread.set_lead(*lead));
                 }
             }
             // Actions that need nothing more, and those that are never queued because the image lacks their

@@ -168,6 +168,12 @@ impl Governor {
         self.velocity
     }
 
+    /// Multiplies the velocity, because distances along the path count for this much more from here on. There is no jerk
+    /// limit.
+    pub fn rescale(&mut self, ratio: f32) {
+        self.velocity *= ratio;
+    }
+
     /// Returns the time (s) and distance (mm) that have been computed but not handed out. [`Governor::velocity`] is the
     /// velocity at their end.
     pub fn pending(&self) -> (f32, f32) {

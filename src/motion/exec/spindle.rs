@@ -4,6 +4,7 @@ use super::{Exec, PAUSE, SEGMENT_S, Step};
 use crate::boards::outputs;
 use crate::capability::Capability;
 use crate::dda::Segment;
+use crate::motion::block::{Block, Body, QueuedAction};
 use crate::motion::float::{least, some};
 use crate::motion::queue::BlockSource;
 use crate::motion::retract::Retreat;
@@ -43,6 +44,22 @@ impl Exec {
         {
             self.follows = Follows::Nothing;
         }
+    }
+
+    /// Ends the pass if nothing of it is left to do. A hold does not keep the pass: the spindle may pause then.
+    #[small]
+    pub(super) fn ends_pass(&mut self, blocks: &mut BlockSource) -> bool {
+        let is_end =
+            |block: &Block| matches!(block.body, Body::QueuedAction(QueuedAction::EndThread));
+        let ends = Capability::Lathe.is_built_in()
+            && !self.running.active
+            && blocks.look(is_end) == Some(true);
+        if ends {
+            blocks.enter();
+            blocks.release();
+            self.follows = Follows::Nothing;
+        }
+        ends
     }
 
     /// The pass in step with the spindle, if there is one.
@@ -148,7 +165,9 @@ impl Exec {
         // Whether the axes stop within this line, in which X stands still.
         let fits = velocity * velocity < 2.0 * accel * self.running.left;
         let leaves = (breaks_off || self.hold) && retract.is_some() && fits;
-        if leaves && self.prep.rest_of(retract.motors) {
+        let stands =
+            |block: &Block| matches!(&block.body, Body::Line(line) if line.keeps(retract.motors));
+        if leaves && blocks.look(stands) == Some(true) {
             let why = thread.fault().unwrap_or(Status::Terminated);
             let retreat = Retreat::new(retract, why, self.prep.debt_of(retract.motors));
             self.prep.join(retract.motors, retreat.is_backwards());

@@ -7,12 +7,6 @@ use crate::boards::MOTORS;
 use crate::dda::Segment;
 
 impl Prep {
-    /// Whether the block moves none of `motors`.
-    #[small]
-    pub fn rest_of(&self, motors: u8) -> bool {
-        (self.full | self.minor) & motors == 0
-    }
-
     /// Returns the debt of the first of `motors`, phase units.
     #[small]
     pub fn debt_of(&self, motors: u8) -> i16 {
@@ -20,7 +14,7 @@ impl Prep {
         self.debt.get(first).copied().unwrap_or_default()
     }
 
-    /// Prepares `motors`, which the block does not move, to move in this direction. Segments have ticks for them from
+    /// Prepares `motors`, which the line does not move, to move in this direction. A debt that they still have is left. Segments have ticks for them from
     /// here on.
     #[inline(never)]
     #[small]

@@ -251,8 +251,7 @@ impl Planner {
             return;
         }
         let mut target = self.position;
-        let out = self.retract_length();
-        let beside = x.saturating_add(out);
+        let beside = self.beside(x);
         let [to_x, to_y, to_z, ..] = &mut target;
         match part {
             BACK_IN => {
@@ -264,7 +263,7 @@ impl Planner {
             part if part > BACK_IN => (*to_x, *to_y, *to_z) = (x, y, z),
             0 => {
                 self.take_up_changes();
-                *to_x = if out.0 < 0 { beside.min(*to_x) } else { beside.max(*to_x) };
+                *to_x = if beside < x { beside.min(*to_x) } else { beside.max(*to_x) };
             }
             1 => (*to_y, *to_z) = (y, z),
             _ => *to_x = x,
@@ -284,19 +283,26 @@ impl Planner {
         }
     }
 
+    /// Returns where X is when it has left the cut from `x`: within its travel.
+    #[inline(never)]
+    #[small]
+    fn beside(&self, x: Length) -> Length {
+        let end = x.saturating_add(self.retract_length());
+        match Setup::travel(&*self.links.settings.borrow(), X) {
+            Some((low, high)) => end.max(low).min(high),
+            None => end,
+        }
+    }
+
     /// Returns how X leaves the cut, with the limits of the axis as they are now.
     #[inline(never)]
     #[small]
     fn retract(&self) -> Retract {
-        let length = self.retract_length();
-        let settings = self.links.settings.borrow();
         let [x, ..] = self.position;
-        let mut end = x.saturating_add(length).0;
-        if let Some((low, high)) = Setup::travel(&*settings, X) {
-            end = end.max(low.0).min(high.0);
-        }
+        let end = self.beside(x).0;
+        let settings = self.links.settings.borrow();
         // X stays if it is beyond its travel: it would leave the cut through the work.
-        if (end < x.0) != (length.0 < 0) {
+        if (end < x.0) != (self.retract_length().0 < 0) {
             return Retract::NONE;
         }
         let mut retract = Retract::NONE;
@@ -328,7 +334,7 @@ impl Planner {
     /// Waits until the encoder gives the time of a turn, in counts. Returns `None` if the queue is to be dropped, and
     /// an error if the spindle gives no pulse for too long.
     async fn spindle_turns(&self) -> Result<Option<u32>, Status> {
-        let (mut since, mut last) = (millis(), 0);
+        let (mut since, mut most) = (millis(), 0);
         // The power task reads the encoder, and then raises this event.
         wait(self.links.thread, Event::BlockDone, || {
             if self.is_flushed() {
@@ -341,8 +347,9 @@ impl Planner {
             if seen >= ENOUGH && synced && turn != 0 {
                 return Some(Ok(Some(turn)));
             }
-            if seen != last {
-                last = seen;
+            // A spindle that is slower than the encoder can measure never gets beyond a pulse or two.
+            if seen > most {
+                most = seen;
                 if seen < ENOUGH {
                     since = millis();
                 }
