@@ -275,13 +275,19 @@ impl Runner<'_> {
     #[inline(never)]
     #[small]
     fn held(&mut self, out: &mut Snapshot, spindle: &mut Spindle) {
-        spindle::switch(spindle, out, false);
-        machine::drop_if_wanted(|| {
-            // A paused output stays off. A kill switches off all outputs here, because the end of the program, which
-            // would do so too, may have to wait for a door.
-            out.outputs = if machine::is_killing() { 0 } else { spindle::on() };
-            spindle.go_on();
+        // Within a pass the spindle does not pause: axes follow it, or wait for it.
+        if self.machine.thread().is_none() {
             spindle::switch(spindle, out, false);
+        }
+        machine::drop_if_wanted(|| {
+            // When a program is dropped, a paused output stays off. A kill switches off all outputs here, because the
+            // end of the program, which would do so too, may have to wait for a door. The remainder of a pass is
+            // dropped as well, but its program goes on.
+            if machine::is_dropping() || machine::is_alarmed() {
+                out.outputs = if machine::is_killing() { 0 } else { spindle::on() };
+                spindle.go_on();
+                spindle::switch(spindle, out, false);
+            }
             let held = self.machine.drop_all(&mut self.blocks, out);
             stepper::settle(held, &mut out.target);
             if Capability::Lathe.is_built_in() && machine::is_dropping() {
@@ -317,15 +323,19 @@ impl Runner<'_> {
             let turned = if is_backwards { leaving } else { 0 };
             let backwards = core::hint::black_box(waits.backwards & !leaving | turned);
             let mode = Segment::mode_of(moving);
+            // In the taper of a thread X moves already.
+            let stands = waits.increment.get(motor) == Some(&0);
             machine.lead((waits.ticks, waits.period), out, |increment| {
                 // Two pieces, so that a step waits for 31 cycles at most. The first piece moves nothing.
-                segments.amend(back, |segment| {
-                    (segment.backwards, segment.mode) = (backwards, mode);
-                }) && segments.amend(back, |segment| {
-                    if let Some(of) = segment.increment.get_mut(motor) {
-                        *of = increment;
-                    }
-                })
+                stands
+                    && segments.amend(back, |segment| {
+                        (segment.backwards, segment.mode) = (backwards, mode);
+                    })
+                    && segments.amend(back, |segment| {
+                        if let Some(of) = segment.increment.get_mut(motor) {
+                            *of = increment;
+                        }
+                    })
             });
         }
     }

@@ -85,5 +85,6 @@ mod threads;
 mod transcripts;
 mod turning_alarms;
 mod turning_faults;
+mod turning_holds;
 mod watchdog;
 mod wrap;

@@ -2,32 +2,16 @@
 //! from F8 to F13.
 
 use kerf::boards::{Board, MEGA2560_GRBL_LATHE, MEGA2560_LATHE};
-use kerf_sim::mechanics::Build;
 
-use crate::common::turning::{Lathe, STEPS};
+use crate::common::turning::{Lathe, MARKS, RPM, STEPS, driven};
 
 const Z: usize = 1;
 const BOARDS: [&Board; 2] = [&MEGA2560_LATHE, &MEGA2560_GRBL_LATHE];
-const RPM: f64 = 300.0;
 /// Velocity in a thread of 1 mm, mm/s.
 const SPEED: f64 = RPM / 60.0;
-/// Marks of the encoder in a turn.
-const MARKS: u32 = 20;
 /// Depth of a tap, mm.
 const DEEP: f64 = 5.0;
 const TAP: &str = "g33.1 z-5 k1";
-
-/// A lathe whose outputs drive the spindle, which gains or loses 600 turns a minute in a second. The spindle turns.
-fn driven(board: &'static Board) -> Lathe {
-    let mut build = Build::lathe(board, MARKS).unwrap();
-    (build.spindle.rpm, build.spindle.pwm, build.spindle.torque) = (RPM, None, 600.0);
-    let mut lathe = Lathe::of(board, &build, MARKS);
-    lathe.take("m3 s300");
-    lathe.run_for_ms(3_000);
-    lathe.take("g91");
-    lathe.forget();
-    lathe
-}
 
 /// Checks that one exception was reported, by its number or its message, and no other, and that the position is known
 /// to the step.

@@ -56,6 +56,22 @@ impl Cut {
     }
 }
 
+/// Turns a minute of a [driven] spindle, and the marks of its encoder in a turn.
+pub const RPM: f64 = 300.0;
+pub const MARKS: u32 = 20;
+
+/// A lathe whose outputs drive the spindle, which gains or loses 600 turns a minute in a second. The spindle turns.
+pub fn driven(board: &'static Board) -> Lathe {
+    let mut build = Build::lathe(board, MARKS).unwrap();
+    (build.spindle.rpm, build.spindle.pwm, build.spindle.torque) = (RPM, None, 600.0);
+    let mut lathe = Lathe::of(board, &build, MARKS);
+    lathe.take("m3 s300");
+    lathe.run_for_ms(3_000);
+    lathe.take("g91");
+    lathe.forget();
+    lathe
+}
+
 /// Returns the distance between two phases of a lead, mm.
 pub fn apart(one: f64, other: f64, lead: f64) -> f64 {
     let off = (one - other) / lead;
