@@ -2,7 +2,7 @@
 //! the line alone, whatever holds, drops and stops come before.
 
 use kerf::config::StepRatio;
-use kerf::dda::STEP;
+use kerf::dda::{STEP, Segment};
 use kerf::motion::advance::Lead;
 use kerf::motion::block::{Block, QueuedAction};
 use kerf::motion::exec::Step;
@@ -239,6 +239,69 @@ fn travels_and_retractions_have_no_lead() {
         before = position[E];
     }
     assert_eq!((turns, rig.pins.position), (2, rig.target()));
+}
+
+/// A printer whose lead takes long to give up: its extruder is limited to 48 mm/s and 3,000 mm/s^2.
+fn slow_extruder(jerk: [f32; 3], steps: u32) -> Rig {
+    let mut config = printer(jerk[0]);
+    config.velocity[..4].copy_from_slice(&[250.0, 250.0, 12.0, 48.0]);
+    config.accel[..4].copy_from_slice(&[1_000.0, 1_000.0, 100.0, 3_000.0]);
+    config.jerk[..3].copy_from_slice(&jerk);
+    config.ratio = [80, 80, 400, steps].map(|steps| StepRatio { num: steps, den: 10_000 });
+    let mut rig = Rig::new(config);
+    rig.leads = Some(E);
+    let steps = steps as f32;
+    let lead = Lead {
+        motor: E as u8,
+        time: 10_000,
+        accel: Short::new(3_000.0 * steps),
+        velocity: Short::new(48.0 * steps),
+        slack: Lead::slack(steps),
+    };
+    rig.aside(Block::action(QueuedAction::Advance(lead), 0));
+    rig
+}
+
+/// Returns the time of each segment, s, and the velocity of the extruder in it, mm/s.
+fn extruder_speeds(rig: &Rig, steps: f64) -> Vec<(f64, f64)> {
+    let speed = |segment: &Segment| {
+        let time = f64::from(segment.ticks) * f64::from(segment.period) / 16e6;
+        let way = f64::from(segment.increment[E]) * f64::from(segment.ticks) / f64::from(STEP);
+        let way = if segment.backwards & 1 << E != 0 { -way } else { way };
+        (time, way / steps / time)
+    };
+    rig.emitted.iter().map(|emitted| speed(&emitted.segment)).collect()
+}
+
+#[test]
+fn the_extruder_keeps_to_its_acceleration_while_it_gives_up_its_lead() {
+    const FAST: f32 = 33_333.0;
+    let print = ([30.0, 0.0, 0.0, 3.9], 100.0);
+    let ways: [&[To]; 6] = [
+        &[],
+        &[([30.0, 0.14, 0.0, 3.9], 100.0), ([30.2, 0.14, 0.0, 3.89], 100.0)],
+        &[([30.0, 10.0, 0.0, 3.9], 100.0)],
+        &[([30.0, 1.0, 0.0, 3.9], 2.0)],
+        &[([30.0, 0.0, 0.5, 3.9], 12.0)],
+        &[([0.0, 0.0, 0.0, 7.8], 100.0)],
+    ];
+    let jerks = [[0.0; 3], [FAST; 3], [FAST, 50.0, 10.0]];
+    let each = |way| {
+        let jerks = jerks.iter();
+        jerks.flat_map(move |jerk| [93, 420, 840].map(|steps| (way, *jerk, steps)))
+    };
+    for (way, jerk, steps) in ways.into_iter().flat_map(each) {
+        let mut rig = slow_extruder(jerk, steps);
+        let lines = [&[print], way].concat();
+        run(&mut rig, &lines);
+        assert_eq!(rig.pins.position, rig.target());
+        let speeds = extruder_speeds(&rig, f64::from(steps));
+        for pair in speeds.windows(2) {
+            let [(before, from), (time, to)] = pair else { unreachable!() };
+            let most = 3_000.0 * before.max(*time) + 0.5;
+            assert!((to - from).abs() < most, "{way:?}, jerk {jerk:?}, {steps} steps/mm: {pair:?}");
+        }
+    }
 }
 
 #[test]

@@ -19,11 +19,12 @@ use super::block::{Line, PARTS_LOG2};
 use super::divide::quotient;
 use super::float::{below, greater, least, less, lesser, ratio, scaled, size, some, whole};
 use super::short::Short;
+use crate::boards::MOTORS;
 use crate::capability::Capability;
 use crate::config::StepRatio;
 use crate::dda::{STEP, STEP_LOG2};
-use crate::hal::TIMER_HZ;
 use crate::hal::arithmetic::product;
+use crate::hal::{TICKS, TIMER_HZ};
 use crate::math::sqrt;
 use crate::units::Length;
 
@@ -38,6 +39,15 @@ const SHORTEST: f32 = 1e-4;
 const MOST: f32 = 1e9;
 /// A lead so small that it may stay while other motors move, phase units: 1/32 step.
 const LITTLE: u32 = 1 << 10;
+
+/// The highest velocity of the motor with its lead, phase units in 256 CPU cycles: a step in each tick of a segment whose
+/// ticks are as long as those of a usual line may be. At a higher velocity the motor would brake at once where such a
+/// segment begins.
+const RATE_MAX: f32 = STEP as f32 * 256.0 / (2 * TICKS[MOTORS - 1].coarse) as f32;
+
+/// The most that the lead may ask for in a tick, phase units. This is more than a step, which is all that the motor can
+/// make, so that [`Advance::note`] sees a lead that had to stay behind.
+const MOST_PER_TICK: u16 = u16::MAX - 1;
 
 /// [`refine`] stores a distance to 1/32 of the unit in which it is counted. This is the exponent of 32.
 const MORE_LOG2: u8 = 5;
@@ -156,7 +166,7 @@ impl Advance {
             self.motor = lead.motor;
             self.accel = lead.accel;
             self.slack = lead.slack;
-            self.rate = whole(least(lead.velocity.get() * PER_256, 65_535.0)) as u16;
+            self.rate = whole(least(lead.velocity.get() * PER_256, RATE_MAX)) as u16;
         }
         self.on = lead.time != 0 || self.made != 0;
     }
@@ -239,7 +249,7 @@ impl Advance {
         self.pace = if core::mem::take(&mut self.jumps) { 0.0 } else { pace };
     }
 
-    /// Returns how far the lead goes in each of `ticks`, towards its goal, signed; no more than a step.
+    /// Returns how far the lead goes in each of `ticks`, towards its goal, signed; no more than [`MOST_PER_TICK`].
     #[inline(never)]
     pub fn travel(&mut self, ticks: u16, period: u16) -> i32 {
         let want = self.goal - self.made;
@@ -260,13 +270,14 @@ impl Advance {
         let accel = scaled(self.accel.get(), STEP_LOG2 as i8);
         let gain = accel * time;
         let (slow, fast) = (speed - gain, speed + gain);
-        let next = if less(fast * time, far) {
+        let next = if less(gain * time, far) {
             // The speed from which the lead can stop at its goal by losing at most `gain` in each later segment.
-            lesser(sqrt(gain * gain + 2.0 * accel * far) - gain, fast)
+            sqrt(gain * gain + 2.0 * accel * far) - gain
         } else {
+            // The goal is reached at a speed of `gain` at most, because the lead stops there.
             ratio(far, time)
         };
-        self.speed = self.pace + turned(greater(next, slow), late);
+        self.speed = self.pace + turned(greater(lesser(next, fast), slow), late);
         per_tick(rounded(self.speed * time), ticks)
     }
 
@@ -335,11 +346,11 @@ fn rounded(x: f32) -> i32 {
     if x.is_sign_negative() { -size } else { size }
 }
 
-/// Returns a distance divided by `ticks`, rounded, and no more than a step.
+/// Returns a distance divided by `ticks`, rounded, and no more than [`MOST_PER_TICK`].
 #[inline(never)]
 #[small]
 fn per_tick(way: i32, ticks: u16) -> i32 {
-    let size = way.unsigned_abs().min(product(ticks, STEP));
+    let size = way.unsigned_abs().min(product(ticks, MOST_PER_TICK));
     let part = i32::from(quotient(size + u32::from(ticks / 2), ticks));
     if way < 0 { -part } else { part }
 }
@@ -446,9 +457,40 @@ mod tests {
     }
 
     #[test]
-    fn parts_are_rounded_and_within_a_step() {
+    fn a_lead_that_few_ticks_held_back_goes_on_from_its_speed() {
+        let mut advance = advance();
+        (advance.made, advance.goal) = (1_000 * i32::from(STEP), 0);
+        advance.speed = -4_400.0 * f32::from(STEP);
+        // Five ticks of 0.4 ms, in each of which the motor makes a step: 2,500 steps/s.
+        let more = advance.travel(5, 6_400);
+        advance.note(-i32::from(STEP), more, (5, 6_400));
+        let before = advance.made;
+        let more = advance.travel(TICKS, PERIOD);
+        advance.note(more, more, (TICKS, PERIOD));
+        let way = f64::from(before - advance.made) / f64::from(STEP);
+        // 2 ms at 2,500 steps/s, and 89,000 steps/s^2 for 2 ms.
+        assert!((way - 5.36).abs() < 0.03, "{way}");
+    }
+
+    #[test]
+    fn a_lead_stops_at_its_goal_within_its_acceleration() {
+        for steps in 1..200 {
+            let mut advance = advance();
+            advance.made = steps * i32::from(STEP) / 3;
+            let leads = run(&mut advance, 60);
+            let mut before = (f64::from(steps) / 3.0, 0.0);
+            for lead in leads {
+                let way = lead - before.0;
+                assert!((way - before.1).abs() < 0.36 + 0.01, "{steps}: {way} behind {}", before.1);
+                before = (lead, way);
+            }
+        }
+    }
+
+    #[test]
+    fn parts_are_rounded_and_within_their_limit() {
         assert_eq!([63, 32, 31, -32, -31].map(|way| per_tick(way, 64)), [1, 1, 0, -1, 0]);
-        assert_eq!(per_tick(i32::MAX, 2_000), STEP.into());
-        assert_eq!(per_tick(-i32::MAX, 1), -i32::from(STEP));
+        assert_eq!(per_tick(i32::MAX, 2_000), MOST_PER_TICK.into());
+        assert_eq!(per_tick(-i32::MAX, 1), -i32::from(MOST_PER_TICK));
     }
 }

@@ -34,7 +34,8 @@
 //!
 //! **Pressure advance.** An extruder is ahead of its line by its lead ([`advance`](super::advance)). The lead is added
 //! to segments that are otherwise complete, and is counted separately. So the rules above hold for the line without the
-//! lead, and at a standstill there is no lead ([`Prep::relax`]).
+//! lead, and at a standstill there is no lead ([`Prep::relax`]). A motor makes one step in a tick at most. An exact end
+//! therefore has no long ticks while there is a lead: they would stop the extruder.
 //!
 //! Cost on AVR: 600 cycles a segment and 200 for each motor that moves; 400 for `begin`, and 300 for each
 //! motor when `k` changes.
@@ -414,7 +415,7 @@ impl Prep {
         let (mut fine, mut shift) = coarsen(left, limit);
         if exact && left < u32::from(STEP) {
             let fits = left.trailing_zeros() as u8;
-            if fits > shift {
+            if fits > shift && !self.leads() {
                 // The remainder, in no more ticks than necessary.
                 (fine, shift) = (finer(left, fits), fits);
             }
