@@ -5,7 +5,7 @@
 //! other output may come first.
 
 use super::command;
-use super::frame::{Fault, Frame, Session};
+use super::frame::{Fault, Frame, Session, Sum};
 use super::host::{self, Code, Step};
 use super::status::{is_passed_over, is_unknown, reason};
 use super::write::{cold, int, line_end, text};
@@ -70,13 +70,20 @@ impl Request {
     /// Starts to answer a line that could not be kept, or was dropped.
     #[small]
     pub(super) fn refused(status: Status, line: &[u8], session: &mut Session) -> Self {
-        let frame = Frame::of(line);
-        let code = command::code(frame.block.of(line));
-        let is_whole = !matches!(status, Status::BufferFull | Status::InputTooLong);
-        let what = match is_whole.then(|| take(&frame, code, line, session)) {
-            Some(Err(fault)) => What::Resend(fault, session.last),
-            None if session.sums => What::Resend(Fault::Sum, session.last),
-            _ => What::Refused(status),
+        let mut frame = Frame::of(line);
+        let taken = match status {
+            Status::InputTooLong if frame.number.is_some() => {
+                // The end of the line, with the checksum, has not been kept.
+                frame.sum = if session.sums { Sum::Right } else { Sum::None };
+                session.take(&frame, None, false)
+            }
+            Status::InputTooLong | Status::BufferFull if session.sums => Err(Fault::Sum),
+            Status::InputTooLong | Status::BufferFull => Ok(()),
+            _ => take(&frame, command::code(frame.block.of(line)), line, session),
+        };
+        let what = match taken {
+            Err(fault) => What::Resend(fault, session.last),
+            Ok(()) => What::Refused(status),
         };
         Self { what, at: 0, block: frame.block, begun: false, silent: false }
     }

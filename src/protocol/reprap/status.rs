@@ -22,7 +22,9 @@ pub fn is_unknown(status: Status) -> bool {
 #[inline(never)]
 #[small]
 pub fn is_passed_over(status: Status, block: &[u8]) -> bool {
-    let moves = block.first().is_none_or(|letter| matches!(letter & !0x20, b'G' | b'X'..=b'Z'));
+    // A move may stand behind a comment.
+    let may_move = |letter: &u8| matches!(letter & !0x20, b'G' | b'X'..=b'Z') || *letter == b'(';
+    let moves = block.first().is_none_or(may_move);
     let of_words = Status::CardError as u8..=Status::WordConflict as u8;
     !moves && of_words.contains(&(status as u8)) && status != Status::AboveMaximum
 }
