@@ -67,22 +67,56 @@ pub fn words(block: &[u8]) -> &[u8] {
 #[inline(never)]
 #[small]
 pub fn has(block: &[u8], letter: u8) -> bool {
-    without_comment(block).iter().any(|byte| byte.to_ascii_uppercase() == letter)
+    behind(block, letter).is_some()
 }
 
-/// Returns the text behind the code of a block, up to a comment.
+/// Returns the text behind a letter that is in no comment.
+#[inline(never)]
 #[small]
-fn without_comment(block: &[u8]) -> &[u8] {
-    words(block).split(|byte| *byte == b';').next().unwrap_or(&[])
+fn behind(block: &[u8], letter: u8) -> Option<&[u8]> {
+    let mut bytes = Bytes::of(words(block));
+    bytes.find(|byte| byte.to_ascii_uppercase() == letter)?;
+    Some(bytes.rest)
+}
+
+/// The bytes of a text that are in no comment. Parentheses count as outside.
+pub struct Bytes<'a> {
+    rest: &'a [u8],
+    in_comment: bool,
+}
+
+impl<'a> Bytes<'a> {
+    pub fn of(text: &'a [u8]) -> Self {
+        Self { rest: text, in_comment: false }
+    }
+}
+
+impl Iterator for Bytes<'_> {
+    type Item = u8;
+
+    #[inline(never)]
+    #[small]
+    fn next(&mut self) -> Option<u8> {
+        loop {
+            let (byte, rest) = self.rest.split_first()?;
+            self.rest = rest;
+            match byte {
+                b')' => self.in_comment = false,
+                _ if self.in_comment => continue,
+                b';' => return None,
+                b'(' => self.in_comment = true,
+                _ => {}
+            }
+            return Some(*byte);
+        }
+    }
 }
 
 /// Returns the number behind a letter; `None` if there is none.
 #[inline(never)]
 #[small]
 pub fn number(block: &[u8], letter: u8) -> Option<Number> {
-    let text = without_comment(block);
-    let at = text.iter().position(|byte| byte.to_ascii_uppercase() == letter)?;
-    let text = text.get(at + 1..)?.trim_ascii_start();
+    let text = behind(block, letter)?.trim_ascii_start();
     let is_digit = |byte: &u8| matches!(byte, b'0'..=b'9' | b'.' | b'-');
     let end = text.iter().position(|byte| !is_digit(byte)).unwrap_or(text.len());
     Number::parse(text.get(..end)?)
@@ -109,6 +143,12 @@ mod tests {
             assert_eq!(code(none.as_bytes()), None, "{none}");
         }
         assert!(has(b"G28 x Y", b'X') && !has(b"G28 X ; Z", b'Z'));
+        let comments = b"G28 (home all axes) Y (; Z 3) S5 ; M110";
+        for (letter, is_word) in [(b'Y', true), (b'S', true), (b'H', false), (b'X', false)] {
+            assert_eq!(has(comments, letter), is_word);
+        }
+        assert_eq!((value(comments, b'Z', 0), value(comments, b'S', 0)), (None, Some(5)));
+        assert!(!has(b"G28 (X Y", b'Y') && !has(comments, b'M'));
         assert_eq!(value(b"M207 S1.5 F1800", b'S', 4), Some(15_000));
         assert_eq!(value(b"M207 S-1.5", b'S', 4), Some(-15_000));
         assert_eq!(value(b"M207 S", b'S', 4), None);
