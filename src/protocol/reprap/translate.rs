@@ -47,7 +47,7 @@ fn time_ms(block: &[u8]) -> Option<i32> {
 }
 
 fn has_words(block: &[u8]) -> bool {
-    command::words(block).first().is_some_and(|byte| *byte != b';')
+    command::Bytes::of(command::words(block)).any(|byte| byte.is_ascii_alphabetic())
 }
 
 /// Writes `G4 P` with the time in seconds, and none of the block's other words.
@@ -72,14 +72,10 @@ fn put(out: &mut Rewritten, text: &[u8]) -> Result<(), Status> {
     out.extend_from_slice(text).map_err(|_| Status::InputTooLong)
 }
 
-/// Copies words up to a semicolon. Cost on AVR: 30 cycles a byte.
+/// Copies words, without the text of comments. Cost on AVR: 50 cycles a byte.
 fn copy(text: &[u8], out: &mut Rewritten) -> Result<(), Status> {
-    for byte in text {
-        let byte = match byte {
-            b';' => break,
-            b'E' | b'e' => b'A',
-            byte => *byte,
-        };
+    for byte in command::Bytes::of(text) {
+        let byte = if matches!(byte, b'E' | b'e') { b'A' } else { byte };
         out.push(byte).map_err(|_| Status::InputTooLong)?;
     }
     Ok(())
@@ -99,6 +95,9 @@ mod tests {
             ("G4 P500", "G4P0000000.500"),
             ("G4 S2", "G4P0000002.000"),
             ("G4", "G4P0000000.000"),
+            ("G92 (E is 0)", "G92X0Y0Z0A0"),
+            ("G1 X1 (outer; E5) E1 (", "G1 X1 () A1 ("),
+            ("G4 (S 1) P500", "G4P0000000.500"),
             ("M0 Turn the part", "M0"),
             ("M1 S3", "G4P0000003.000"),
             ("G90", "G90"),
