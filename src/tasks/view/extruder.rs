@@ -20,6 +20,9 @@ const OVERSHOOT: u16 = 80;
 #[inline(always)]
 pub(super) fn extruder(view: &mut View<'_>, what: Extruder) -> Status {
     let (links, alarm) = (view.links, machine::alarm());
+    if !view.may_feed() {
+        return Status::Muted;
+    }
     let mut model = links.model.borrow_mut();
     match what {
         Extruder::Relative(relative) => model.set_relative(relative),
