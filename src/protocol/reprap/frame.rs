@@ -13,8 +13,8 @@ use crate::protocol::Span;
 pub struct Session {
     /// The number of the last line in order.
     pub last: i32,
-    /// The number of a line that has overtaken those before it, and does not come again.
-    ahead: i32,
+    /// Lines that have overtaken those before them, and do not come again: bit n is line `last` + 1 + n.
+    ahead: u16,
     /// Whether a line with a number and a right checksum has been received.
     pub sums: bool,
     /// The number of lines begun, modulo 256.
@@ -162,32 +162,35 @@ impl Session {
         if counts && frame.sum == Sum::Wrong {
             return Err(Fault::Sum);
         }
-        let Some(number) = frame.number else {
-            if let Some(set) = sets {
-                self.last = set;
-            } else if frame.numbered || (counts && frame.sum == Sum::Right) {
-                return Err(Fault::Number);
-            }
-            return Ok(());
-        };
-        if frame.sum == Sum::None && self.sums {
+        if frame.number.is_some() && frame.sum == Sum::None && self.sums {
             return Err(Fault::NoSum);
         }
         if let Some(set) = sets {
-            self.last = set;
-            self.ahead = 0;
-        } else if number == self.last.wrapping_add(1) {
-            self.last = number;
-        } else if overtakes && number > self.last {
-            self.ahead = number;
-        } else {
+            (self.last, self.ahead) = (set, 0);
+        } else if let Some(number) = frame.number {
+            self.count(number, overtakes)?;
+        } else if frame.numbered || (counts && frame.sum == Sum::Right) {
             return Err(Fault::Number);
         }
-        if self.ahead != 0 && self.ahead == self.last.wrapping_add(1) {
-            self.last = self.ahead;
-            self.ahead = 0;
+        self.sums |= frame.number.is_some() && frame.sum == Sum::Right;
+        Ok(())
+    }
+
+    /// Counts the number of a line. A line that `overtakes` may have a later number than the next one.
+    fn count(&mut self, number: i32, overtakes: bool) -> Result<(), Fault> {
+        let bit = match number.wrapping_sub(self.last) {
+            1 => 1,
+            by @ 2..=16 if overtakes => 1 << (by - 1),
+            _ => 0,
+        };
+        if bit == 0 || self.ahead & bit != 0 {
+            return Err(Fault::Number);
         }
-        self.sums |= frame.sum == Sum::Right;
+        self.ahead |= bit;
+        while self.ahead & 1 != 0 {
+            self.last = self.last.wrapping_add(1);
+            self.ahead >>= 1;
+        }
         Ok(())
     }
 }
@@ -303,6 +306,35 @@ mod tests {
     }
 
     #[test]
+    fn lines_that_overtake_are_taken_once() {
+        let mut session = Session { last: 5, ..Session::default() };
+        let mut take = |number, sets, overtakes| {
+            let frame = Frame { number, numbered: true, sum: Sum::Right, block: Span::default() };
+            session.take(&frame, sets, overtakes)
+        };
+        for overtaking in [7, 9, 8, 21] {
+            assert_eq!(take(Some(overtaking), None, true), Ok(()), "{overtaking}");
+        }
+        for refused in [7, 9, 5, 22] {
+            assert_eq!(take(Some(refused), None, true), Err(Fault::Number), "{refused}");
+        }
+        assert_eq!(take(Some(6), None, false), Ok(()));
+        for again in 7..=9 {
+            assert_eq!(take(Some(again), None, false), Err(Fault::Number), "{again}");
+        }
+        assert_eq!(take(Some(10), None, false), Ok(()));
+        assert_eq!(take(Some(12), None, true), Ok(()));
+        // M110, with a line number or without, begins anew.
+        for number in [Some(20), None] {
+            assert_eq!(take(number, Some(10), false), Ok(()));
+            for next in 11..=13 {
+                assert_eq!(take(Some(next), None, false), Ok(()), "{next}");
+            }
+            assert_eq!(take(Some(15), None, true), Ok(()));
+        }
+    }
+
+    #[test]
     fn usual_lines_are_taken_as_others_are() {
         let with_sum = |text: &str| {
             let sum = text.bytes().fold(0, |sum, byte| sum ^ byte);
@@ -333,7 +365,7 @@ mod tests {
             "",
         ];
         lines.extend(others.map(std::string::String::from));
-        for (ahead, sums) in [(0, false), (0, true), (9, true)] {
+        for (ahead, sums) in [(0, false), (0, true), (4, true)] {
             let before = Session { last: 6, ahead, sums, lines: 255 };
             let mut usual_ones = 0;
             for line in &lines {
