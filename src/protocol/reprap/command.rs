@@ -13,12 +13,11 @@ pub fn code(block: &[u8]) -> Option<(u8, u16)> {
     if !matches!(letter, b'G' | b'M' | b'T') {
         return None;
     }
-    let rest = rest.trim_ascii_start();
-    let digits = rest.iter().position(|byte| !byte.is_ascii_digit()).unwrap_or(rest.len());
-    if rest.get(digits) == Some(&b'.') {
+    let (digits, rest) = split_digits(rest);
+    if rest.first() == Some(&b'.') {
         return None;
     }
-    let number = integer(rest.get(..digits)?)?;
+    let number = integer(digits)?;
     Some((letter, u16::try_from(number).ok()?))
 }
 
@@ -58,9 +57,16 @@ pub fn waits(code: Option<(u8, u16)>) -> bool {
 #[inline(never)]
 #[small]
 pub fn words(block: &[u8]) -> &[u8] {
-    let rest = block.get(1..).unwrap_or(&[]).trim_ascii_start();
-    let digits = rest.iter().position(|byte| !byte.is_ascii_digit()).unwrap_or(rest.len());
-    rest.get(digits..).unwrap_or(&[]).trim_ascii()
+    split_digits(block.get(1..).unwrap_or(&[])).1.trim_ascii()
+}
+
+/// Splits a text behind its leading digits. Blanks at the ends of the text are left out.
+#[inline(never)]
+#[small]
+pub fn split_digits(text: &[u8]) -> (&[u8], &[u8]) {
+    let text = text.trim_ascii();
+    let end = text.iter().position(|byte| !byte.is_ascii_digit()).unwrap_or(text.len());
+    text.split_at_checked(end).unwrap_or((text, &[]))
 }
 
 /// Whether a block has a word with this letter behind its code.
@@ -116,7 +122,7 @@ impl Iterator for Bytes<'_> {
 #[inline(never)]
 #[small]
 pub fn number(block: &[u8], letter: u8) -> Option<Number> {
-    let text = behind(block, letter)?.trim_ascii_start();
+    let text = behind(block, letter)?.trim_ascii();
     let is_digit = |byte: &u8| matches!(byte, b'0'..=b'9' | b'.' | b'-');
     let end = text.iter().position(|byte| !is_digit(byte)).unwrap_or(text.len());
     Number::parse(text.get(..end)?)

@@ -6,6 +6,7 @@
 //! error may have changed the other. A line is also damaged if its number cannot be read, or if it has a byte 0,
 //! which does not change the checksum.
 
+use super::command::split_digits;
 use crate::protocol::Span;
 
 /// What a port keeps about its sender.
@@ -33,6 +34,19 @@ pub enum Sum {
     Right,
     /// The checksum does not match.
     Wrong,
+}
+
+impl Sum {
+    /// Compares the checksum of a text with the stated one, which begins with an asterisk.
+    fn of(text: &[u8], stated: &[u8]) -> Self {
+        let (mut sum, mut has_zero) = (0, false);
+        for byte in text {
+            sum ^= byte;
+            has_zero |= *byte == 0;
+        }
+        let stated = stated.get(1..).and_then(|digits| integer(digits.trim_ascii()));
+        if stated == Some(sum.into()) && !has_zero { Self::Right } else { Self::Wrong }
+    }
 }
 
 /// The parts of a line.
@@ -65,51 +79,28 @@ impl Frame {
     #[small]
     pub fn of(line: &[u8]) -> Self {
         let star = asterisk(line);
-        let mut end = star.unwrap_or(line.len());
-        let sum = match star {
-            None => Sum::None,
-            Some(at) => {
-                let (text, stated) = line.split_at_checked(at).unwrap_or((line, &[]));
-                let (mut sum, mut has_zero) = (0, false);
-                for byte in text {
-                    sum ^= byte;
-                    has_zero |= *byte == 0;
-                }
-                let stated = stated.get(1..).and_then(|digits| integer(digits.trim_ascii()));
-                let whole = stated == Some(sum.into()) && !has_zero;
-                if whole { Sum::Right } else { Sum::Wrong }
-            }
-        };
-        let blank = |at: usize| line.get(at).is_some_and(u8::is_ascii_whitespace);
-        let mut start = 0;
-        while start < end && blank(start) {
-            start += 1;
-        }
+        let (text, stated) =
+            line.split_at_checked(star.unwrap_or(line.len())).unwrap_or((line, &[]));
+        let sum = if star.is_some() { Sum::of(text, stated) } else { Sum::None };
+        let mut rest = text.trim_ascii();
         let mut number = None;
-        let numbered = matches!(line.get(start), Some(b'N' | b'n'));
+        let numbered = matches!(rest.first(), Some(b'N' | b'n'));
         if numbered {
-            let mut behind = start + 1;
-            while behind < end && blank(behind) {
-                behind += 1;
+            let signed = rest.get(1..).unwrap_or(&[]).trim_ascii();
+            let unsigned = signed.strip_prefix(b"-");
+            let (digits, behind) = split_digits(unsigned.unwrap_or(signed));
+            // A number with a fraction, or with a sign inside, is not a line number.
+            if !matches!(behind.first(), Some(b'.' | b'-')) {
+                number =
+                    integer(digits).map(|number| if unsigned.is_some() { -number } else { number });
             }
-            let first = behind;
-            while behind < end && line.get(behind).is_some_and(|b| b.is_ascii_digit() || *b == b'-')
-            {
-                behind += 1;
-            }
-            // A number with a fraction is not a line number.
-            let ends = line.get(behind) != Some(&b'.');
-            number = line.get(first..behind).filter(|_| ends).and_then(integer);
             if number.is_some() {
-                start = behind;
+                rest = behind;
             }
         }
-        while start < end && blank(start) {
-            start += 1;
-        }
-        while start < end && blank(end - 1) {
-            end -= 1;
-        }
+        let rest = rest.trim_ascii();
+        let start = rest.as_ptr().addr().wrapping_sub(line.as_ptr().addr());
+        let end = start.wrapping_add(rest.len());
         Self { number, numbered, sum, block: Span { start: start as u8, end: end as u8 } }
     }
 
@@ -126,20 +117,16 @@ impl Frame {
 /// other bytes may follow it, because the checksum may be damaged.
 fn asterisk(line: &[u8]) -> Option<usize> {
     let at = line.iter().rposition(|byte| *byte == b'*')?;
-    let behind = line.get(at + 1..).unwrap_or(&[]).trim_ascii();
-    let numbered = matches!(line.trim_ascii_start().first(), Some(b'N' | b'n'));
-    let digits = !behind.is_empty() && behind.iter().all(u8::is_ascii_digit);
-    (digits || numbered).then_some(at)
+    let (digits, behind) = split_digits(line.get(at + 1..).unwrap_or(&[]));
+    let numbered = matches!(line.trim_ascii().first(), Some(b'N' | b'n'));
+    let ends = !digits.is_empty() && behind.is_empty();
+    (ends || numbered).then_some(at)
 }
 
-/// Parses digits with an optional minus sign; `None` for other text or a number that is too large.
+/// Parses digits; `None` for other text or a number that is too large.
 #[inline(never)]
 #[small]
-pub fn integer(text: &[u8]) -> Option<i32> {
-    let (digits, negative) = match text.split_first() {
-        Some((b'-', rest)) => (rest, true),
-        _ => (text, false),
-    };
+pub fn integer(digits: &[u8]) -> Option<i32> {
     let mut value = 0i32;
     for byte in digits {
         let digit = byte.wrapping_sub(b'0');
@@ -148,7 +135,7 @@ pub fn integer(text: &[u8]) -> Option<i32> {
         }
         value = value * 10 + i32::from(digit);
     }
-    (!digits.is_empty()).then_some(if negative { -value } else { value })
+    (!digits.is_empty()).then_some(value)
 }
 
 #[small]
@@ -273,6 +260,9 @@ mod tests {
     fn numbers_and_checksums() {
         assert_eq!(parts("N-1 M110 N-1*125"), (Some(-1), Sum::Right, "M110 N-1"));
         assert_eq!(parts("N0 M110 N0*125"), (Some(0), Sum::Right, "M110 N0"));
+        assert_eq!(parts("N -7 G1\t"), (Some(-7), Sum::None, "G1"));
+        assert_eq!(parts("N--7 G1"), (None, Sum::None, "N--7 G1"));
+        assert_eq!(parts("N5-3 G1"), (None, Sum::None, "N5-3 G1"));
         assert_eq!(parts(" n2G28 *18 "), (Some(2), Sum::Wrong, "G28"));
         assert_eq!(parts("N2 G28*17"), (Some(2), Sum::Right, "G28"));
         assert_eq!(parts("N2 G28*1j"), (Some(2), Sum::Wrong, "G28"));
