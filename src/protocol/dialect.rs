@@ -171,7 +171,8 @@ pub trait Answers {
 
     /// Whether the next step needs the machine at rest. Until then the line waits as G-code does, and other lines
     /// overtake it.
-    fn awaits_rest(&self) -> bool {
+    fn awaits_rest(&self, line: &[u8]) -> bool {
+        let _ = line;
         false
     }
 }
@@ -509,10 +510,10 @@ macro_rules! dialects {
             }
 
             #[inline(always)]
-            fn awaits_rest(&self) -> bool {
+            fn awaits_rest(&self, line: &[u8]) -> bool {
                 match self {
                     $(#[cfg(feature = $feature)]
-                    Self::$name(request) => request.awaits_rest(),)+
+                    Self::$name(request) => request.awaits_rest(line),)+
                 }
             }
 

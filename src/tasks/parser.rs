@@ -542,7 +542,7 @@ fn begin(
         request.ran(status, commented);
     }
     let feeds = port.number == links.feeder.get();
-    if request.awaits_rest() && feeds && is_working(links) {
+    if request.awaits_rest(line) && feeds && is_working(links) {
         port.speech.set(before);
         *deferred = if gcode.is_some() { Deferred::Answer } else { Deferred::Line };
         return Begun::Again;

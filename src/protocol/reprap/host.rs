@@ -136,6 +136,17 @@ pub fn part(
     }
 }
 
+/// Whether a code is performed at rest.
+#[small]
+pub fn needs_rest(code: Code, block: &[u8]) -> bool {
+    match code {
+        (b'M', 18 | 84 | 400 | 420 | 502) | (b'G', 28 | 29 | 161 | 162) => true,
+        (b'M', 92 | 201 | 203 | 206) => !words(block).is_empty(),
+        (b'M', 205) => has(block, b'J'),
+        _ => false,
+    }
+}
+
 /// M400: waits until all requested motion is done, or an alarm has dropped it.
 #[small]
 fn finished(machine: &mut impl Machine) -> Step {

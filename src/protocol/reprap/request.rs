@@ -180,8 +180,11 @@ impl Answers for Request {
 
     #[inline(never)]
     #[small]
-    fn awaits_rest(&self) -> bool {
-        matches!(self.what, What::Host((b'M', 18 | 84 | 400) | (b'G', 28 | 161 | 162)))
+    fn awaits_rest(&self, line: &[u8]) -> bool {
+        match self.what {
+            What::Host(code) => host::needs_rest(code, self.block.of(line)),
+            _ => false,
+        }
     }
 }
 
