@@ -128,6 +128,8 @@ pub fn part(
             Status::Again => Step::Later(0),
             Status::Ok => {
                 machine.unlock_heaters();
+                // The alarm may have dropped the retraction.
+                machine.memory().reprap.retracted = false;
                 Step::Done
             }
             status => Step::Refused(status),
