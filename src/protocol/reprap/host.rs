@@ -92,6 +92,9 @@ pub fn part(
             machine.go_on();
             Step::Done
         }
+        110 if has(block, b'N') && value(block, b'N', 0).is_none() => {
+            Step::Refused(Status::OutOfRange)
+        }
         112 => {
             machine.alarm(Alarm::Shutdown);
             Step::Refused(Status::ShutDown)

@@ -127,7 +127,7 @@ pub fn list(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Option<u8
     (heats || usize::from(row) + 1 < LISTED.len()).then_some((row + 1) << 2)
 }
 
-/// Sets the values that a code names, axis by axis; reports them if it names none.
+/// Sets the values that a code names, axis by axis, after all of them have been checked; reports them if it names none.
 #[inline(never)]
 #[small]
 pub fn set(
@@ -137,7 +137,8 @@ pub fn set(
     machine: &mut impl Machine,
     out: &mut impl Out,
 ) -> Step {
-    const TELLS: u8 = 8;
+    const SETS: u8 = LETTERS.len() as u8;
+    const TELLS: u8 = 2 * SETS + 1;
     if matches!(code, 202 | 204) {
         // An axis has a single acceleration, set by M201.
         return Step::Done;
@@ -147,14 +148,15 @@ pub fn set(
         return if more { Step::At(at + 1) } else { Step::Done };
     }
     let word = |axis| number(block, letter(code, axis));
-    if at == 0 && !(0..LETTERS.len() as u8).any(|axis| word(axis).is_some()) {
+    if at == 0 && !(0..SETS).any(|axis| word(axis).is_some()) {
         return Step::At(TELLS);
     }
-    if usize::from(at) >= LETTERS.len() {
+    if at >= 2 * SETS {
         return Step::Done;
     }
-    let Some(to) = word(at) else { return Step::Later(at + 1) };
-    match set_axis(code, at, to, machine) {
+    let axis = at % SETS;
+    let Some(to) = word(axis) else { return Step::Later(at + 1) };
+    match set_axis(code, axis, to, at >= SETS, machine) {
         Ok(()) => Step::Later(at + 1),
         // Settings of motors can only change at rest.
         Err(Status::Again) => Step::Later(at),
@@ -162,34 +164,44 @@ pub fn set(
     }
 }
 
+/// Checks the value of a code on an axis, and sets it if `puts`.
 #[inline(never)]
 #[small]
-fn set_axis(code: u16, axis: u8, to: Number, machine: &mut impl Machine) -> Result<(), Status> {
+fn set_axis(
+    code: u16,
+    axis: u8,
+    to: Number,
+    puts: bool,
+    machine: &mut impl Machine,
+) -> Result<(), Status> {
     if machine.value(crate::protocol::Value::Working) != 0 {
         return Err(Status::Again);
     }
     match code {
-        92 => set_steps(axis, to, machine, |machine, turn, to| match machine.setting(turn) == to {
-            true => Ok(()),
-            false => machine.set(turn, to).map(|_| ()),
+        92 => set_steps(axis, to, machine, |machine, turn, to| {
+            if puts && machine.setting(turn) != to {
+                machine.set(turn, to)?;
+            }
+            Ok(())
         }),
         203 => {
             // M203 is in mm/s.
             let by_second = to.fixed(3, false).filter(|to| (0..=i32::MAX / 60).contains(to));
             let by_second = by_second.ok_or(Status::OutOfRange)?;
             let to = Number::int(by_second.unsigned_abs() * 60).thousandth();
-            put_number(machine, Owner::Axis(axis), token("vm"), to)?;
-            put_number(machine, Owner::Axis(axis), token("fr"), to)
+            put_number(machine, Owner::Axis(axis), token("vm"), to, puts)?;
+            put_number(machine, Owner::Axis(axis), token("fr"), to, puts)
         }
-        201 => put_number(machine, Owner::Axis(axis), token("ac"), to),
-        205 => put_number(machine, Owner::Axis(axis), token("jd"), to),
+        201 => put_number(machine, Owner::Axis(axis), token("ac"), to, puts),
+        205 => put_number(machine, Owner::Axis(axis), token("jd"), to, puts),
         _ => {
             let to = to.fixed(4, false).ok_or(Status::OutOfRange)?;
-            machine.set_row(TableRow::system(0), axis, Length(to))
+            if puts { machine.set_row(TableRow::system(0), axis, Length(to)) } else { Ok(()) }
         }
     }
 }
 
+/// Checks the value of a setting, and sets it if `puts`.
 #[inline(never)]
 #[small]
 pub fn put_number(
@@ -197,8 +209,12 @@ pub fn put_number(
     owner: Owner,
     token: [u8; 4],
     to: Number,
+    puts: bool,
 ) -> Result<(), Status> {
     let setting = named(owner, token).ok_or(Status::UnrecognizedName)?;
     let value = machine.settings().check(setting, to, false)?;
-    machine.set(setting, value).map(|_| ())
+    if puts {
+        machine.set(setting, value)?;
+    }
+    Ok(())
 }

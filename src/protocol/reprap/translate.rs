@@ -54,9 +54,14 @@ fn has_words(block: &[u8]) -> bool {
 #[inline(never)]
 #[small]
 fn dwell(block: &[u8], out: &mut Rewritten) -> Result<(), Status> {
-    let ms = time_ms(block).unwrap_or(0).max(0) as u32;
+    let ms = match time_ms(block) {
+        None if command::has(block, b'S') || command::has(block, b'P') => {
+            return Err(Status::OutOfRange);
+        }
+        ms => ms.unwrap_or(0).max(0),
+    };
     put(out, b"G4P")?;
-    let (mut rest, mut divisor) = (ms, 1_000_000_000u32);
+    let (mut rest, mut divisor) = (ms as u32, 1_000_000_000u32);
     while divisor > 0 {
         if divisor == 100 {
             put(out, b".")?;

@@ -169,7 +169,7 @@ pub fn set_teacup(
     let Some(to) = u32::try_from(to).ok().and_then(|to| to.checked_mul(factor)) else {
         return Step::Refused(Status::OutOfRange);
     };
-    match put_number(machine, owner(bed), name(letter), Number::int(to / 10).thousandth()) {
+    match put_number(machine, owner(bed), name(letter), Number::int(to / 10).thousandth(), true) {
         Ok(()) => Step::Done,
         Err(Status::Again) => Step::Later(0),
         Err(status) => Step::Refused(status),
@@ -194,7 +194,7 @@ pub fn set(
     }
     let Some(letter) = LETTERS.get(usize::from(at)) else { return Step::Done };
     let Some(to) = number(block, *letter) else { return Step::Later(at + 1) };
-    match put_number(machine, owner(bed), name(at), to) {
+    match put_number(machine, owner(bed), name(at), to, true) {
         Ok(()) => Step::Later(at + 1),
         Err(Status::Again) => Step::Later(at),
         Err(status) => Step::Refused(status),
