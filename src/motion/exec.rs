@@ -23,7 +23,7 @@
 mod spindle;
 
 use super::block::{Block, Body, Line, QueuedAction};
-use super::float::{below, greater, scaled, some, whole};
+use super::float::{below, greater, lesser, scaled, some, whole};
 use super::governor::{Ahead, Governor, Stretch, same};
 use super::prep::{CYCLES_MAX, FINE_LOG2, Prep};
 use super::queue::{BlockSource, Constraint};
@@ -715,10 +715,8 @@ fn rounded(left: &mut f32, stretch: &Stretch) -> u32 {
     if !some(stretch.distance) {
         return cycles_of(stretch.seconds);
     }
-    *left -= stretch.distance;
-    if *left >= before {
-        *left = f32::from_bits(before.to_bits() - 1);
-    }
+    let bit = f32::from_bits(before.to_bits() - 1);
+    *left = lesser(before - stretch.distance, bit);
     cycles_of(stretch.seconds * ((before - *left) / stretch.distance))
 }
 
