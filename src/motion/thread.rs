@@ -135,6 +135,9 @@ pub struct Thread {
     end: u32,
     /// Whether an index has come since the last call of [`Thread::error`].
     indexed: bool,
+    /// Whether there was a pulse too many, and no index has come since at which the count was right. Further pulses that
+    /// come early are those of a spindle that has become faster.
+    strayed: bool,
     kind: Kind,
 }
 
@@ -188,6 +191,7 @@ impl Thread {
             short: 0,
             end: 0,
             indexed: false,
+            strayed: false,
             kind: Kind::NONE,
         }
     }
@@ -331,7 +335,7 @@ impl Thread {
                 self.expected = at_index;
                 self.pulses = if per_turn == 1 { count.wrapping_sub(1) } else { at_index };
                 self.stage = Stage::Indexed;
-            } else if per_turn > 1 && !matches!(self.kind, Kind::Tap { .. }) {
+            } else if self.has_check() {
                 self.check_turns(turns, at_index);
             }
         }
@@ -388,10 +392,15 @@ impl Thread {
         }
     }
 
+    /// Whether an index shows whether the count of pulses is right.
+    fn has_check(&self) -> bool {
+        self.per_turn > 1 && matches!(self.kind, Kind::Pass { .. })
+    }
+
     /// Whether the interval between pulses hardly changes from one to the next. Until the axes follow, it may still come
     /// from a turn with a missing index pulse.
     fn is_even(&self) -> bool {
-        self.per_turn > 1 && self.follows() && matches!(self.kind, Kind::Pass { .. })
+        self.has_check() && self.follows() && !self.strayed
     }
 
     /// Distance along the path in a pulse, mm.
@@ -414,6 +423,7 @@ impl Thread {
                 short = other;
             }
         }
+        self.strayed &= short != 0;
         let before = core::mem::replace(&mut self.short, short);
         if short == 0 || short == before {
             self.ahead += self.pitch() * f32::from(short);
@@ -431,10 +441,16 @@ impl Thread {
         let off = passed - true_count;
         let early = if self.is_even() { EARLY } else { LATE };
         if !self.turns_unevenly() && !(-early..=LATE).contains(&off) && passed < 100.0 {
-            let fits = (passed + 1.0 - LATE) as u16;
-            self.expected = self.expected.wrapping_add(new.wrapping_sub(fits as u8));
-            true_count = f32::from(fits);
-            if fits == 0 {
+            let fits = (passed + 1.0 - LATE) as u16 as u8;
+            let more = new.wrapping_sub(fits);
+            // Further pulses too many are those of a spindle that has become faster.
+            let is_stray = more == 1 && !self.strayed;
+            self.strayed |= off < 0.0 && self.has_check();
+            if off > 0.0 || is_stray {
+                self.expected = self.expected.wrapping_add(more);
+                true_count = f32::from(fits);
+            }
+            if !some(true_count) {
                 return;
             }
         }
@@ -602,6 +618,8 @@ mod tests {
         /// The number of an index pulse that does not come, and the time of one too many.
         no_index: Option<u64>,
         stray_index: Option<u64>,
+        /// From this index on the spindle turns twice as fast.
+        doubles: Option<u64>,
         /// From this time on there are no pulses.
         ends: u64,
         accel: f32,
@@ -622,6 +640,7 @@ mod tests {
                 stray: None,
                 no_index: None,
                 stray_index: None,
+                doubles: None,
                 ends: u64::MAX,
                 accel: ACCEL,
             };
@@ -633,6 +652,9 @@ mod tests {
         fn pulses(&self) -> Pulses {
             let (turn, n) = (u64::from(self.turn), u64::from(self.per_turn));
             let time = self.time.min(self.ends);
+            if let Some(from) = self.doubles.filter(|from| time > *from) {
+                return self.doubled(from, time);
+            }
             let turns = time / turn;
             // The first pulse of sync is half of a pulse interval after the index.
             let half = turn / n / 2;
@@ -671,6 +693,22 @@ mod tests {
                 at_index: told(index_at),
                 sync: told(time),
                 sync_at: sync_at as u16,
+            }
+        }
+
+        /// What the sensors have seen at `time`, if the spindle turns twice as fast since an index at `from`.
+        fn doubled(&self, from: u64, time: u64) -> Pulses {
+            let (turn, n) = (u64::from(self.turn) / 2, u64::from(self.per_turn));
+            let (turns, since) = (from / turn / 2, time - from);
+            let half = turn / n / 2;
+            let count = (since + half) * n / turn;
+            Pulses {
+                now: self.time as u16,
+                index: (turns + since / turn) as u16,
+                index_at: (from + since / turn * turn) as u16,
+                at_index: (turns * n + since / turn * n) as u16,
+                sync: (turns * n + count) as u16,
+                sync_at: (from + (count * turn).div_ceil(n)).saturating_sub(half) as u16,
             }
         }
 
@@ -778,6 +816,25 @@ mod tests {
                 let bound = (0.6 / f64::from(per_turn)).max(0.015);
                 assert!(most < bound && end < 0.002, "{per_turn}, {tenth}: {most}, {end}");
             }
+        }
+    }
+
+    #[test]
+    fn a_spindle_that_becomes_much_faster_is_followed() {
+        for per_turn in [2u16, 4, 8, 100] {
+            let mut pass = Pass::new(per_turn, 50_000, 0);
+            pass.run(300);
+            // At an index.
+            let turns = pass.time.div_ceil(50_000);
+            while pass.time < turns * 50_000 {
+                pass.stretch();
+            }
+            // From here on there are two turns where there was one.
+            pass.doubles = Some(turns * 50_000);
+            let (way, time) = (pass.way, pass.time);
+            pass.run(600);
+            let went = (pass.way - way) * 25_000.0 / (pass.time - time) as f64;
+            assert!((went - 1.0).abs() < 0.03, "{per_turn}: {went} of the way");
         }
     }
 
