@@ -207,7 +207,7 @@ impl Runner<'_> {
             }
             let ms = spindle::switch(spindle, out, false);
             // Within G33.1 the axes follow the encoder and do not wait.
-            if self.machine.thread().is_none() {
+            if !self.machine.needs_spindle() {
                 self.machine.wait(ms, out);
             }
         }
@@ -275,8 +275,7 @@ impl Runner<'_> {
     #[inline(never)]
     #[small]
     fn held(&mut self, out: &mut Snapshot, spindle: &mut Spindle) {
-        // Within a pass the spindle does not pause: axes follow it, or wait for it.
-        if self.machine.thread().is_none() {
+        if !self.machine.needs_spindle() {
             spindle::switch(spindle, out, false);
         }
         machine::drop_if_wanted(|| {
@@ -378,6 +377,9 @@ fn look_at_spindle(exec: &mut Exec, encoder: &mut Encoder) {
     let pulses = sensors::read();
     let velocity = exec.velocity();
     let Some(thread) = exec.thread() else { return };
+    if !thread.has_begun() && machine::is_held() {
+        return thread.wait_anew();
+    }
     if thread.turns_round() {
         encoder.note_turning();
     }

@@ -52,6 +52,7 @@ impl Exec {
         let is_end =
             |block: &Block| matches!(block.body, Body::QueuedAction(QueuedAction::EndThread));
         let ends = Capability::Lathe.is_built_in()
+            && matches!(self.follows, Follows::Angle(_))
             && !self.running.active
             && blocks.look(is_end) == Some(true);
         if ends {
@@ -60,6 +61,15 @@ impl Exec {
             self.follows = Follows::Nothing;
         }
         ends
+    }
+
+    /// Whether axes follow the spindle in a pass, so that the spindle must not pause.
+    #[small]
+    pub fn needs_spindle(&self) -> bool {
+        match &self.follows {
+            Follows::Angle(thread) if Capability::Lathe.is_built_in() => thread.has_begun(),
+            _ => false,
+        }
     }
 
     /// The pass in step with the spindle, if there is one.

@@ -27,7 +27,7 @@ use crate::gcode::command::{Feed, Motion};
 use crate::gcode::setup::Setup;
 use crate::hal::event::{Event, wait};
 use crate::hal::time::millis;
-use crate::machine::Alarm;
+use crate::machine::{self, Alarm};
 use crate::math::sqrt;
 use crate::motion::block::{Block, Pass, QueuedAction};
 use crate::motion::dynamics::{MachineLimits, PER_SECOND_CUBED, PER_SECOND_SQUARED};
@@ -347,8 +347,9 @@ impl Planner {
             if seen >= ENOUGH && synced && turn != 0 {
                 return Some(Ok(Some(turn)));
             }
-            // A spindle that is slower than the encoder can measure never gets beyond a pulse or two.
-            if seen > most {
+            // A spindle that is slower than the encoder can measure never gets beyond a pulse or two. In a hold the spindle
+            // may stand still.
+            if seen > most || machine::is_held() {
                 most = seen;
                 if seen < ENOUGH {
                     since = millis();
