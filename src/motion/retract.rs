@@ -4,8 +4,9 @@
 //! lost, the error is above its limit, or a feedhold or an alarm has come ([`Exec`](super::exec::Exec)). Exec calls
 //! [`Retreat::add`] for each segment while the axes slow down, and for segments of its own when they stand. The retreat
 //! begins in segments that are already queued ([`Exec::lead`](super::exec::Exec::lead)), which would otherwise delay X
-//! by 9 ms. The motors of X stand still in the pass, so that no motor has both motions. X has a ramp up, a cruise and a
-//! ramp down of its own.
+//! by 9 ms. The motors of X stand still in the lines of the pass in which it begins, so that no motor has both motions.
+//! Segments in which they still move, at the end of a taper, are left as they are. X has a ramp up, a cruise and a ramp
+//! down of its own.
 //!
 //! Units: steps of X, s. Distances handed out are counted in whole phase units, without rounding errors. X ends within
 //! half a step, and a ten-thousandth, of the requested distance. Cost on AVR: 6,000 cycles a segment. RAM: shared with

@@ -20,7 +20,7 @@
 //! as many leads as the ramp needs, so that it reaches them some turns later.
 //!
 //! **Pulses that do not fit.** A pulse after twice the expected time counts as two. A pulse that comes too soon is
-//! ignored. The next two indices show whether that was right. The [spindle is lost](Thread::fault) when two pulses in a row
+//! ignored. Two indices that agree on it correct a wrong count. The [spindle is lost](Thread::fault) when two pulses in a row
 //! are overdue; until then the line goes on at its speed. With a single pulse a turn, a missing pulse looks like a
 //! spindle at half its speed; it is treated as a missing pulse.
 //!

@@ -172,7 +172,7 @@ impl Exec {
             return self.await_spindle(out, segment);
         }
         let retract = thread.retract();
-        // Whether the axes stop within this line, in which X stands still.
+        // Whether the axes stop within this line.
         let fits = velocity * velocity < 2.0 * accel * self.running.left;
         let leaves = (breaks_off || self.hold) && retract.is_some() && fits;
         let stands =
