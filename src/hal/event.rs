@@ -105,7 +105,7 @@ pub fn pass_over() -> u8 {
 }
 
 /// Milliseconds between two events of [`set_eager`]: a power of two.
-const EAGER_MS: u8 = 4;
+const EAGER_MS: u8 = 8;
 /// The bits of `eager` that are ports.
 const EAGER_PORTS: u8 = EAGER_MS - 1;
 const _: () =
@@ -190,7 +190,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_look_is_due_every_four_ms_whichever_milliseconds_are_missed() {
+    fn a_look_is_due_in_time_whichever_milliseconds_are_missed() {
         for step in [1u32, 2, 3, 4, 5, 7, 8, 12, 100] {
             for first in 0..8 {
                 let (mut eager, mut last) = (0b10, first);

@@ -635,12 +635,11 @@ impl Exec {
             running.fresh = false;
             running.scale = self.prep.own() as f32 / running.left;
         }
-        let cycles = match is_rounded(running.left, stretch.distance) {
-            true => rounded(&mut running.left, stretch),
-            false => {
-                running.left -= stretch.distance;
-                cycles
-            }
+        let before = running.left;
+        running.left -= stretch.distance;
+        let cycles = match is_rounded(before, stretch.distance) {
+            true => rounded(before, &mut running.left, stretch),
+            false => cycles,
         };
         out.left = running.left;
         let left = whole(running.left * running.scale);
@@ -705,18 +704,16 @@ fn is_rounded(left: f32, distance: f32) -> bool {
     left.to_bits() > distance.to_bits() + (BITS << 23)
 }
 
-/// Takes a stretch from what is left of its line, at least one bit. Returns how long the distance takes that was taken,
-/// CPU cycles. A stretch that goes nowhere takes its own time.
+/// Takes at least one bit from what is left of a line, which was `before`, for a stretch. Returns how long the distance
+/// takes that is taken, CPU cycles. A stretch that goes nowhere takes its own time.
 #[cold]
 #[inline(never)]
 #[small]
-fn rounded(left: &mut f32, stretch: &Stretch) -> u32 {
-    let before = *left;
+fn rounded(before: f32, left: &mut f32, stretch: &Stretch) -> u32 {
     if !some(stretch.distance) {
         return cycles_of(stretch.seconds);
     }
-    let bit = f32::from_bits(before.to_bits() - 1);
-    *left = lesser(before - stretch.distance, bit);
+    *left = lesser(*left, f32::from_bits(before.to_bits() - 1));
     cycles_of(stretch.seconds * ((before - *left) / stretch.distance))
 }
 
