@@ -105,7 +105,7 @@ pub fn pass_over() -> u8 {
 }
 
 /// Milliseconds between two events of [`set_eager`]: a power of two.
-const EAGER_MS: u8 = 8;
+const EAGER_MS: u8 = 4;
 /// The bits of `eager` that are ports.
 const EAGER_PORTS: u8 = EAGER_MS - 1;
 const _: () =
@@ -162,6 +162,7 @@ fn looked(eager: u8, ms: u8) -> Option<u8> {
 }
 
 /// Whether it is time for a look, and a byte waits on a port where bytes may act without the end of a line.
+#[inline(never)]
 fn is_eager() -> bool {
     let Some(now) = looked(eager().get(), imp::time::millis() as u8) else { return false };
     eager().set(now);
