@@ -1,12 +1,12 @@
-//! Arduino Mega 2560 with RAMPS 1.4: X, Y, Z and the first extruder.
+//! Arduino Mega 2560 with RAMPS 1.4, as a printer: X, Y, Z and the first extruder, for the dialect of printing hosts.
 
 use super::Port::{A, B, D, E, F, G, H, J, K, L};
 use super::{Board, Encoder, Heater, Heaters, MotorPins, Pwm, Timer, USB, pin};
 
-/// Arduino Mega 2560 with RAMPS 1.4.
+/// Arduino Mega 2560 with RAMPS 1.4, as a printer.
 pub const RAMPS14: Board = Board {
     name: "ramps14",
-    features: &["dialect-tinyg", "dialect-reprap", "probing", "printer", "corexy", "bed-plane"],
+    features: &["dialect-reprap", "probing", "printer", "corexy", "sd", "bed-plane"],
     dialect: 0,
     clock_hz: 16_000_000,
     motors: &[

@@ -20,8 +20,8 @@ mod pico_cnc;
 mod pico_cnc6;
 #[path = "../boards/ramps14.rs"]
 mod ramps14;
-#[path = "../boards/ramps14-sd.rs"]
-mod ramps14_sd;
+#[path = "../boards/ramps14-cnc.rs"]
+mod ramps14_cnc;
 #[path = "../boards/skr-pico.rs"]
 mod skr_pico;
 
@@ -37,7 +37,7 @@ pub use mega2560_lathe::MEGA2560_LATHE;
 pub use pico_cnc::PICO_CNC;
 pub use pico_cnc6::PICO_CNC6;
 pub use ramps14::RAMPS14;
-pub use ramps14_sd::RAMPS14_SD;
+pub use ramps14_cnc::RAMPS14_CNC;
 pub use skr_pico::SKR_PICO;
 
 /// The number of motors that the board of this image drives.
@@ -207,7 +207,7 @@ pub const ALL: [&Board; 8] = [
     &PICO_CNC,
     &PICO_CNC6,
     &RAMPS14,
-    &RAMPS14_SD,
+    &RAMPS14_CNC,
     &SKR_PICO,
 ];
 
@@ -228,8 +228,8 @@ pub fn by_name(name: &str) -> Option<&'static Board> {
 #[cfg(feature = "board-ramps14")]
 pub const ACTIVE: &Board = &RAMPS14;
 /// The board that this image is built for.
-#[cfg(feature = "board-ramps14-sd")]
-pub const ACTIVE: &Board = &RAMPS14_SD;
+#[cfg(feature = "board-ramps14-cnc")]
+pub const ACTIVE: &Board = &RAMPS14_CNC;
 /// The board that this image is built for.
 #[cfg(feature = "board-mega2560-grbl-lathe")]
 pub const ACTIVE: &Board = &MEGA2560_GRBL_LATHE;
@@ -248,7 +248,7 @@ pub const ACTIVE: &Board = &SKR_PICO;
 /// The board that this image is built for.
 #[cfg(not(any(
     feature = "board-ramps14",
-    feature = "board-ramps14-sd",
+    feature = "board-ramps14-cnc",
     feature = "board-mega2560-grbl-lathe",
     feature = "board-mega2560-lathe",
     feature = "board-pico-cnc",

@@ -13,13 +13,15 @@
 //! | [`notice`] | what the machine reports without being asked |
 //! | [`out`] | where dialects write to |
 //! | [`tinyg`], [`grbl`], `reprap` | the dialects of TinyG, of grbl, and of printing hosts |
-//! | `write`, `steps` | shared by grbl's dialect and that of printing hosts: numbers and texts, steps per millimetre |
+//! | `write`, `steps`, `by_name` | shared by grbl's dialect and that of printing hosts: numbers and texts, steps per millimetre, settings by name |
 //!
 //! Everything outside the dialects is neutral: the [`Status`](crate::status::Status), the names of settings and
 //! values, and what the machine is [doing](crate::machine::Doing). A dialect spells them out for its senders. Each
 //! dialect is a Cargo feature. In an image with a single dialect nothing is chosen at run time, and the choice costs
 //! nothing.
 
+#[cfg(any(feature = "dialect-grbl", feature = "dialect-reprap"))]
+mod by_name;
 pub mod checksum;
 pub mod dialect;
 #[cfg(feature = "dialect-grbl")]

@@ -7,9 +7,10 @@ pub trait Side {
     fn send(&mut self, bytes: &[u8]);
     /// Puts bytes on the line of the second port.
     fn send_aux(&mut self, bytes: &[u8]);
-    /// Whether the machine greets in TinyG's dialect; else it speaks grbl's alone.
-    fn speaks_tinyg(&self) -> bool {
-        true
+    /// Returns the first of its dialects, whose greeting comes last: `dialect-tinyg`, `dialect-grbl` or
+    /// `dialect-reprap`.
+    fn first_dialect(&self) -> &'static str {
+        "dialect-tinyg"
     }
     /// Drives the pin with which the second port's sender holds the machine back.
     fn set_aux_cts(&mut self, stop: bool);

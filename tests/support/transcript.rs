@@ -330,7 +330,7 @@ impl<S: Side> Player<'_, S> {
             Event::SendAux(bytes) => self.side.send_aux(bytes),
             Event::AuxCts(stop) => self.side.set_aux_cts(*stop),
             Event::Hear(line) => {
-                self.greeted = line == OTHER_GREETING;
+                self.greeted = line == OTHER_GREETING || line == START;
                 return self.hear(0, line);
             }
             Event::HearAux(line) => return self.hear(1, line),
@@ -358,13 +358,15 @@ impl<S: Side> Player<'_, S> {
         Ok(())
     }
 
-    /// Waits for the greeting: of TinyG's dialect, or, in an image without that dialect, of grbl's, which may have
-    /// come already.
+    /// Waits for the greeting: of TinyG's dialect, or, in an image without that dialect, of the one that it has, which
+    /// may have come already.
     fn greeting(&mut self) -> Result<(), String> {
-        if self.side.speaks_tinyg() {
-            return self.wait(0, GREETING, |line| matches(GREETING, line));
-        }
-        if std::mem::take(&mut self.greeted) { Ok(()) } else { self.hear(0, OTHER_GREETING) }
+        let own = match self.side.first_dialect() {
+            "dialect-grbl" => OTHER_GREETING,
+            "dialect-reprap" => START,
+            _ => return self.wait(0, GREETING, |line| matches(GREETING, line)),
+        };
+        if std::mem::take(&mut self.greeted) { Ok(()) } else { self.hear(0, own) }
     }
 
     /// Sends a file as a sender that waits for each answer.

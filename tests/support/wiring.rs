@@ -163,7 +163,7 @@ fn about(board: &Board) -> &'static str {
              `mega2560-grbl-lathe` have the same pins, and a [spindle's sensors](lathe.md)."
         }
         "ramps14" => {
-            "An Arduino Mega 2560 with RAMPS 1.4: X, Y, Z and the first extruder (E0) as A."
+            "An Arduino Mega 2560 with RAMPS 1.4: X, Y, Z and the first extruder (E0) as A. `ramps14-cnc` has the same pins, without heaters."
         }
         "pico-cnc" => {
             "A Raspberry Pi Pico on a breakout board, with four drivers. **Its pins are 3.3 V** and tolerate no more: see [the RP2040](rp2040.md)."

@@ -27,12 +27,12 @@ pub enum Board {
     /// Raspberry Pi Pico on a breakout board with six drivers
     #[value(name = "pico-cnc6")]
     PicoCnc6,
-    /// Arduino Mega 2560 with RAMPS 1.4
+    /// Arduino Mega 2560 with RAMPS 1.4, as a printer
     #[value(name = "ramps14")]
     Ramps14,
-    /// Arduino Mega 2560 with RAMPS 1.4 and an SD card
-    #[value(name = "ramps14-sd")]
-    Ramps14Sd,
+    /// Arduino Mega 2560 with RAMPS 1.4, as a mill
+    #[value(name = "ramps14-cnc")]
+    Ramps14Cnc,
     /// BTT SKR Pico v1.0
     #[value(name = "skr-pico")]
     SkrPico,
@@ -66,7 +66,7 @@ impl Board {
             Board::PicoCnc => "pico-cnc",
             Board::PicoCnc6 => "pico-cnc6",
             Board::Ramps14 => "ramps14",
-            Board::Ramps14Sd => "ramps14-sd",
+            Board::Ramps14Cnc => "ramps14-cnc",
             Board::SkrPico => "skr-pico",
         }
     }

@@ -301,14 +301,14 @@ mod tests {
         let name = |machine| image(Board::Ramps14, machine).file_name().unwrap().to_owned();
         assert_eq!(name(Machine::Careful), "ramps14.elf");
         assert_eq!(name(Machine::Lathe), "ramps14-lathe.elf");
-        let lacks = image_without(Board::Ramps14, Machine::Careful, &["help".into()]);
-        assert_eq!(lacks.file_name().unwrap(), "ramps14-without-help.elf");
+        let lacks = image_without(Board::Ramps14Cnc, Machine::Careful, &["help".into()]);
+        assert_eq!(lacks.file_name().unwrap(), "ramps14-cnc-without-help.elf");
     }
 
     #[test]
     fn what_is_left_out_is_no_feature_of_the_image() {
         let all = features(Board::Ramps14, Machine::Careful, &[]).unwrap();
-        assert!(all.starts_with("board-ramps14,machine-careful,dialect-tinyg,"), "{all}");
+        assert!(all.starts_with("board-ramps14,machine-careful,dialect-reprap,"), "{all}");
         let some = features(Board::Ramps14, Machine::Careful, &["probing".into()]).unwrap();
         assert_eq!(some, all.replace(",probing", ""));
         let unknown = features(Board::Ramps14, Machine::Careful, &["hlep".into()]);

@@ -14,7 +14,7 @@ use crate::gcode::modal::MotionMode;
 use crate::gcode::tables::{SYSTEMS, TableRow};
 use crate::machine::alarm::is_program_end;
 use crate::machine::{Alarm, Cycle, Doing};
-use crate::protocol::{Answers, Machine, Next, Out, STARTUP_MAX, Span, Store, Value};
+use crate::protocol::{Answers, Machine, Next, Out, STARTUP_MAX, Span, Store, Value, by_name};
 use crate::status::Status;
 use crate::units::{AXES, Length};
 use crate::{plain, text};
@@ -192,7 +192,7 @@ impl Request {
                 self.command = Command::Nothing;
                 Step::At(0)
             }
-            Command::Named(from) if settings::by_name(command::name(line, from)).is_none() => {
+            Command::Named(from) if by_name::find(command::name(line, from)).is_none() => {
                 Step::Error(UNSUPPORTED)
             }
             // The commands from here on need the machine at rest or in an alarm.
@@ -379,16 +379,13 @@ fn list_setting(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Step 
 #[inline(never)]
 #[small]
 fn named(at: u8, line: &[u8], from: u8, machine: &mut impl Machine, out: &mut impl Out) -> Step {
-    let name = command::name(line, from);
-    let Some(setting) = settings::by_name(name) else { return Step::Error(UNSUPPORTED) };
+    let found = by_name::find(command::name(line, from));
+    let Some(setting) = found else { return Step::Error(UNSUPPORTED) };
     if from != 0 {
         let to = command::value(line, from);
         return set(at, machine, out, |machine| settings::set_named(setting, to, machine));
     }
-    out.put(b'$');
-    out.put_all(name.iter().map(u8::to_ascii_lowercase));
-    out.put(b'=');
-    settings::put_named(setting, machine, out);
+    by_name::write(setting, machine, out);
     line_end(out);
     Step::Done
 }

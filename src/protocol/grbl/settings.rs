@@ -4,15 +4,13 @@
 //! without a setting in Kerf is shown with a fixed value, and accepts only that value.
 
 use super::report::LOWERED;
-use super::write::{fixed, text};
 use crate::boards::MOTORS;
 use crate::capability::Capability;
-use crate::config::name::{Name, token};
-use crate::config::table::Kind;
-use crate::config::{Fixed, Number, Owner, Setting, hex};
+use crate::config::name::token;
+use crate::config::{Fixed, Number, Owner, Setting};
 use crate::progmem;
 use crate::protocol::steps::{motor_of, named, set_steps, steps};
-use crate::protocol::{Machine, Out, Warning};
+use crate::protocol::{Machine, Warning, by_name};
 use crate::status::Status;
 use crate::units::AXES;
 
@@ -202,7 +200,7 @@ fn travel(axis: u8, machine: &mut impl Machine) -> (i32, i32) {
 #[inline(never)]
 #[small]
 pub fn set(number: u8, text: &[u8], machine: &mut impl Machine) -> Result<(), Status> {
-    let to = parse(text)?;
+    let to = by_name::parse(text)?;
     if to.is_negative() {
         return Err(Status::BelowMinimum);
     }
@@ -252,52 +250,12 @@ pub fn set(number: u8, text: &[u8], machine: &mut impl Machine) -> Result<(), St
     }
 }
 
-/// Returns the setting with one of Kerf's own names; `None` if there is none.
-#[inline(never)]
-#[small]
-pub fn by_name(name: &[u8]) -> Option<Setting> {
-    Setting::find(&Name::new().with(name)?)
-}
-
-/// Writes the value of a setting, in the unit of TinyG's dialect and with all its decimals.
-#[inline(never)]
-#[small]
-pub fn put_named(setting: Setting, machine: &mut impl Machine, out: &mut impl Out) {
-    let (row, value) = (setting.row(), machine.setting(setting));
-    match row.kind {
-        Kind::Text => text(out, setting.text()),
-        Kind::Data | Kind::Job => out.put_all(hex(value).iter().copied()),
-        _ => fixed(out, Fixed { value, decimals: row.stored }),
-    }
-}
-
-/// Sets a setting to the value in `text`. [`Status::Again`] as of [`set`].
-#[inline(never)]
+/// Sets a setting with one of Kerf's own names to the value in `text`. [`Status::Again`] as of [`set`].
 #[small]
 pub fn set_named(setting: Setting, text: &[u8], machine: &mut impl Machine) -> Result<(), Status> {
-    match text {
-        [b'0', b'x' | b'X', digits @ ..] if setting.is_data() => {
-            put_value(machine, Some(setting), parse_hex(digits)?)
-        }
-        _ => put(machine, Some(setting), parse(text)?),
-    }
-}
-
-/// Parses up to eight hexadecimal digits.
-#[small]
-fn parse_hex(digits: &[u8]) -> Result<i32, Status> {
-    if !(1..=8).contains(&digits.len()) {
-        return Err(Status::BadNumber);
-    }
-    let digit = |bits: u32, byte: &u8| Some(bits << 4 | char::from(*byte).to_digit(16)?);
-    let bits = digits.iter().try_fold(0, digit).ok_or(Status::BadNumber)?;
-    Ok(bits.cast_signed())
-}
-
-/// Parses a number. Commas are refused, so that 1,5 is not taken for 15.
-#[small]
-fn parse(text: &[u8]) -> Result<Number, Status> {
-    Number::parse(text).filter(|_| !text.contains(&b',')).ok_or(Status::BadNumber)
+    let warning = by_name::set(setting, text, machine)?;
+    note(machine, warning);
+    Ok(())
 }
 
 /// Sets bits of `grm`, and keeps the bits in `kept`.
@@ -312,13 +270,9 @@ fn set_report(bits: i32, kept: i32, machine: &mut impl Machine) -> Result<(), St
 #[inline(never)]
 #[small]
 fn put(machine: &mut impl Machine, setting: Option<Setting>, to: Number) -> Result<(), Status> {
-    let setting = setting.ok_or(Status::UnrecognizedName)?;
-    let value = machine.settings().check(setting, to, false).map_err(|status| match status {
-        // Error 4 is for negative values only.
-        Status::BelowMinimum => Status::OutOfRange,
-        other => other,
-    })?;
-    put_value(machine, Some(setting), value)
+    let warning = by_name::put(setting, to, machine)?;
+    note(machine, warning);
+    Ok(())
 }
 
 /// Stores a value that has the scale of the stored setting.
@@ -329,18 +283,18 @@ fn put_value(
     setting: Option<Setting>,
     value: i32,
 ) -> Result<(), Status> {
-    let setting = setting.ok_or(Status::UnrecognizedName)?;
-    if !setting.accepts(value) {
-        return Err(Status::OutOfRange);
-    }
-    if machine.setting(setting) == value {
-        return Ok(());
-    }
-    let warning = machine.set(setting, value)?;
+    let warning = by_name::store(setting, value, machine)?;
+    note(machine, warning);
+    Ok(())
+}
+
+/// Remembers that a velocity has been lowered, for the message behind the answer.
+#[inline(never)]
+#[small]
+fn note(machine: &mut impl Machine, warning: Warning) {
     if warning == Warning::Velocity {
         machine.memory().grbl.note(LOWERED, true);
     }
-    Ok(())
 }
 
 #[small]

@@ -4,12 +4,15 @@ use super::frame::{Frame, Sum, integer};
 use crate::config::Number;
 
 /// Returns the code of a block, with its letter in upper case: the first word, if that is G, M or T with a whole
-/// number. `None` otherwise.
+/// number; `$` with 0 for a line about a setting by its name. `None` otherwise.
 #[inline(never)]
 #[small]
 pub fn code(block: &[u8]) -> Option<(u8, u16)> {
     let (letter, rest) = block.split_first()?;
     let letter = letter.to_ascii_uppercase();
+    if letter == b'$' {
+        return Some((letter, 0));
+    }
     if !matches!(letter, b'G' | b'M' | b'T') {
         return None;
     }
@@ -145,6 +148,7 @@ mod tests {
         assert_eq!(code(b"G1X10"), Some((b'G', 1)));
         assert_eq!(code(b"G 28 X"), Some((b'G', 28)));
         assert_eq!(code(b"T0"), Some((b'T', 0)));
+        assert_eq!(code(b"$1sa=1.8"), Some((b'$', 0)));
         for none in ["", "X1", "G28.2 X0", "Mx", "M99999999"] {
             assert_eq!(code(none.as_bytes()), None, "{none}");
         }

@@ -2,7 +2,7 @@
 
 use super::command::{has, value, words};
 use super::write::{cold, fixed, int, line_end, text};
-use super::{bed, card, report, settings, tuning};
+use super::{bed, card, names, report, settings, tuning};
 use crate::capability::Capability;
 use crate::config::Fixed;
 use crate::gcode::overrides::{Change, Override};
@@ -55,7 +55,7 @@ pub fn of(code: Option<Code>, block: &[u8]) -> Option<Code> {
             17 | 18 | 82..=84 | 92 | 105 | 108 | 110..=112 | 114 | 115 | 117..=119 | 130..=134 | 155
                 | 201..=208 | 220 | 221 | 301..=304 | 400 | 500..=503 | 900 | 999
         ),
-        (b'T', _) => true,
+        (b'T' | b'$', _) => true,
         _ => false,
     };
     code.filter(|_| is_own)
@@ -74,6 +74,7 @@ pub fn part(
     let number = match code {
         (b'T', 0) => return Step::Done,
         (b'T', _) => return Step::Refused(Status::ToolInvalid),
+        (b'$', _) => return names::part(at, block, machine, out),
         (b'G', 10 | 11) => return retract(code.1 == 10, machine, out),
         (b'G', 29) | (b'M', 420) if Capability::BedPlane.is_built_in() => {
             return bed::part(code.1, at, block, machine, out);
@@ -148,6 +149,7 @@ pub fn needs_rest(code: Code, block: &[u8]) -> bool {
         (b'M', 18 | 84 | 400 | 420 | 502) | (b'G', 28 | 29 | 161 | 162) => true,
         (b'M', 92 | 201 | 203 | 206) => !words(block).is_empty(),
         (b'M', 205) => has(block, b'J'),
+        (b'$', _) => block.contains(&b'='),
         _ => false,
     }
 }

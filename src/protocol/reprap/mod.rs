@@ -12,6 +12,7 @@
 //! | [`request`] | answers a line |
 //! | [`host`] | the codes that query or set something |
 //! | [`settings`] | M92, M201 to M206, M503 |
+//! | [`names`] | `$name=value`, `$$`: settings by Kerf's own names |
 //! | [`bed`] | G29, M420: the plane of the bed |
 //! | [`card`] | M20 to M27, M30, M32: the SD card |
 //! | [`report`] | M105, M114, M115, M119 |
@@ -30,6 +31,7 @@ mod card;
 mod command;
 mod frame;
 mod host;
+mod names;
 mod report;
 mod request;
 mod settings;

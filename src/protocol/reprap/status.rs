@@ -14,6 +14,7 @@ pub fn is_unknown(status: Status) -> bool {
             | Status::MalformedCommand
             | Status::BadNumber
             | Status::NotBuiltIn
+            | Status::UnrecognizedName
     )
 }
 

@@ -18,7 +18,7 @@ use crate::report::{Measured, Rejected, Report};
 use crate::runs::Runs;
 use crate::trace::Trace;
 
-pub use setup::read_setup;
+pub use setup::{read_setup, setup_of};
 pub(crate) use watch::{POLL, Watch};
 
 /// Longest time of a reset, ms of AVR time.
@@ -144,6 +144,12 @@ fn may_wait(line: &str) -> bool {
     numbers.filter_map(|digits| digits.parse::<u32>().ok()).any(|n| matches!(n, 0 | 1 | 6 | 60))
 }
 
+/// Returns the setting that a job needs in front of its own: [`GO_ON`], if its lines have a code that may wait for an
+/// operator.
+pub(crate) fn going_on(lines: &Lines) -> Option<&'static str> {
+    lines.iter().any(|(_, line)| may_wait(line)).then_some(GO_ON)
+}
+
 /// Sends settings, each of which must be accepted. If the lines have a code that may wait for an operator, also sends
 /// [`GO_ON`].
 pub(crate) fn ask_settings(
@@ -152,9 +158,7 @@ pub(crate) fn ask_settings(
     lines: &Lines,
     settings: &[String],
 ) -> Result<()> {
-    let waits = lines.iter().any(|(_, line)| may_wait(line));
-    let go_on = waits.then(|| GO_ON.to_string());
-    for line in go_on.iter().chain(settings) {
+    for line in going_on(lines).into_iter().chain(settings.iter().map(String::as_str)) {
         let response = host.ask(machine, line, ASK_MS)?;
         if response.status != 0 {
             bail!("the firmware refuses {line} with status {}: {}", response.status, response.raw);

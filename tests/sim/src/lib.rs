@@ -9,6 +9,7 @@
 
 pub mod bench;
 mod bus;
+pub mod by_name;
 pub mod card;
 pub mod chip;
 mod counts;

@@ -1,6 +1,6 @@
 //! Alarms on the image: how soon the outputs of spindle and coolant are off.
 
-use kerf::boards::{Board, MEGA2560_GRBL, Pin, RAMPS14, inputs};
+use kerf::boards::{Board, MEGA2560_GRBL, Pin, RAMPS14_CNC, inputs};
 use kerf_sim::mechanics::Build;
 use kerf_sim::{Host, Machine};
 
@@ -95,7 +95,7 @@ fn off_after(machine: &mut Machine, host: &mut Host, cause: Cause) -> u64 {
 
 #[test]
 fn every_alarm_switches_the_outputs_off() {
-    for board in [&MEGA2560_GRBL, &RAMPS14] {
+    for board in [&MEGA2560_GRBL, &RAMPS14_CNC] {
         for (cause, within) in [
             (Line("{alarm:n}"), LINE_MS),
             (Line("{shutd:n}"), LINE_MS),

@@ -4,10 +4,10 @@
 use std::io::{Cursor, Read, Seek, SeekFrom, Write};
 
 use fatfs::{FatType, FileSystem, FormatVolumeOptions, FsOptions, format_volume};
-use kerf::boards::{RAMPS14, RAMPS14_SD};
+use kerf::boards::RAMPS14;
 use kerf_sim::Machine;
 
-use crate::common::{booted, firmware, set};
+use crate::common::{firmware, printing};
 
 /// Where the partition begins, blocks.
 const FIRST: usize = 63;
@@ -77,7 +77,7 @@ struct Printer {
 
 impl Printer {
     fn new(fat: FatType, is_high: bool, files: &[(&str, String)]) -> Self {
-        let mut machine = firmware(&RAMPS14_SD);
+        let mut machine = firmware(&RAMPS14);
         machine.insert_card(image(fat, files), is_high);
         Self::started(machine)
     }
@@ -185,17 +185,16 @@ fn circle(moves: usize) -> String {
     text
 }
 
-/// Returns what the image `ramps14` stores of these settings.
+/// Returns what is in EEPROM after these settings.
 fn settings(lines: &[&str]) -> [u8; 4096] {
-    let (mut machine, mut host) = booted(&RAMPS14);
-    lines.iter().for_each(|line| set(&mut machine, &mut host, line));
-    host.run_for_ms(&mut machine, 6_000).unwrap();
+    let mut machine = printing::booted(&RAMPS14);
+    lines.iter().for_each(|line| printing::set(&mut machine, line));
     *machine.eeprom()
 }
 
 /// Returns how long a file takes from a host that has four lines in flight, s.
 fn over_the_wire(kept: &[u8; 4096], text: &str) -> f64 {
-    let mut machine = firmware(&RAMPS14_SD);
+    let mut machine = firmware(&RAMPS14);
     machine.set_eeprom(kept);
     let mut printer = Printer::started(machine);
     printer.ask("M302 P1");
@@ -212,7 +211,7 @@ fn over_the_wire(kept: &[u8; 4096], text: &str) -> f64 {
 }
 
 /// A print from a card is as fast as a print from a host at 115,200 baud, unless the card is slow. A host that asks
-/// for temperatures is answered. The settings are those that the image `ramps14` has stored.
+/// for temperatures is answered.
 #[test]
 fn a_print_from_a_card_is_as_fast_as_the_planner() {
     let kept = settings(&["{mch:3}", "{xjm:100000}", "{yjm:100000}", "{ajm:100000}", "{he1k:6}"]);
@@ -220,10 +219,10 @@ fn a_print_from_a_card_is_as_fast_as_the_planner() {
     let wire = over_the_wire(&kept, &circle(moves));
     println!("over the wire {wire:.2} s");
     for (access_us, most) in [(100, 1.05), (2_000, 1.05), (20_000, 1.6), (90_000, 3.5)] {
-        let mut machine = firmware(&RAMPS14_SD);
+        let mut machine = firmware(&RAMPS14);
         machine.set_eeprom(&kept);
         machine.insert_card(image(FatType::Fat16, &[("A.G", circle(moves))]), true);
-        let select = RAMPS14_SD.heaters.unwrap().heaters[0].select.unwrap();
+        let select = RAMPS14.heaters.unwrap().heaters[0].select.unwrap();
         machine.build_max6675(select);
         let mut printer = Printer::started(machine);
         let settings = printer.ask("M503");

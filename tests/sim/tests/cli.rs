@@ -62,7 +62,7 @@ fn mistakes_are_explained() {
             &job,
             &["--board", "uno"],
             "no board uno; there are mega2560-grbl, mega2560-grbl-lathe, mega2560-lathe, pico-cnc, pico-cnc6, ramps14, \
-             ramps14-sd, skr-pico",
+             ramps14-cnc, skr-pico",
         ),
     ];
     for (elf, job, more, want) in cases {

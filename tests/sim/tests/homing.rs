@@ -1,6 +1,6 @@
 //! Homing on the image, with carriages and with switches that bounce and stick.
 
-use kerf::boards::{Board, MEGA2560_GRBL, RAMPS14, inputs};
+use kerf::boards::{Board, MEGA2560_GRBL, RAMPS14_CNC, inputs};
 use kerf_sim::mechanics::{Bounce, Build, Wiring};
 use kerf_sim::{Host, Machine};
 
@@ -51,7 +51,7 @@ fn places(machine: &Machine) -> [i64; 3] {
 fn every_axis_ends_on_its_step_from_wherever_it_comes() {
     // Off the switches by their hysteresis of 0.2 mm, the step at which they open, and the zero back-off.
     let (lower, upper) = ((2.2 + 0.5) * 1_280.0, (98.0 - 0.2 - 0.5) * 1_280.0);
-    for board in [&MEGA2560_GRBL, &RAMPS14] {
+    for board in [&MEGA2560_GRBL, &RAMPS14_CNC] {
         for wiring in [Wiring::NormallyOpen, Wiring::NormallyClosed] {
             let (mut machine, mut host) = standing(board, wiring, [5.0, 1.0, 96.3]);
             assert_eq!(home(&mut machine, &mut host, "{home:1}"), None);

@@ -8,7 +8,7 @@ use std::path::Path;
 use std::sync::{LazyLock, Mutex};
 use std::thread;
 
-use kerf::boards::{Board, MEGA2560_GRBL, RAMPS14};
+use kerf::boards::{Board, MEGA2560_GRBL, RAMPS14_CNC};
 use kerf_sim::job::{self, Lines, Options};
 use kerf_sim::oracle::{self, Setup};
 use kerf_sim::report::Report;
@@ -31,7 +31,7 @@ struct Run {
 }
 
 static RUNS: LazyLock<Vec<Run>> = LazyLock::new(|| {
-    let pairs = JOBS.iter().flat_map(|job| [(*job, &MEGA2560_GRBL), (*job, &RAMPS14)]);
+    let pairs = JOBS.iter().flat_map(|job| [(*job, &MEGA2560_GRBL), (*job, &RAMPS14_CNC)]);
     let waiting: Mutex<VecDeque<(&str, &Board)>> = Mutex::new(pairs.collect());
     let done = Mutex::new(Vec::new());
     let work = || {
@@ -102,7 +102,7 @@ fn jobs_on_the_grbl_board_end_well_and_exact_to_the_step() {
 
 #[test]
 fn jobs_on_ramps_end_well_and_exact_to_the_step() {
-    every_run(Some(&RAMPS14), ends_well);
+    every_run(Some(&RAMPS14_CNC), ends_well);
 }
 
 /// Returns the steps of each motor in both directions together. Each line must move each motor in one direction only:

@@ -1,6 +1,6 @@
 //! Two serial ports at once, answers in time, and flow control by pins.
 
-use kerf::boards::{MEGA2560_GRBL, RAMPS14};
+use kerf::boards::{MEGA2560_GRBL, RAMPS14_CNC};
 use kerf_sim::protocol::{Incoming, classify};
 use kerf_sim::{AUX, Host, Machine};
 
@@ -212,7 +212,7 @@ fn a_sender_that_heeds_rts_loses_nothing() {
 
 #[test]
 fn a_board_without_the_pins_refuses_flow_control_by_pins() {
-    let (mut machine, mut host) = booted(&RAMPS14);
+    let (mut machine, mut host) = booted(&RAMPS14_CNC);
     assert_eq!(host.ask(&mut machine, "{ex:2}", 1_000).unwrap().status, 110);
     set(&mut machine, &mut host, "{ex:1}");
 }

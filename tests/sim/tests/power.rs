@@ -1,6 +1,6 @@
 //! Motors have power before they step, each by its own enable pin where the board has one.
 
-use kerf::boards::{Board, MEGA2560_GRBL, Pin, RAMPS14};
+use kerf::boards::{Board, MEGA2560_GRBL, Pin, RAMPS14_CNC};
 use kerf_sim::Machine;
 
 use crate::common::{booted, set};
@@ -36,19 +36,23 @@ fn power_comes_before_the_first_step() {
     // At least 25 us.
     assert!(lead(&MEGA2560_GRBL, "g0 x1", MEGA2560_GRBL.enable_all.unwrap()) > 400);
     for (motor, line) in ["g0 x1", "g0 y1", "g0 z1", "g0 a1"].iter().enumerate() {
-        assert!(lead(&RAMPS14, line, RAMPS14.motors[motor].enable.unwrap()) > 400, "{line}");
+        assert!(
+            lead(&RAMPS14_CNC, line, RAMPS14_CNC.motors[motor].enable.unwrap()) > 400,
+            "{line}"
+        );
     }
 }
 
 #[test]
 fn a_motor_that_stands_still_stays_off() {
-    let (mut machine, mut host) = booted(&RAMPS14);
+    let (mut machine, mut host) = booted(&RAMPS14_CNC);
     set(&mut machine, &mut host, NO_SENSOR);
     set(&mut machine, &mut host, "{1pm:3,2pm:3,3pm:2,4pm:0,mt:0.2}");
     set(&mut machine, &mut host, "g1 f500 y1 a1");
     machine.run_for_ms(60).unwrap();
-    let on =
-        |machine: &Machine| [0, 1, 2, 3].map(|m| is_on(machine, RAMPS14.motors[m].enable.unwrap()));
+    let on = |machine: &Machine| {
+        [0, 1, 2, 3].map(|m| is_on(machine, RAMPS14_CNC.motors[m].enable.unwrap()))
+    };
     assert_eq!(on(&machine), [false, true, true, false]);
     machine.run_for_ms(2_000).unwrap();
     assert_eq!(on(&machine), [false; 4]);

@@ -5,7 +5,7 @@
 //! sample, 20 us after the edge, a fifth of a step. Where a step reaches a plate that is less than the time to the
 //! next step, and the report is exact. Where the contact closes between two steps the report may be off by one.
 
-use kerf::boards::{Board, MEGA2560_GRBL, RAMPS14, inputs};
+use kerf::boards::{Board, MEGA2560_GRBL, RAMPS14_CNC, inputs};
 use kerf_sim::mechanics::{Bounce, Build};
 use kerf_sim::{Host, Machine};
 use serde_json::Value;
@@ -117,7 +117,7 @@ impl Bench {
 
 #[test]
 fn a_plate_is_found_to_the_step_at_10_khz() {
-    for board in [&MEGA2560_GRBL, &RAMPS14] {
+    for board in [&MEGA2560_GRBL, &RAMPS14_CNC] {
         let mut bench = Bench::new(board);
         let mut worst = 0;
         for n in 0..6 {
@@ -228,7 +228,7 @@ fn two_axes_are_found_to_the_step() {
 
 #[test]
 fn it_ends_at_the_contact_unless_told_otherwise() {
-    for board in [&MEGA2560_GRBL, &RAMPS14] {
+    for board in [&MEGA2560_GRBL, &RAMPS14_CNC] {
         let mut bench = Bench::new(board);
         for (backs_off, steps) in [(1, -700), (0, -931), (1, -1_331)] {
             set(&mut bench.machine, &mut bench.host, &format!("{{pbo:{backs_off}}}"));

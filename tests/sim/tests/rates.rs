@@ -1,6 +1,6 @@
 //! Step rates, high and low and mixed, measured pulse by pulse.
 
-use kerf::boards::{Board, MEGA2560_GRBL, RAMPS14};
+use kerf::boards::{Board, MEGA2560_GRBL, RAMPS14_CNC};
 use kerf_sim::job::{self, Options};
 use kerf_sim::{Host, Machine};
 
@@ -65,7 +65,7 @@ fn three_motors_are_held_at_20000_steps_a_second() {
 
 #[test]
 fn three_motors_are_held_at_20000_steps_a_second_on_ramps() {
-    three_motors_are_held_on(&RAMPS14);
+    three_motors_are_held_on(&RAMPS14_CNC);
 }
 
 fn three_motors_are_held_on(board: &'static Board) {
@@ -128,7 +128,7 @@ fn reversals_of_all_motors_never_miss_a_tick() {
     // Without a hot end A is no extruder. The filament of an extruder would have to be hot.
     let axis_a = "{aam:1,avm:3600,afr:3600}";
     let settings = ["{he1k:0}", "{4ma:3}", axis_a, "{4tr:1.25}", "{xjm:2000}"];
-    let (mut machine, mut host) = machine(&RAMPS14, &settings);
+    let (mut machine, mut host) = machine(&RAMPS14_CNC, &settings);
     let mut heard = 0;
     for n in 1..=120 {
         let to = n % 2;

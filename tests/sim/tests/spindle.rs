@@ -1,6 +1,6 @@
 //! The spindle's outputs on the chip: the width of its pulses, its levels, and the effect of a reset.
 
-use kerf::boards::{Board, MEGA2560_GRBL, Pin, RAMPS14};
+use kerf::boards::{Board, MEGA2560_GRBL, Pin, RAMPS14_CNC};
 use kerf_sim::mechanics::Build;
 use kerf_sim::{Host, LINES_IN_FLIGHT, Machine};
 
@@ -19,7 +19,7 @@ fn drives(machine: &Machine, pin: Pin) -> Option<bool> {
 
 #[test]
 fn pulses_are_as_wide_as_s_says_within_a_count() {
-    for board in [&MEGA2560_GRBL, &RAMPS14] {
+    for board in [&MEGA2560_GRBL, &RAMPS14_CNC] {
         let (mut machine, mut host) = booted(board);
         assert!((machine.pulses().hertz - 1_000.0).abs() < 0.01, "{:?}", machine.pulses());
         assert_eq!(machine.pulses().share, 0.0, "{:?}", machine.pulses());
@@ -97,16 +97,16 @@ fn an_enable_that_is_active_low_is_never_low_at_start() {
 
 #[test]
 fn a_reset_stops_the_spindle() {
-    let (mut machine, mut host) = (firmware(&RAMPS14), Host::new(LINES_IN_FLIGHT));
+    let (mut machine, mut host) = (firmware(&RAMPS14_CNC), Host::new(LINES_IN_FLIGHT));
     host.boot(&mut machine, 1_000).unwrap();
     set(&mut machine, &mut host, "m3 s2000");
     set(&mut machine, &mut host, "m8");
     host.run_for_ms(&mut machine, 100).unwrap();
-    assert!(machine.is_high(RAMPS14.outputs[0].unwrap()));
+    assert!(machine.is_high(RAMPS14_CNC.outputs[0].unwrap()));
     machine.send_now(0x18);
     machine.run_for_ms(500).unwrap();
     assert_eq!(machine.resets(), 1);
-    for pin in RAMPS14.hazards {
+    for pin in RAMPS14_CNC.hazards {
         assert_eq!(drives(&machine, *pin), Some(false), "{pin:?}");
     }
     assert_eq!(machine.pulses().share, 0.0);

@@ -4,7 +4,7 @@
 //! segment before the interrupt takes it. A twin on the host, `Dda::tick`, gets the segments of each run of the
 //! timer.
 
-use kerf::boards::{Board, MEGA2560_GRBL, MOTORS, RAMPS14};
+use kerf::boards::{Board, MEGA2560_GRBL, MOTORS, RAMPS14_CNC};
 use kerf::dda::{Dda, Pins, SEGMENTS, STEP, Segment};
 use kerf::hal::ring::{Consumer, Producer, Ring};
 use kerf_sim::mechanics::Random;
@@ -240,7 +240,7 @@ fn compare(board: &'static Board, seed: u64) -> (usize, usize) {
 #[test]
 fn the_interrupt_does_what_the_generator_does() {
     let (mut ticks, mut runs) = (0, 0);
-    for (seed, board) in (0..).zip([&MEGA2560_GRBL, &RAMPS14, &MEGA2560_GRBL, &RAMPS14]) {
+    for (seed, board) in (0..).zip([&MEGA2560_GRBL, &RAMPS14_CNC, &MEGA2560_GRBL, &RAMPS14_CNC]) {
         let (more_ticks, more_runs) = compare(board, seed);
         (ticks, runs) = (ticks + more_ticks, runs + more_runs);
     }

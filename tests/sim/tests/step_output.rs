@@ -1,6 +1,6 @@
 //! Step pulses as drivers need them: width, polarity, and time for directions to settle.
 
-use kerf::boards::{Board, MEGA2560_GRBL, RAMPS14};
+use kerf::boards::{Board, MEGA2560_GRBL, RAMPS14_CNC};
 use kerf_sim::Machine;
 use kerf_sim::job::{self, Options};
 
@@ -51,7 +51,7 @@ fn pulses_are_as_wide_as_is_asked_for() {
 
 #[test]
 fn polarity_is_each_motors_own() {
-    for board in [&MEGA2560_GRBL, &RAMPS14] {
+    for board in [&MEGA2560_GRBL, &RAMPS14_CNC] {
         let machine = ran(board, "{1sp:1,3sp:1,spw:4}", JOB);
         for (m, motor) in board.motors.iter().enumerate() {
             let high = machine.peek(motor.step.port.address() as u16) & 1 << motor.step.bit != 0;

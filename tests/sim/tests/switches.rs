@@ -1,6 +1,6 @@
 //! Switches on the image: how fast a limit switch stops motion, and which signals count as a limit.
 
-use kerf::boards::{Board, MEGA2560_GRBL, MEGA2560_LATHE, RAMPS14, inputs};
+use kerf::boards::{Board, MEGA2560_GRBL, MEGA2560_LATHE, RAMPS14_CNC, inputs};
 use kerf_sim::mechanics::{Bounce, Build, Sensors, Wiring};
 use kerf_sim::{Host, Machine};
 
@@ -51,7 +51,7 @@ fn check_windows(machine: &Machine) {
 
 #[test]
 fn a_limit_stops_at_once() {
-    for board in [&MEGA2560_GRBL, &RAMPS14] {
+    for board in [&MEGA2560_GRBL, &RAMPS14_CNC] {
         for (input, name) in
             [(inputs::X_MIN, "xmin"), (inputs::Y_MIN, "ymin"), (inputs::Z_MIN, "zmin")]
         {
@@ -92,9 +92,9 @@ fn at_full_speed_it_takes_longer() {
 
 #[test]
 fn a_carriage_that_runs_into_its_switch_stops_before_the_hard_end() {
-    let mut build = Build::of(&RAMPS14);
+    let mut build = Build::of(&RAMPS14_CNC);
     build.axes[0].start = 150.0;
-    let (mut machine, mut host) = running(&RAMPS14, &build, &["{xsx:2,xvm:4000,yvm:4000}"]);
+    let (mut machine, mut host) = running(&RAMPS14_CNC, &build, &["{xsx:2,xvm:4000,yvm:4000}"]);
     machine.tamper(|m, _| m.bounce(inputs::X_MAX, Some(Bounce { times: 20, cycles: 3_000 * US })));
     let told = exceptions(&mut machine, &mut host, 3_000);
     assert!(told.len() == 1 && told[0].contains("xmax"), "{told:?}");
@@ -193,7 +193,7 @@ fn a_look_within_the_tick_does_not_let_exec_interrupt_itself() {
 
 #[test]
 fn each_event_is_told_once_and_the_state_is_right_after_it() {
-    let (mut machine, mut host) = running(&RAMPS14, &Build::of(&RAMPS14), &["{xsn:1}"]);
+    let (mut machine, mut host) = running(&RAMPS14_CNC, &Build::of(&RAMPS14_CNC), &["{xsn:1}"]);
     machine.tamper(|m, _| m.bounce(inputs::X_MIN, Some(Bounce { times: 30, cycles: 5_000 * US })));
     for worked in [true, false, true] {
         machine.tamper(|mechanics, now| mechanics.work(inputs::X_MIN, worked, now));
@@ -209,7 +209,7 @@ fn each_event_is_told_once_and_the_state_is_right_after_it() {
 
 #[test]
 fn after_a_limit_the_position_is_known_to_the_step() {
-    for (board, jerk) in [(&MEGA2560_GRBL, "{xjm:1e5}"), (&RAMPS14, "{xjm:5e3}")] {
+    for (board, jerk) in [(&MEGA2560_GRBL, "{xjm:1e5}"), (&RAMPS14_CNC, "{xjm:5e3}")] {
         let (mut machine, mut host) = running(board, &Build::of(board), &[jerk, "{xsn:2}"]);
         for n in 0..6 {
             machine.tamper(|mechanics, now| mechanics.work(inputs::X_MIN, true, now));

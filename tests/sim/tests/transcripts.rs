@@ -10,16 +10,16 @@ use crate::{pages, transcript};
 /// Transcripts that only the image of a lathe can play.
 const TURNING: [&str; 3] = ["encoder.", "thread", "lathe-"];
 /// Transcripts that only the image of a printer can play.
-const PRINTING: [&str; 4] = ["bed", "corexy", "heat", "reprap"];
+const PRINTING: [&str; 2] = ["bed", "reprap"];
 /// Transcripts that also need grbl's dialect.
 const BOTH: [&str; 2] = ["grbl-thread", "grbl-lathe"];
 
 #[test]
 fn the_image_keeps_to_the_transcripts() {
     let mut all = transcript::read_all(Path::new("../../transcripts"));
-    // No image for this chip has drivers with UART, or both printing hosts and a second port. The emulated `skr-pico`
-    // has them.
-    let elsewhere = ["drivers", "reprap-ports"];
+    // No image for this chip has drivers with UART, or both printing hosts and a second port or TinyG's dialect. The
+    // emulated `skr-pico` has them.
+    let elsewhere = ["drivers", "reprap-ports", "corexy", "heat"];
     all.retain(|one| !elsewhere.iter().any(|name| one.name.starts_with(name)));
     let begins = |names: &[&str], one: &transcript::Transcript| {
         names.iter().any(|name| one.name.starts_with(name))

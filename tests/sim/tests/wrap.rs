@@ -1,13 +1,13 @@
 //! The millisecond count of the image wraps after 2^32 ms, 49.7 days. Each machine here starts 3 s before the wrap.
 
-use kerf::boards::RAMPS14;
+use kerf::boards::RAMPS14_CNC;
 use kerf_sim::{Host, LINES_IN_FLIGHT, Machine};
 
 use crate::common::{age, firmware, set};
 
 /// A machine that has run for 49.7 days minus 3 s.
 fn old() -> (Machine, Host) {
-    let mut machine = firmware(&RAMPS14);
+    let mut machine = firmware(&RAMPS14_CNC);
     age(&mut machine, 3_000);
     let mut host = Host::new(LINES_IN_FLIGHT);
     host.boot(&mut machine, 1_000).unwrap();
@@ -35,7 +35,7 @@ fn with_a_spindle() {
     let (mut machine, mut host) = old();
     set(&mut machine, &mut host, "m3 s1000");
     pass(&mut machine, &mut host);
-    let spindle = RAMPS14.outputs[0].unwrap();
+    let spindle = RAMPS14_CNC.outputs[0].unwrap();
     assert!(machine.is_high(spindle));
     set(&mut machine, &mut host, "m5");
     host.run_for_ms(&mut machine, 100).unwrap();

@@ -11,7 +11,7 @@ use kerf::boards::RAMPS14;
 use super::Figure;
 use super::spirals::spiral;
 use super::workload::{ACCELERATION, Bed, How, USUAL_JERK};
-use crate::host::{Host, LINES_IN_FLIGHT};
+use crate::by_name;
 use crate::machine::Machine;
 
 /// Feed, mm/min.
@@ -21,34 +21,30 @@ const CHORD: f64 = 0.2;
 const WINDOW: usize = 4;
 /// The job has ended when no step has come for this long, ms.
 const REST_MS: u64 = 500;
-/// Time after which the settings are in EEPROM, ms.
-const KEEPS_MS: u64 = 4_000;
 
 /// Moves of 0.2 mm of a printing host, without line numbers.
 pub fn plain(bed: &Bed) -> Result<Figure> {
-    over_ideal(bed, false, &["{dia:16}"])
+    over_ideal(bed, false, &[])
 }
 
 /// Moves of 0.2 mm of a printing host, with pressure advance.
 pub fn advanced(bed: &Bed) -> Result<Figure> {
-    over_ideal(bed, false, &["{he1pa:0.05}", "{dia:16}"])
+    over_ideal(bed, false, &["{he1pa:0.05}"])
 }
 
 /// Lines with their numbers and checksums, along X and Y.
 pub fn numbered(bed: &Bed) -> Result<Figure> {
-    over_ideal(bed, true, &["{dia:16}"])
+    over_ideal(bed, true, &[])
 }
 
 fn over_ideal(bed: &Bed, numbered: bool, more: &'static [&'static str]) -> Result<Figure> {
     let bed = bed.beside(&RAMPS14)?;
     let how = How { jerk: Some(USUAL_JERK), more, ..How::default() };
     let mut machine = bed.machine()?;
-    let mut host = Host::new(LINES_IN_FLIGHT);
-    host.boot(&mut machine, 1_000)?;
+    by_name::boot(&mut machine)?;
     for line in bed.settings(how) {
-        host.ask(&mut machine, &line, 1_000)?;
+        by_name::set(&mut machine, &line)?;
     }
-    host.run_for_ms(&mut machine, KEEPS_MS)?;
     let mut fresh = bed.machine()?;
     fresh.set_eeprom(machine.eeprom());
     fresh.run_for_ms(500)?;

@@ -14,27 +14,32 @@ const AXIS_NAMES: [char; AXES] = ['x', 'y', 'z', 'a', 'b', 'c'];
 
 /// Reads motors and axes from the firmware.
 pub fn read_setup(machine: &mut impl Runs, host: &mut Host) -> Result<Setup> {
+    setup_of(|name| {
+        let response = host.ask(machine, &format!("{{{name}:n}}"), ASK_MS)?;
+        let value = response.body.get(name).cloned();
+        value.with_context(|| format!("no {name} in {}", response.raw))
+    })
+}
+
+/// Makes the setup from the values of settings, which `value` returns by their names.
+pub fn setup_of(mut value: impl FnMut(&str) -> Result<Value>) -> Result<Setup> {
     let mut motors = Vec::with_capacity(MOTORS);
     for n in 1..=MOTORS {
-        let response = host.ask(machine, &format!("{{{n}:n}}"), ASK_MS)?;
-        let group = response.body.get(n.to_string());
-        let motor = group.and_then(motor_of);
-        let raw = &response.raw;
-        motors.push(motor.with_context(|| format!("no settings of motor {n} in {raw}"))?);
+        let motor = motor_of(|key| value(&format!("{n}{key}")).ok());
+        motors.push(motor.with_context(|| format!("no settings of motor {n}"))?);
     }
     let mut modes = [AxisMode::Standard; AXES];
     for motor in &motors {
         for axis in [motor.axis, if motor.besides == 0 { motor.axis } else { 1 }] {
-            modes[axis] = mode_of(machine, host, axis)?;
+            modes[axis] = mode_of(value(&format!("{}am", AXIS_NAMES[axis])).ok());
         }
     }
     Ok(Setup { motors, modes })
 }
 
-fn motor_of(group: &Value) -> Option<MotorSetup> {
-    let number = |key| Decimal::parse(&group.get(key)?.as_number()?.to_string());
-    let whole = |key| number(key)?.as_whole();
-    let drives = usize::try_from(whole("ma")?).ok()?;
+fn motor_of(mut value: impl FnMut(&str) -> Option<Value>) -> Option<MotorSetup> {
+    let mut number = |key| Decimal::parse(&value(key)?.as_number()?.to_string());
+    let drives = usize::try_from(number("ma")?.as_whole()?).ok()?;
     let besides = match u8::try_from(drives) {
         Ok(SUM) => 1,
         Ok(DIFFERENCE) => -1,
@@ -48,38 +53,40 @@ fn motor_of(group: &Value) -> Option<MotorSetup> {
         besides,
         step_angle: number("sa")?,
         travel: if moves { number("tr")? } else { Decimal::whole(0) },
-        microsteps: u32::try_from(whole("mi")?).ok()?,
-        inverted: whole("po")? != 0,
+        microsteps: u32::try_from(number("mi")?.as_whole()?).ok()?,
+        inverted: number("po")?.as_whole()? != 0,
         // Not every firmware has this setting.
-        active_low: whole("sp").unwrap_or(0) != 0,
+        active_low: number("sp").and_then(|value| value.as_whole()).unwrap_or(0) != 0,
     })
 }
 
-fn mode_of(machine: &mut impl Runs, host: &mut Host, axis: usize) -> Result<AxisMode> {
-    let name = format!("{}am", AXIS_NAMES[axis]);
-    let response = host.ask(machine, &format!("{{{name}:n}}"), ASK_MS)?;
-    Ok(match response.body.get(&name).and_then(Value::as_i64) {
+fn mode_of(value: Option<Value>) -> AxisMode {
+    match value.and_then(|value| value.as_i64()) {
         Some(0) => AxisMode::Disabled,
         Some(2) => AxisMode::Inhibited,
         Some(3) => AxisMode::Radius,
         _ => AxisMode::Standard,
-    })
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn motor_of(group: serde_json::Value) -> Option<MotorSetup> {
+        super::motor_of(|key| group.get(key).cloned())
+    }
+
     #[test]
     fn a_motor_may_move_nothing() {
-        let motor = motor_of(&serde_json::json!({"ma":255,"sa":1.8,"tr":5,"mi":8,"po":0})).unwrap();
+        let motor = motor_of(serde_json::json!({"ma":255,"sa":1.8,"tr":5,"mi":8,"po":0})).unwrap();
         assert_eq!(motor.steps(10_000), 0);
     }
 
     #[test]
     fn a_motor_may_drive_two_axes() {
         let motor = |ma: u8| {
-            motor_of(&serde_json::json!({"ma":ma,"sa":1.8,"tr":40,"mi":16,"po":0})).unwrap()
+            motor_of(serde_json::json!({"ma":ma,"sa":1.8,"tr":40,"mi":16,"po":0})).unwrap()
         };
         assert_eq!((motor(SUM).axis, motor(SUM).besides), (0, 1));
         assert_eq!((motor(DIFFERENCE).axis, motor(DIFFERENCE).besides), (0, -1));
@@ -89,9 +96,9 @@ mod tests {
     #[test]
     fn reads_a_motor_group() {
         let group = serde_json::json!({"ma":2,"sa":1.8,"tr":1.25,"mi":8,"po":1,"pm":2,"sp":0});
-        let motor = motor_of(&group).unwrap();
+        let motor = motor_of(group).unwrap();
         assert_eq!((motor.axis, motor.microsteps, motor.inverted), (2, 8, true));
         assert_eq!(motor.steps(10_000), 1280);
-        assert!(motor_of(&serde_json::json!({"ma":1})).is_none());
+        assert!(motor_of(serde_json::json!({"ma":1})).is_none());
     }
 }

@@ -7,8 +7,8 @@
 //! | [`session`] | a printing host: line numbers, checksums, one line in flight |
 //! | [`heat`] | the temperatures of the print, and how well they were held |
 //!
-//! Settings are asked of a twin, a second machine, in TinyG's dialect, because the port that prints speaks the
-//! dialect of printing hosts from its first line on. Steps count from the last G28.
+//! Settings are given to a twin, a second machine, so that the print begins with what a start finds in EEPROM. Steps
+//! count from the last G28.
 
 mod heat;
 mod path;
@@ -18,7 +18,7 @@ mod session;
 use anyhow::{Context, Result, bail, ensure};
 use kerf::boards::{Board, MOTORS};
 
-use crate::host::Host;
+use crate::by_name;
 use crate::job::{self, BOOT_MS, Lines, Options};
 use crate::machine::Machine;
 use crate::oracle::{Outcome, Setup, Unclear};
@@ -51,17 +51,13 @@ pub fn is_print(board: &Board, lines: &Lines) -> bool {
 /// settings, and its setup.
 fn twin(machine: &Machine, lines: &Lines, settings: &[String]) -> Result<(Machine, Setup)> {
     let mut twin = Machine::new(machine.image().clone(), machine.board())?;
-    let mut host = Host::new(1);
-    host.boot(&mut twin, BOOT_MS)?;
-    let machine = host.ask(&mut twin, "{mch:n}", LINE_MS)?;
-    let careful = machine.body["mch"].as_i64() == Some(0);
-    let all: Vec<_> =
-        careful.then(|| PRINTER.to_owned()).into_iter().chain(settings.iter().cloned()).collect();
-    // Lines such as M0 may wait for an operator in a print, too: this also sends the setting that makes the firmware
-    // resume.
-    job::ask_settings(&mut twin, &mut host, lines, &all)?;
-    job::put_away(&mut twin, &mut host)?;
-    let setup = job::read_setup(&mut twin, &mut host)?;
+    by_name::boot(&mut twin)?;
+    let careful = by_name::value(&mut twin, "mch")?.as_i64() == Some(0);
+    let own = careful.then_some(PRINTER).into_iter().chain(job::going_on(lines));
+    for setting in own.chain(settings.iter().map(String::as_str)) {
+        by_name::set(&mut twin, setting)?;
+    }
+    let setup = by_name::read_setup(&mut twin)?;
     Ok((twin, setup))
 }
 

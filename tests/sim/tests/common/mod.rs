@@ -2,6 +2,7 @@
 
 #[macro_use]
 mod rows;
+pub mod printing;
 mod simulated;
 pub mod turning;
 

@@ -19,8 +19,8 @@ impl Side for Machine {
         Machine::send_to(self, AUX, bytes);
     }
 
-    fn speaks_tinyg(&self) -> bool {
-        self.board().features.contains(&"dialect-tinyg")
+    fn first_dialect(&self) -> &'static str {
+        self.board().features[0]
     }
 
     fn set_aux_cts(&mut self, stop: bool) {
