@@ -5,9 +5,6 @@ use kerf_sim::Machine;
 
 use crate::common::{booted, set};
 
-/// Without a hot end axis A is no extruder. The filament of an extruder would have to be hot.
-const NO_SENSOR: &str = "{he1k:0}";
-
 /// Whether an enable pin, which is active low, is on.
 fn is_on(machine: &Machine, pin: Pin) -> bool {
     machine.peek(pin.port.address() as u16) & 1 << pin.bit == 0
@@ -16,9 +13,6 @@ fn is_on(machine: &Machine, pin: Pin) -> bool {
 /// Runs until the first step, instruction by instruction. Returns how many cycles before it `enable` came on.
 fn lead(board: &'static Board, line: &str, enable: Pin) -> u64 {
     let (mut machine, mut host) = booted(board);
-    if board.heaters.is_some() {
-        set(&mut machine, &mut host, NO_SENSOR);
-    }
     set(&mut machine, &mut host, "{1pm:3,2pm:3,3pm:3,4pm:3}");
     assert!(!is_on(&machine, enable));
     machine.send(format!("{line}\n").as_bytes());
@@ -46,7 +40,6 @@ fn power_comes_before_the_first_step() {
 #[test]
 fn a_motor_that_stands_still_stays_off() {
     let (mut machine, mut host) = booted(&RAMPS14_CNC);
-    set(&mut machine, &mut host, NO_SENSOR);
     set(&mut machine, &mut host, "{1pm:3,2pm:3,3pm:2,4pm:0,mt:0.2}");
     set(&mut machine, &mut host, "g1 f500 y1 a1");
     machine.run_for_ms(60).unwrap();

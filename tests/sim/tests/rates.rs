@@ -125,9 +125,8 @@ fn one_step_every_ten_seconds_with_fine_steps() {
 /// before the timer gets there. Otherwise the timer counts on to 65,535: 4 ms without a step.
 #[test]
 fn reversals_of_all_motors_never_miss_a_tick() {
-    // Without a hot end A is no extruder. The filament of an extruder would have to be hot.
     let axis_a = "{aam:1,avm:3600,afr:3600}";
-    let settings = ["{he1k:0}", "{4ma:3}", axis_a, "{4tr:1.25}", "{xjm:2000}"];
+    let settings = ["{4ma:3}", axis_a, "{4tr:1.25}", "{xjm:2000}"];
     let (mut machine, mut host) = machine(&RAMPS14_CNC, &settings);
     let mut heard = 0;
     for n in 1..=120 {

@@ -99,6 +99,8 @@ fn an_enable_that_is_active_low_is_never_low_at_start() {
 fn a_reset_stops_the_spindle() {
     let (mut machine, mut host) = (firmware(&RAMPS14_CNC), Host::new(LINES_IN_FLIGHT));
     host.boot(&mut machine, 1_000).unwrap();
+    // While the dialect is open a `^x` at rest only greets.
+    set(&mut machine, &mut host, "{fb:n}");
     set(&mut machine, &mut host, "m3 s2000");
     set(&mut machine, &mut host, "m8");
     host.run_for_ms(&mut machine, 100).unwrap();
