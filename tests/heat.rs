@@ -8,7 +8,7 @@ use crate::plant::{AIR, Plant};
 
 /// The state of a sensor's wire.
 #[derive(Clone, Copy, PartialEq)]
-enum Wire {
+pub enum Wire {
     Well,
     Open,
     Short,
@@ -16,24 +16,26 @@ enum Wire {
     Loose,
 }
 
-struct Printer {
-    machine: Machine,
-    hot_end: Plant,
-    bed: Plant,
-    wire: Wire,
+/// A printer whose firmware runs in mocked time.
+pub struct Printer {
+    pub machine: Machine,
+    pub hot_end: Plant,
+    pub bed: Plant,
+    pub wire: Wire,
     /// Whether the transistor of the hot end conducts whatever the firmware does.
-    stuck: bool,
+    pub stuck: bool,
     noise: u32,
-    loose: f64,
+    /// What the loose sensor reads.
+    pub loose: f64,
     /// The kind of the hot end's sensor.
     kind: Kind,
     word: u16,
-    ms: u64,
-    said: String,
+    pub ms: u64,
+    pub said: String,
 }
 
 /// Time between two computations of the plants, ms.
-const STEP: u64 = 10;
+pub const STEP: u64 = 10;
 /// Time that a MAX6675 takes for a conversion, ms.
 const CONVERTS: u64 = 220;
 
@@ -43,7 +45,7 @@ impl Printer {
     }
 
     /// A printer whose hot end has this temperature at power-up; `None` without the capability.
-    fn at(degrees: f64) -> Option<Self> {
+    pub fn at(degrees: f64) -> Option<Self> {
         if !Capability::Printer.is_built_in() {
             return None;
         }
@@ -87,7 +89,7 @@ impl Printer {
     }
 
     /// Runs for a time, and calls `look` at each step.
-    fn run(&mut self, ms: u64, mut look: impl FnMut(&Self)) {
+    pub fn run(&mut self, ms: u64, mut look: impl FnMut(&Self)) {
         for _ in 0..ms / STEP {
             let on = self.machine.heaters_on();
             let (seconds, fan) = (STEP as f64 / 1_000.0, on & 4 != 0);
@@ -110,13 +112,13 @@ impl Printer {
         }
     }
 
-    fn send(&mut self, line: &str) {
+    pub fn send(&mut self, line: &str) {
         self.machine.send(line.as_bytes());
         self.machine.send(b"\n");
     }
 
     /// Sends a line and runs until it is answered.
-    fn ask(&mut self, line: &str) -> String {
+    pub fn ask(&mut self, line: &str) -> String {
         self.said.clear();
         self.send(line);
         self.run(200, |_| {});

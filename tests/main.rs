@@ -81,6 +81,8 @@ mod grbl_random;
 mod grbl_resets;
 mod heat;
 mod heat_hosts;
+mod heat_lines;
+mod heat_patterns;
 mod hold;
 mod jogs;
 mod limits;

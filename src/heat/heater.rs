@@ -18,8 +18,8 @@ const MISSING: u8 = 3;
 const ASKED_EVERY: u8 = 6;
 /// Samples for which a MAX6675 may be unreadable, while a block of the SD card is being transferred: 160 ms.
 const DENIED: u8 = 4;
-/// [`Rule::rise_s`] of the hot end and of the bed.
-const RISE_S: [u16; HEATERS] = [20, 90];
+/// [`Rule::rise_s`] and [`Rule::reach`] of the hot end and of the bed.
+const RULES: [(u16, i16); HEATERS] = [(20, 256), (90, 128)];
 
 /// A heater with its sensor.
 #[derive(Clone, Copy, Debug)]
@@ -32,6 +32,8 @@ pub struct Heater {
     least: i16,
     control: Control,
     watch: Watch,
+    /// The highest power since the last step of `watch`, also if the heater has been stopped since.
+    given: u8,
     /// The sum of the sensor's readings since the last step.
     sum: i32,
     samples: u8,
@@ -65,6 +67,7 @@ impl Heater {
         least: 0,
         control: Control::OFF,
         watch: Watch::OFF,
+        given: 0,
         sum: 0,
         samples: 0,
         missing: 0,
@@ -224,9 +227,11 @@ impl Heater {
         tune: Option<&mut Tune>,
     ) -> Result<(), Status> {
         self.now = mean;
-        let rise_s = if number == 0 { RISE_S[0] } else { RISE_S[1] };
+        let (rise_s, reach) = if number == 0 { RULES[0] } else { RULES[1] };
         if self.kind != Kind::None {
-            self.watch.step(mean, wanted, &Rule { rise_s, hottest: self.hottest })?;
+            let rule = Rule { rise_s, hottest: self.hottest, reach };
+            let given = core::mem::take(&mut self.given);
+            self.watch.step(mean, wanted, given, &rule)?;
         }
         match (wanted, tune) {
             (0, _) => self.control.stop(mean),
@@ -235,6 +240,7 @@ impl Heater {
                 self.control.step(mean, wanted, fan, &self.factors);
             }
         }
+        self.given = self.given.max(self.control.power());
         Ok(())
     }
 }

@@ -23,34 +23,20 @@ pub struct Plant {
 pub const AIR: f64 = 22.0;
 
 impl Plant {
+    /// A heater of this heat capacity (joules per degree), power (watts), loss without the fan and additional loss with
+    /// it (watts per degree), and time constants (seconds).
+    pub fn of(capacity: f64, watts: f64, loss: f64, fan: f64, delay: [f64; 2]) -> Self {
+        Self { capacity, watts, loss, fan, delay, heater: 0.0, block: AIR, sensor: AIR }
+    }
+
     /// A hot end of 40 W that reaches 200 degrees in 90 s.
     pub fn hot_end() -> Self {
-        let delay = [2.0, 1.5];
-        Self {
-            capacity: 14.0,
-            watts: 40.0,
-            loss: 0.09,
-            fan: 0.03,
-            delay,
-            heater: 0.0,
-            block: AIR,
-            sensor: AIR,
-        }
+        Self::of(14.0, 40.0, 0.09, 0.03, [2.0, 1.5])
     }
 
     /// A bed of 120 W that reaches 60 degrees in 4 minutes.
     pub fn bed() -> Self {
-        let delay = [5.0, 4.0];
-        Self {
-            capacity: 600.0,
-            watts: 120.0,
-            loss: 1.2,
-            fan: 0.0,
-            delay,
-            heater: 0.0,
-            block: AIR,
-            sensor: AIR,
-        }
+        Self::of(600.0, 120.0, 1.2, 0.0, [5.0, 4.0])
     }
 
     /// Lets time pass with a share of the heater's power and of the fan's; a `bool` is all or nothing.
