@@ -44,8 +44,6 @@ pub const BEYOND: i16 = 15 * UNIT;
 const BY_ITSELF: i16 = 20 * UNIT;
 /// Up to this temperature a heater that is off has no fault, however cold it was.
 const WARM: i16 = 70 * UNIT;
-/// From this temperature on a heater may need full power to hold its target.
-const HELD: i16 = 50 * UNIT;
 /// A fall by this at full power is a fault.
 const COLDER: i16 = 20 * UNIT;
 /// How far `mark` and `warm` follow a fall in a step: 10 degrees a second, which no heater exceeds. So a disturbed
@@ -56,6 +54,9 @@ const FALL: i16 = 2 * UNIT;
 const FULL: i16 = 63;
 /// The loss that a heater may have at 0 degrees.
 const LOSS: i16 = FULL / 8;
+/// From this loss on, which is that at 96 degrees in a hot end and 48 in a bed, a heater may need full power to hold its
+/// target.
+const HELD: i16 = FULL / 2;
 /// The limit of `owed`, for each step of [`Rule::rise_s`].
 const LIMIT: i16 = FULL - LOSS;
 /// `warm` rises by this times the power in a step, over [`Rule::rise_s`]: at full power 16 degrees a second for a hot
@@ -181,9 +182,9 @@ impl Watch {
         }
         let fall = fall.clamp(0, FALL);
         self.mark -= fall;
-        let loss = match self.phase {
-            Phase::Holds if now >= HELD => FULL,
-            _ => LOSS + now.max(0) / rule.reach,
+        let loss = match LOSS + now.max(0) / rule.reach {
+            loss if loss >= HELD && self.phase == Phase::Holds => FULL,
+            loss => loss,
         };
         let limit = limit(rule);
         let lost = if fall > 0 && power > 0 {

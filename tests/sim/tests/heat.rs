@@ -1,10 +1,10 @@
 //! The heaters on the chip: the converter, the pins, faults, and motion at the same time.
 
-use kerf::boards::{Heater, Heaters, Pin, RAMPS14};
+use kerf::boards::{Heater, Heaters, Pin, RAMPS14, RAMPS14_SD};
 use kerf::heat::sensor::{Kind, share};
 use kerf_sim::{Host, Machine};
 
-use crate::common::{booted, set};
+use crate::common::{booted, firmware, set};
 use crate::plant::Plant;
 
 /// The board's heaters.
@@ -323,5 +323,71 @@ fn every_way_off_lets_go_of_the_pins() {
         println!("{name}: off after {off:?} ms");
         let most = if name == "the watchdog" { 700 } else { 100 };
         assert!(off.is_some_and(|ms| ms <= most), "{name}: off after {off:?} ms");
+    }
+}
+
+/// What is wrong with a hot end.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Defect {
+    /// The sensor has fallen out and reads 28 degrees.
+    Loose,
+    /// The heater gets no current.
+    Dead,
+    /// The transistor stays on.
+    Stuck,
+}
+
+/// A host changes the target again and again: the fault comes within the time that a constant target gives. Lines of a
+/// printing host, on its own image.
+#[test]
+fn no_change_of_target_hides_a_fault() {
+    let rises: &[(&str, u64)] = &[("M104 S200", 9_000), ("M104 S201", 9_000)];
+    let falls: &[(&str, u64)] = &[("M104 S200", 8_000), ("M104 S0", 500)];
+    let around: &[(&str, u64)] = &[("M104 S200", 9_000), ("M104 S30", 1_000)];
+    let off: &[(&str, u64)] = &[("M104 S0", 8_000), ("M104 S160", 500)];
+    for (defect, at, targets, seconds, text) in [
+        (Defect::Loose, 200.0, rises, 25, "heater does not heat"),
+        (Defect::Loose, 200.0, falls, 30, "heater does not heat"),
+        (Defect::Loose, 200.0, around, 30, "heater does not heat"),
+        (Defect::Dead, 28.0, falls, 30, "heater does not heat"),
+        (Defect::Stuck, 120.0, off, 25, "heater out of control"),
+    ] {
+        let mut machine = firmware(&RAMPS14_SD);
+        let Heaters { heaters: [hot_end, bed], .. } = RAMPS14_SD.heaters.expect("it has heaters");
+        let mut plant = Plant::hot_end();
+        (plant.block, plant.sensor) = (at, at);
+        let millivolts = |degrees| (share(Kind::Semitec, degrees) * 5_000.0).round() as u32;
+        machine.set_millivolts(bed.channel, millivolts(22.0));
+        let (mut turns, mut left) = (targets.iter().cycle(), 1_000);
+        let (mut said, mut told, mut most) = (String::new(), None, at);
+        for ms in 0..seconds * 1_000 + 1_000 {
+            if left == 0 {
+                let (line, lasts) = turns.next().expect("it is endless");
+                machine.send(format!("{line}\n").as_bytes());
+                left = *lasts;
+            }
+            left -= 1;
+            let power = match defect {
+                Defect::Loose => machine.power_at(hot_end.pin),
+                Defect::Dead => 0.0,
+                Defect::Stuck => 1.0,
+            };
+            plant.pass(0.001, power, 0.0);
+            most = most.max(plant.block);
+            let reads = if defect == Defect::Loose { 28.0 } else { plant.sensor };
+            machine.set_millivolts(hot_end.channel, millivolts(reads));
+            machine.run_for_ms(1).unwrap();
+            said += &String::from_utf8_lossy(&machine.receive());
+            if said.contains(text) {
+                told = told.or(Some(ms));
+            }
+            if told.is_some_and(|told| ms > told + 200) {
+                assert_eq!(machine.power_at(hot_end.pin), 0.0, "{defect:?}, {targets:?}");
+                break;
+            }
+        }
+        println!("{defect:?}, {targets:?}: after {told:?} ms, at most {most:.0}");
+        assert!(told.is_some(), "{defect:?}, {targets:?}: block {most:.0}, {said}");
+        assert!(most < 290.0, "{defect:?}, {targets:?}: {most:.0}");
     }
 }
