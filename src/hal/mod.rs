@@ -44,7 +44,10 @@ pub mod imp;
 #[path = "host/mod.rs"]
 pub mod imp;
 
-/// The part of `rp2040` that is plain Rust, compiled here for its tests.
+/// The parts of `rp2040` that are plain Rust, compiled here for their tests.
+#[cfg(test)]
+#[path = "rp2040/pieces/mod.rs"]
+mod pieces;
 #[cfg(test)]
 #[allow(dead_code)]
 #[path = "rp2040/stepper/words.rs"]

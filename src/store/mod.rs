@@ -42,6 +42,11 @@ pub trait Memory {
     fn read_here(&self, at: u16) -> u8 {
         self.read(at)
     }
+    /// Whether some bytes could not be read at the start.
+    #[inline(always)]
+    fn is_lost(&self) -> bool {
+        false
+    }
     /// Whether a byte is being written.
     fn is_busy(&self) -> bool;
     /// Whether a byte may be written to an address at once. While the memory is busy this is `true` only if the

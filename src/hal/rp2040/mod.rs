@@ -40,6 +40,7 @@ pub mod heaters;
 pub mod inputs;
 mod last_words;
 pub mod panic;
+mod pieces;
 pub mod pwm;
 pub mod stepper;
 #[path = "../host/text.rs"]

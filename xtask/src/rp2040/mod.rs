@@ -19,7 +19,7 @@ const TARGET: &str = "thumbv6m-none-eabi";
 const FLAGS: &str = "-C linker=ld.lld -C link-arg=-Tlink.x -C link-arg=-Tlink-rp.x -C link-arg=-Lsrc/hal/rp2040 -C link-arg=--nmagic";
 
 /// Flash that the image may take: 2 MiB minus the part of `memory.x` that stores settings.
-const FLASH: u64 = (2 << 20) - (64 << 10);
+const FLASH: u64 = (2 << 20) - (68 << 10);
 /// RAM for statics, of 256 KiB; the rest is for the stack.
 const STATIC_RAM: u64 = 192 << 10;
 
