@@ -10,7 +10,7 @@ mod texts;
 use heapless::Vec;
 
 use crate::progmem::Plain;
-use crate::store::program::STARTUPS;
+use crate::store::program::{STARTUPS, Startup};
 use crate::store::{Memory, program};
 
 /// The longest line of a job, in bytes.
@@ -56,7 +56,8 @@ impl Job {
 
     /// Returns the job of the start-up lines; `None` if there are none.
     pub fn of_startup(memory: &impl Memory) -> Option<Self> {
-        let any = (0..STARTUPS).any(|n| program::startup_len(memory, n) != 0);
+        let mut lines = (0..STARTUPS).filter_map(|n| Startup::find(memory, n));
+        let any = lines.any(|line| line.len() != 0);
         any.then(|| Self { number: STARTUP, ..Self::default() })
     }
 
@@ -127,18 +128,20 @@ impl Job {
         let n = self.piece;
         self.piece += 1;
         line.clear();
-        for at in 0..program::startup_len(memory, n) {
-            let _ = line.push(program::startup_byte(memory, n, at));
+        if let Some(startup) = Startup::find(memory, n) {
+            for at in 0..startup.len() {
+                let _ = line.push(startup.byte(memory, at));
+            }
         }
         n < STARTUPS
     }
 
     fn stored_line(&mut self, memory: &impl Memory, line: &mut Vec<u8, LINE_MAX>) -> bool {
         line.clear();
-        let len = program::len(memory).unwrap_or(0);
+        let Some(program) = program::find(memory) else { return false };
         let mut at = u16::from_le_bytes([self.at, self.piece]);
         let mut found = false;
-        while let Some(byte) = program::byte(memory, len, at) {
+        while let Some(byte) = program.byte(memory, at) {
             at += 1;
             found = true;
             if byte == b'\n' {

@@ -1,5 +1,5 @@
 //! A program of G-code that a user keeps in EEPROM, behind the log. The area has 874 bytes (698 in an image that can
-//! print). Its last 86 bytes are two start-up lines, which run at each start.
+//! print). Its last 129 bytes have two start-up lines, which run at each start.
 //!
 //! ```text
 //! byte 0      VALID, written last; any other value: there is no program
@@ -7,13 +7,18 @@
 //! 3, 4        checksum of the text
 //! 5 ...       the text; each line ends in a line feed
 //! ```
-//! The program is written line by line, one byte per call: the caller that stores a line repeats the call until the
-//! line is stored, so nothing is buffered in RAM. A byte that is already right is not written again. [`begin`] makes
-//! the old program invalid, [`end`] makes the new one valid. So after a power failure there is the old program, the
-//! new one or none. The program is checked when it is started, which takes 10 ms on AVR, and is then read in place.
+//! One program begins at the first byte and goes up, the other begins at the last byte and goes down. A new program is
+//! written on the side where none is valid. [`end`] makes it valid and then the old one invalid. So after a power
+//! failure there is the old program or the new one. Only if both have no room together, the first line that needs the
+//! room of the old one makes that invalid: then there may be none.
 //!
-//! A start-up line takes 43 bytes: its length, a checksum of two bytes, and at most 40 of text. If a power failure has
-//! cut a line off, there is no line.
+//! The program is written line by line, one byte per call: the caller that stores a line repeats the call until the
+//! line is stored, so nothing is buffered in RAM. A byte that is already right is not written again. The program is
+//! checked when it is started, which takes 10 ms on AVR, and is then read in place.
+//!
+//! A start-up line takes a slot of 43 bytes: its length and whose line it is, a checksum of two bytes, and at most 40
+//! of text. There are three slots. A new line is written to the free one, and then the old one is made invalid. So after
+//! a power failure there is the old line or the new one.
 //!
 //! If the log of earlier firmware has reached this area, the log keeps it ([`Log::is_wide`](super::Log::is_wide)). No
 //! program can be stored then.
@@ -31,14 +36,25 @@ const ERASED: u8 = 0xFF;
 const HEAD: u16 = 5;
 /// The number of start-up lines.
 pub const STARTUPS: u8 = 2;
+/// The number of slots for them.
+const SLOTS: u8 = STARTUPS + 1;
 /// The longest start-up line.
 pub const STARTUP_MAX: u8 = 40;
-/// Bytes of a start-up line, with its head.
+/// Bytes of a slot.
 const STARTUP: u16 = 3 + STARTUP_MAX as u16;
-/// Bytes of the program, with its head.
-const PROGRAM: u16 = AREA - STARTUP * STARTUPS as u16;
+/// Bytes of both programs, with their heads.
+const PROGRAM: u16 = AREA - STARTUP * SLOTS as u16;
 
 const CRC: Crc<u16, NoTable> = Crc::<u16, NoTable>::new(&CRC_16_XMODEM);
+
+/// A program, or the part of a new one that has been stored.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Program {
+    /// Whether its bytes go down from the last one.
+    down: bool,
+    /// The length of the text in bytes.
+    len: u16,
+}
 
 /// The result of one call that stores something.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -47,8 +63,10 @@ pub enum Stored {
     Again,
     /// There is no room.
     Full,
-    /// Complete. The text has this length now.
-    Done(u16),
+    /// Complete.
+    Done,
+    /// Complete. This is what there is of the new program now.
+    Part(Program),
 }
 
 #[small]
@@ -56,99 +74,167 @@ fn base<M: Memory>() -> u16 {
     M::SIZE - AREA
 }
 
-/// Returns the byte of the text at a place; `None` from `len` on.
 #[small]
-pub fn byte<M: Memory>(memory: &M, len: u16, at: u16) -> Option<u8> {
-    (at < len).then(|| memory.read(base::<M>() + HEAD + at))
+impl Program {
+    /// Returns the offset of a byte of the program, counted from its head, from [`base`].
+    fn place(self, at: u16) -> u16 {
+        if self.down { PROGRAM - 1 - at } else { at }
+    }
+
+    /// Returns the byte of the text at a place; `None` behind the end.
+    pub fn byte<M: Memory>(self, memory: &M, at: u16) -> Option<u8> {
+        (at < self.len).then(|| self.read(memory, HEAD + at))
+    }
+
+    fn read<M: Memory>(self, memory: &M, at: u16) -> u8 {
+        memory.read(base::<M>() + self.place(at))
+    }
+
+    /// Returns the program on the other side, without text.
+    fn other(self) -> Self {
+        Self { down: !self.down, len: 0 }
+    }
+
+    /// Returns the two bytes of the head from `at` on.
+    fn pair<M: Memory>(self, memory: &M, at: u16) -> u16 {
+        u16::from_le_bytes([self.read(memory, at), self.read(memory, at + 1)])
+    }
+
+    #[inline(never)]
+    fn sum<M: Memory>(self, memory: &M) -> u16 {
+        let mut digest = CRC.digest();
+        for at in 0..self.len {
+            digest.update(&[self.read(memory, HEAD + at)]);
+        }
+        digest.finalize()
+    }
 }
 
-/// Returns the length of the program that its head states; `None` if there is no program.
-#[small]
-pub fn len<M: Memory>(memory: &M) -> Option<u16> {
-    let head = |at| memory.read(base::<M>() + at);
-    let len = u16::from_le_bytes([head(1), head(2)]);
-    (head(0) == VALID && len <= PROGRAM - HEAD).then_some(len)
-}
-
-/// Returns the length of the program; `None` if there is none or its checksum does not match.
+/// Returns the program as its head says; `None` if there is none.
 #[inline(never)]
 #[small]
-pub fn check<M: Memory>(memory: &M) -> Option<u16> {
-    let head = |at| memory.read(base::<M>() + at);
-    len(memory).filter(|len| u16::from_le_bytes([head(3), head(4)]) == sum(memory, *len))
+pub fn find<M: Memory>(memory: &M) -> Option<Program> {
+    [false, true].into_iter().find_map(|down| {
+        let side = Program { down, len: 0 };
+        let len = side.pair(memory, 1);
+        let is_valid = side.read(memory, 0) == VALID && len <= PROGRAM - 2 * HEAD;
+        is_valid.then_some(Program { down, len })
+    })
 }
 
+/// Whether there is a program, and its checksum is right.
+#[inline(never)]
 #[small]
-fn sum<M: Memory>(memory: &M, len: u16) -> u16 {
-    let mut digest = CRC.digest();
-    for at in 0..len {
-        digest.update(&[memory.read(base::<M>() + HEAD + at)]);
-    }
-    digest.finalize()
+pub fn is_whole<M: Memory>(memory: &M) -> bool {
+    find(memory).is_some_and(|program| program.pair(memory, 3) == program.sum(memory))
 }
 
-/// Deletes the old program and starts an empty one.
+/// Starts a new program, which is empty.
+#[inline(never)]
 #[small]
 pub fn begin<M: Memory>(memory: &mut M) -> Stored {
-    if put(memory, [(0, ERASED)].into_iter()) { Stored::Done(0) } else { Stored::Again }
-}
-
-/// Appends a line to the first `len` bytes of the new program.
-#[inline(never)]
-#[small]
-pub fn line<M: Memory>(memory: &mut M, len: u16, text: &[u8]) -> Stored {
-    let end = usize::from(HEAD + len) + text.len() + 1;
-    if end > usize::from(PROGRAM) {
-        return Stored::Full;
-    }
-    let bytes = text.iter().chain(b"\n").copied();
-    match put(memory, (HEAD + len..).zip(bytes)) {
-        true => Stored::Done(end as u16 - HEAD),
+    let new = Program { down: find(memory).is_some_and(|old| !old.down), len: 0 };
+    match put(memory, [(new.place(0), ERASED)].into_iter()) {
+        true => Stored::Part(new),
         false => Stored::Again,
     }
 }
 
-/// Makes the new program of `len` bytes valid.
+/// Appends a line to the new program. Makes the old program invalid if the line needs its room.
 #[inline(never)]
 #[small]
-pub fn end<M: Memory>(memory: &mut M, len: u16) -> Stored {
+pub fn line<M: Memory>(memory: &mut M, new: Program, text: &[u8]) -> Stored {
+    let len = usize::from(new.len) + text.len() + 1;
+    let Some(room) = usize::from(PROGRAM - 2 * HEAD).checked_sub(len) else { return Stored::Full };
+    let old = find(memory).filter(|old| old.down != new.down);
+    if old.is_some_and(|old| usize::from(old.len) > room) {
+        put(memory, [(new.other().place(0), ERASED)].into_iter());
+        return Stored::Again;
+    }
+    let bytes = text.iter().chain(b"\n").copied();
+    match put(memory, (HEAD + new.len..).map(|at| new.place(at)).zip(bytes)) {
+        true => Stored::Part(Program { len: len as u16, ..new }),
+        false => Stored::Again,
+    }
+}
+
+/// Makes the new program valid, and then the old one invalid.
+#[inline(never)]
+#[small]
+pub fn end<M: Memory>(memory: &mut M, new: Program) -> Stored {
     if memory.is_busy() {
         return Stored::Again;
     }
-    let [len0, len1] = len.to_le_bytes();
-    let [sum0, sum1] = sum(memory, len).to_le_bytes();
+    let [len0, len1] = new.len.to_le_bytes();
+    let [sum0, sum1] = new.sum(memory).to_le_bytes();
     let head = [(1, len0), (2, len1), (3, sum0), (4, sum1), (0, VALID)];
-    if put(memory, head.into_iter()) { Stored::Done(len) } else { Stored::Again }
-}
-
-/// Returns the offset of a start-up line from [`base`].
-#[small]
-fn startup(n: u8) -> u16 {
-    PROGRAM + STARTUP * u16::from(n)
-}
-
-/// Returns the length of a start-up line: 0 if there is none. 2,000 cycles for 10 bytes.
-#[inline(never)]
-#[small]
-pub fn startup_len<M: Memory>(memory: &M, n: u8) -> u8 {
-    if n >= STARTUPS {
-        return 0;
+    let head = head.into_iter().map(|(at, byte)| (new.place(at), byte));
+    match put(memory, head.chain([(new.other().place(0), ERASED)])) {
+        true => Stored::Done,
+        false => Stored::Again,
     }
-    let at = base::<M>() + startup(n);
-    let len = memory.read(at);
-    if len > STARTUP_MAX {
-        return 0;
-    }
-    let mut digest = CRC.digest();
-    (0..u16::from(len)).for_each(|byte| digest.update(&[memory.read(at + 3 + byte)]));
-    let sum = u16::from_le_bytes([memory.read(at + 1), memory.read(at + 2)]);
-    if sum == digest.finalize() { len } else { 0 }
 }
 
-/// Returns a byte of the text of a start-up line.
+/// A start-up line in its slot.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Startup {
+    slot: u8,
+    len: u8,
+}
+
+/// Returns the offset of a slot from [`base`]. Firmware with two slots had them at the end.
 #[small]
-pub fn startup_byte<M: Memory>(memory: &M, n: u8, at: u8) -> u8 {
-    memory.read(base::<M>() + startup(n) + 3 + u16::from(at))
+fn slot_place(slot: u8) -> u16 {
+    let from_end = if slot < STARTUPS { STARTUPS - slot } else { SLOTS };
+    AREA - STARTUP * u16::from(from_end)
+}
+
+/// Returns the first byte of the slot of line `n`.
+#[small]
+fn startup_head(n: u8, len: u8) -> u8 {
+    (n + 1) << 6 | len
+}
+
+#[small]
+impl Startup {
+    /// Returns what is in a slot, if it is line `n`. 2,000 cycles for 10 bytes.
+    fn in_slot<M: Memory>(memory: &M, slot: u8, n: u8) -> Option<Self> {
+        let at = base::<M>() + slot_place(slot);
+        let head = memory.read(at);
+        let line = Self { slot, len: head & 0x3F };
+        // Firmware with two slots had no number there.
+        let has_number = head > 0x3F;
+        if line.len > STARTUP_MAX || if has_number { head >> 6 != n + 1 } else { slot != n } {
+            return None;
+        }
+        let mut digest = CRC.digest();
+        (0..line.len).for_each(|at| digest.update(&[line.byte(memory, at)]));
+        if has_number {
+            digest.update(&[head]);
+        }
+        let sum = u16::from_le_bytes([memory.read(at + 1), memory.read(at + 2)]);
+        (sum == digest.finalize()).then_some(line)
+    }
+
+    /// Returns start-up line `n`; `None` if it was never stored.
+    #[inline(never)]
+    pub fn find<M: Memory>(memory: &M, n: u8) -> Option<Self> {
+        (0..SLOTS).find_map(|slot| Self::in_slot(memory, slot, n))
+    }
+
+    /// Returns the length of the line.
+    pub fn len(self) -> u8 {
+        self.len
+    }
+
+    /// Returns a byte of the line.
+    pub fn byte<M: Memory>(self, memory: &M, at: u8) -> u8 {
+        memory.read(base::<M>() + slot_place(self.slot) + 3 + u16::from(at))
+    }
+
+    fn is<M: Memory>(self, memory: &M, bytes: impl Iterator<Item = u8>) -> bool {
+        bytes.eq((0..self.len).map(|at| self.byte(memory, at)))
+    }
 }
 
 /// Stores a start-up line, without blanks and in upper case. An empty text deletes the line.
@@ -156,19 +242,35 @@ pub fn startup_byte<M: Memory>(memory: &M, n: u8, at: u8) -> u8 {
 #[small]
 pub fn put_startup<M: Memory>(memory: &mut M, n: u8, text: &[u8]) -> Stored {
     let bytes = || text.iter().filter(|byte| **byte > b' ').map(u8::to_ascii_uppercase);
-    let mut digest = CRC.digest();
-    bytes().for_each(|byte| digest.update(&[byte]));
-    let [sum0, sum1] = digest.finalize().to_le_bytes();
     let len = bytes().count();
     if n >= STARTUPS || len > usize::from(STARTUP_MAX) {
         return Stored::Full;
     }
-    let at = startup(n);
-    let head = [(at + 1, sum0), (at + 2, sum1), (at, len as u8)];
-    match put(memory, (at + 3..).zip(bytes()).chain(head)) {
-        true => Stored::Done(len as u16),
-        false => Stored::Again,
+    if memory.is_busy() {
+        return Stored::Again;
     }
+    let mut lines = (0..SLOTS).filter_map(|slot| Startup::in_slot(memory, slot, n));
+    if let Some(new) = lines.clone().find(|line| line.is(memory, bytes())) {
+        let Some(old) = lines.find(|line| line.slot != new.slot) else { return Stored::Done };
+        put(memory, [(slot_place(old.slot), ERASED)].into_iter());
+        return Stored::Again;
+    }
+    let taken: [_; STARTUPS as usize] =
+        [0, 1].map(|n| Startup::find(memory, n).map(|line| line.slot));
+    let free = (0..SLOTS).find(|slot| !taken.contains(&Some(*slot))).unwrap_or(0);
+    let at = slot_place(free);
+    let head = startup_head(n, len as u8);
+    let mut digest = CRC.digest();
+    bytes().chain([head]).for_each(|byte| digest.update(&[byte]));
+    let [sum0, sum1] = digest.finalize().to_le_bytes();
+    let body = (at + 3..).zip(bytes()).chain([(at + 1, sum0), (at + 2, sum1)]);
+    let is_written = body.clone().all(|(at, byte)| memory.read(base::<M>() + at) == byte);
+    match is_written {
+        true => put(memory, [(at, head)].into_iter()),
+        // What was in the slot is invalid before the first byte of it changes.
+        false => put(memory, [(at, ERASED)].into_iter()) && put(memory, body),
+    };
+    Stored::Again
 }
 
 /// Writes the first byte that differs from its wanted value. Returns true if all bytes are right and no write is in
@@ -233,80 +335,180 @@ mod tests {
         }
     }
 
-    fn store(cells: &mut Cells, lines: &[&str]) {
-        let mut len = 0;
-        wait(cells, begin);
+    fn store(cells: &mut Cells, lines: &[&str]) -> Option<()> {
+        let Stored::Part(mut new) = wait(cells, begin) else { return None };
         for text in lines {
-            match wait(cells, |cells| line(cells, len, text.as_bytes())) {
-                Stored::Done(now) => len = now,
-                _ => return,
+            match wait(cells, |cells| line(cells, new, text.as_bytes())) {
+                Stored::Part(now) => new = now,
+                _ => return None,
             }
         }
-        wait(cells, |cells| end(cells, len));
+        (wait(cells, |cells| end(cells, new)) == Stored::Done).then_some(())
     }
 
     fn stored(cells: &Cells) -> Option<String> {
-        let len = check(cells)?;
-        let bytes = (0..len).filter_map(|at| byte(cells, len, at)).collect();
+        let program = find(cells).filter(|_| is_whole(cells))?;
+        let bytes = (0..).map_while(|at| program.byte(cells, at)).collect();
         String::from_utf8(bytes).ok()
     }
 
-    #[test]
-    fn a_power_cut_leaves_the_old_program_the_new_or_none() {
-        let mut cells = Cells { bytes: std::vec![0xFF; SIZE], left: usize::MAX, torn: 0 };
-        assert_eq!(stored(&cells), None);
-        store(&mut cells, &["G0 X1", "G0 X2"]);
-        assert_eq!(stored(&cells).as_deref(), Some("G0 X1\nG0 X2\n"));
-        let mut seen = [0; 3];
-        for torn in 0..=u8::MAX {
-            for left in 1..40 {
-                let mut cut = Cells { left, torn, ..cells.clone() };
-                store(&mut cut, &["G0 X1", "G1 Y7 F100", "M2"]);
-                match stored(&cut).as_deref() {
-                    None => seen[0] += 1,
-                    Some("G0 X1\nG0 X2\n") => seen[1] += 1,
-                    Some("G0 X1\nG1 Y7 F100\nM2\n") => seen[2] += 1,
-                    Some(other) => panic!("{other}"),
+    fn blank() -> Cells {
+        Cells { bytes: std::vec![0xFF; SIZE], left: usize::MAX, torn: 0 }
+    }
+
+    /// Stores each program in turn, and cuts power at each byte, with all values that it may have then. What is stored
+    /// is the old program or the new one, and the old one can be replaced then.
+    fn cut_short(programs: &[&[&str]], mut each: impl FnMut(Option<&str>)) {
+        let mut cells = blank();
+        for lines in programs {
+            let old = stored(&cells);
+            let new = lines.iter().flat_map(|line| [*line, "\n"]).collect::<String>();
+            for left in 1.. {
+                let torn = (0..=u8::MAX).step_by(if left % 16 == 0 { 1 } else { 51 });
+                for torn in torn {
+                    let mut cut = Cells { left, torn, ..cells.clone() };
+                    store(&mut cut, lines);
+                    let is = stored(&cut);
+                    assert!(is.is_none() || is == old || is.as_ref() == Some(&new), "{is:?}");
+                    each(is.as_deref());
+                    cut.left = usize::MAX;
+                    assert_eq!(store(&mut cut, lines), Some(()));
+                    assert_eq!(stored(&cut).as_ref(), Some(&new));
+                }
+                let mut cut = Cells { left, ..cells.clone() };
+                store(&mut cut, lines);
+                if cut.left > 0 {
+                    break;
                 }
             }
+            store(&mut cells, lines);
+            assert_eq!(stored(&cells).as_ref(), Some(&new));
         }
-        assert!(seen.iter().all(|count| *count > 0), "{seen:?}");
     }
 
     #[test]
-    fn lines_for_the_start_are_beside_the_program() {
-        let mut cells = Cells { bytes: std::vec![0xFF; SIZE], left: usize::MAX, torn: 0 };
-        assert_eq!((startup_len(&cells, 0), startup_len(&cells, 2)), (0, 0));
-        let long = [b'x'; STARTUP_MAX as usize];
-        wait(&mut cells, |cells| put_startup(cells, 0, b"g54 g20"));
-        wait(&mut cells, |cells| put_startup(cells, 1, &long));
-        store(&mut cells, &["G0 X1"; 19]);
-        let text = |cells: &Cells, n| -> Vec<u8> {
-            (0..startup_len(cells, n)).map(|at| startup_byte(cells, n, at)).collect()
-        };
-        assert_eq!((text(&cells, 0), text(&cells, 1)), (b"G54G20".to_vec(), [b'X'; 40].to_vec()));
-        assert_eq!(put_startup(&mut cells, 1, &[b'x'; 41]), Stored::Full);
-        for torn in 0..=u8::MAX {
-            for left in 1..10 {
+    fn a_power_cut_leaves_the_old_program_or_the_new() {
+        let (mut is_first, mut none) = (true, 0);
+        let programs: [&[&str]; 6] = [
+            &["G0 X1", "G0 X2"],
+            &["G0 X1", "G1 Y7 F100", "M2"],
+            &["P(PPPPPPPPPPPPPPPP)", "G4P1"],
+            &[],
+            &["G0 X1"],
+            &["G0 X3"],
+        ];
+        cut_short(&programs, |is| {
+            none += usize::from(is.is_none() && !is_first);
+            is_first &= is.is_none();
+        });
+        assert_eq!(none, 0, "no program but before the first");
+    }
+
+    #[test]
+    fn programs_that_have_no_room_together_leave_one_or_none() {
+        let (long, longer) = (["G1 X1 Y1 Z1 F1000"; 20], ["G1 X2 Y2 Z2 F2000"; 25]);
+        let mut none = 0;
+        cut_short(&[&long, &longer], |is| none += usize::from(is.is_none()));
+        assert!(none > 0);
+    }
+
+    /// The texts of the start-up lines.
+    fn texts(cells: &Cells) -> [Vec<u8>; 2] {
+        [0, 1].map(|n| {
+            let line = Startup::find(cells, n);
+            line.map_or(Vec::new(), |l| (0..l.len()).map(|at| l.byte(cells, at)).collect())
+        })
+    }
+
+    #[test]
+    fn a_power_cut_leaves_the_old_start_up_line_or_the_new() {
+        let mut cells = blank();
+        let long = "x".repeat(usize::from(STARTUP_MAX));
+        let lines = [
+            (0, "g54 g20"),
+            (0, "G55"),
+            (1, &*long),
+            (0, ""),
+            (1, "g21"),
+            (0, "g20"),
+            (0, &*long),
+            (1, ""),
+            (1, "g4 p1"),
+            (0, "g4 p2"),
+            (0, "g54g20"),
+            (1, "g54g20"),
+        ];
+        for (n, text) in lines {
+            let old = texts(&cells);
+            let mut new = old.clone();
+            new[usize::from(n)] = text.to_uppercase().replace(' ', "").into_bytes();
+            let mut done = false;
+            let cuts =
+                (1..60).flat_map(|left| (0..=u8::MAX).step_by(5).map(move |torn| (left, torn)));
+            for (left, torn) in cuts {
+                // Until no power is missing.
+                if torn == 0 && done {
+                    break;
+                }
                 let mut cut = Cells { left, torn, ..cells.clone() };
-                wait(&mut cut, |cells| put_startup(cells, 0, b"G55"));
-                let text = text(&cut, 0);
-                assert!(matches!(&text[..], b"" | b"G54G20" | b"G55"), "{text:?}");
+                wait(&mut cut, |cells| put_startup(cells, n, text.as_bytes()));
+                done = cut.left > 0;
+                let is = texts(&cut);
+                assert!(is == old || is == new, "{n} {text} {left} {torn}: {is:?}");
+                cut.left = usize::MAX;
+                // Both lines still have room.
+                for n in [1 - n, n] {
+                    wait(&mut cut, |cells| put_startup(cells, n, text.as_bytes()));
+                }
+                assert_eq!(texts(&cut)[usize::from(n)], new[usize::from(n)]);
+                assert_eq!(texts(&cut)[0], texts(&cut)[1]);
             }
+            wait(&mut cells, |cells| put_startup(cells, n, text.as_bytes()));
+            assert_eq!(texts(&cells), new);
         }
-        wait(&mut cells, |cells| put_startup(cells, 0, b""));
-        assert_eq!((startup_len(&cells, 0), stored(&cells).is_some()), (0, true));
+        assert_eq!(put_startup(&mut cells, 1, &[b'x'; 41]), Stored::Full);
+        assert_eq!(put_startup(&mut cells, 2, b"G0"), Stored::Full);
+    }
+
+    /// Firmware with two slots had no number in them, and a program had the room of the third one.
+    #[test]
+    fn start_up_lines_and_programs_of_earlier_firmware_are_read() {
+        let mut cells = blank();
+        for (n, text) in [(2, b"G54"), (1, b"G21")] {
+            let at = SIZE - n * usize::from(STARTUP);
+            cells.bytes[at] = 3;
+            cells.bytes[at + 1..at + 3].copy_from_slice(&CRC.checksum(text).to_le_bytes());
+            cells.bytes[at + 3..at + 6].copy_from_slice(text);
+        }
+        let text = "G0 X1 Y1 Z1\n".repeat(40);
+        let at = SIZE - usize::from(AREA);
+        cells.bytes[at] = VALID;
+        cells.bytes[at + 1..at + 3].copy_from_slice(&(text.len() as u16).to_le_bytes());
+        cells.bytes[at + 3..at + 5].copy_from_slice(&CRC.checksum(text.as_bytes()).to_le_bytes());
+        cells.bytes[at + 5..][..text.len()].copy_from_slice(text.as_bytes());
+        assert_eq!(texts(&cells), [b"G54".to_vec(), b"G21".to_vec()]);
+        assert_eq!(stored(&cells), Some(text));
+        wait(&mut cells, |cells| put_startup(cells, 0, b"G20"));
+        assert_eq!(texts(&cells), [b"G20".to_vec(), b"G21".to_vec()]);
     }
 
     #[test]
     fn it_has_its_room() {
-        let mut cells = Cells { bytes: std::vec![0xFF; SIZE], left: usize::MAX, torn: 0 };
-        let mut len = 0;
-        let mut lines = 0;
-        while let Stored::Done(now) = wait(&mut cells, |cells| line(cells, len, &[b'x'; 39])) {
-            (len, lines) = (now, lines + 1);
+        let mut cells = blank();
+        for _ in 0..2 {
+            let Stored::Part(mut new) = wait(&mut cells, begin) else { panic!() };
+            let mut lines = 0;
+            while let Stored::Part(now) = wait(&mut cells, |cells| line(cells, new, &[b'x'; 39])) {
+                (new, lines) = (now, lines + 1);
+            }
+            assert_eq!(lines, if Capability::Printer.is_built_in() { 13 } else { 18 });
+            assert_eq!(wait(&mut cells, |cells| end(cells, new)), Stored::Done);
+            assert_eq!(stored(&cells).map(|text| text.len()), Some(lines * 40));
         }
-        assert_eq!(lines, if Capability::Printer.is_built_in() { 15 } else { 19 });
+        for n in [0, 1, 0] {
+            wait(&mut cells, |cells| put_startup(cells, n, &[b'x'; STARTUP_MAX as usize]));
+        }
+        assert!(stored(&cells).is_some());
         assert!(cells.bytes[..SIZE - usize::from(AREA)].iter().all(|byte| *byte == 0xFF));
     }
 }

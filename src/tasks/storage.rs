@@ -26,7 +26,7 @@ use crate::protocol::{STARTUP_MAX, Store};
 use crate::status::Status;
 use crate::store::kept::{self, ITEMS, Item};
 use crate::store::log::Put;
-use crate::store::program::{self, Stored};
+use crate::store::program::{self, Program, Stored};
 use crate::store::{Log, Memory, record, tables};
 use crate::units::{Length, PerAxis};
 
@@ -52,8 +52,8 @@ pub struct Storage {
     cold: Cell<Option<(u8, i32)>>,
     /// Settings in EEPROM alone are to have their defaults from this number on.
     forgotten: Cell<u8>,
-    /// The length of the program that is being stored, if one is.
-    program: Cell<Option<u16>>,
+    /// The program that is being stored, as far as it has come.
+    program: Cell<Option<Program>>,
     /// A line waits until a row or a setting has been saved.
     awaited: Cell<bool>,
     wake: Wake,
@@ -169,20 +169,20 @@ impl Storage {
     #[inline(never)]
     pub fn store(&self, what: Store<'_>) -> Result<(), Status> {
         let mut memory = Eeprom::take();
-        let len = self.program.get().ok_or(Status::NotAccepted);
+        let new = self.program.get().ok_or(Status::NotAccepted);
         let stored = match what {
             _ if self.log.get().is_wide() => Stored::Full,
             Store::Begin => program::begin(&mut memory),
-            Store::Line(line) => program::line(&mut memory, len?, line),
-            Store::End => program::end(&mut memory, len?),
+            Store::Line(line) => program::line(&mut memory, new?, line),
+            Store::End => program::end(&mut memory, new?),
             Store::Startup(n, line) => program::put_startup(&mut memory, n, line),
         };
         match stored {
             Stored::Again => return Err(Status::Again),
             Stored::Full => return Err(Status::PersistenceError),
-            Stored::Done(_) if what == Store::End => self.program.set(None),
-            Stored::Done(_) if matches!(what, Store::Startup(..)) => {}
-            Stored::Done(len) => self.program.set(Some(len)),
+            Stored::Done if what == Store::End => self.program.set(None),
+            Stored::Done => {}
+            Stored::Part(new) => self.program.set(Some(new)),
         }
         Ok(())
     }

@@ -57,7 +57,7 @@ use crate::protocol::{Cold, Extruder};
 use crate::protocol::{Hold, Machine, Memory, Remembers, Store, Value, Warning};
 use crate::status::Status;
 use crate::store::kept::ITEMS;
-use crate::store::program;
+use crate::store::program::{self, Startup};
 use crate::units::Length;
 
 /// Whether something moves.
@@ -514,12 +514,13 @@ impl Machine for View<'_> {
 
     fn program(&mut self, at: u16) -> Option<u8> {
         let memory = Eeprom::take();
-        program::byte(&memory, program::len(&memory)?, at)
+        program::find(&memory)?.byte(&memory, at)
     }
 
     fn startup(&mut self, line: u8, at: u8) -> Option<u8> {
         let memory = Eeprom::take();
-        (at < program::startup_len(&memory, line)).then(|| program::startup_byte(&memory, line, at))
+        let line = Startup::find(&memory, line)?;
+        (at < line.len()).then(|| line.byte(&memory, at))
     }
 
     fn restart(&mut self, boot: bool) -> Status {

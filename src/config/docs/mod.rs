@@ -81,7 +81,7 @@ list all of these groups except the tools. Values that survive a power cut canno
 
 ## Stored program
 
-Kerf stores one program of G-code, for example to measure a tool or to move to a fixed position. The program has room for 783 bytes, 607 in
+Kerf stores one program of G-code, for example to measure a tool or to move to a fixed position. The program has room for 735 bytes, 559 in
 an image that can print. A line may have 48 bytes, and takes one byte more for its end.
 
 | | JSON | Text |
@@ -93,8 +93,8 @@ an image that can print. A line may have 48 bytes, and takes one byte more for i
 | run the program | `{test:100}` | `$test=100` |
 | stop the program | `{test:0}` | `$test=0` |
 
-The program is stored once the response to `{prog:t}` has status 0. From `{prog:f}` until then there is no program, even after a power cut.
-A program can be stored only at rest (106). Status 34 means that there is no room for it.
+The program is stored once the response to `{prog:t}` has status 0. Until then the old one is there, also after a power cut. Only if both have no room
+together, the first line that needs the room deletes the old one. A program can be stored only at rest (106). Status 34 means that there is no room for it.
 
 The program ends with M2, M30 or its last line, as a built-in job does. Once its motion is done, an exception report has status 8. If a line is
 refused, the program ends, and an exception report gives the reason at once. Lines are not checked when they are stored, only when they are run.

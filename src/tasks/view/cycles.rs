@@ -28,7 +28,7 @@ pub(super) fn start_job(view: &mut View<'_>, number: u8) -> Status {
     if !job.is_none() && view.is_busy() {
         return Status::NotAccepted;
     }
-    if number == STORED && program::check(&Eeprom::take()).is_none() {
+    if number == STORED && !program::is_whole(&Eeprom::take()) {
         return Status::Error;
     }
     view.links.job.set(job);
