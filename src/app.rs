@@ -11,7 +11,7 @@ use embassy_executor::Spawner;
 use embassy_sync::mutex::Mutex;
 use heapless::Vec;
 
-use crate::config::Settings;
+use crate::config::{Setting, Settings};
 use crate::gcode::command::Commands;
 use crate::gcode::interpreter::Interpreter;
 use crate::hal::eeprom::Eeprom;
@@ -21,13 +21,15 @@ use crate::hal::{LINE_BYTES, stepper, uart, watchdog};
 use crate::machine::{Notices, Probe, Signs};
 use crate::motion::queue::{self, BlockQueue, BlockSource};
 use crate::protocol::{Memory, Occasion, Remembers, Speech};
-use crate::store::Log;
-use crate::store::kept;
+use crate::status::Status;
+use crate::store::kept::{self, ITEMS};
+use crate::store::{Log, Memory as _};
 use crate::tasks::common::Common;
 use crate::tasks::heat::Heaters;
 use crate::tasks::links::{Changes, Links, QueueCount};
 use crate::tasks::planner::Planner;
 use crate::tasks::ports::{AUX_RESERVE, Choice, Port};
+use crate::tasks::setup::limit_velocity;
 use crate::tasks::storage::Storage;
 use crate::tasks::tx::Tx;
 use crate::tasks::view::set_hardware;
@@ -118,8 +120,10 @@ pub fn start(main: Spawner, thread: Thread, rate: u32) -> Option<()> {
     heat::set_all(&links.heat, &mut links.settings.borrow_mut(), links.storage);
     links.model.borrow_mut().start(&*links.settings.borrow());
     choose_dialects(links);
-    if watchdog::cause().is_fault() {
-        alarm::wake_up_in(links);
+    if occasion == Occasion::Defaults {
+        alarm::wake_up_in(links, Status::Initializing);
+    } else if watchdog::cause().is_fault() {
+        alarm::wake_up_in(links, Status::HardReset);
     }
     interrupt::start(|exec_level, level| {
         if let Some(common) = InterruptEnd::of(Common, level)
@@ -194,14 +198,18 @@ fn connect(thread: Thread, rate: u32) -> Option<(&'static Links, Received, Optio
 }
 
 /// Sets all settings to their defaults, then loads those that EEPROM holds. Returns `Occasion::Defaults` if the log in
-/// EEPROM is unreadable.
+/// EEPROM, or a part of it, is unreadable.
 #[inline(never)]
 fn recall(settings: &mut Settings, storage: &Storage) -> Occasion {
     let (log, memory) = (storage.log(), Eeprom::take());
     settings.set_defaults();
-    kept::load(&log, &memory, settings);
+    storage.resume(kept::load(&log, &memory, settings));
+    // Power may have failed between a setting and the velocities that it has lowered.
+    if limit_velocity(settings, Setting::MACHINE) {
+        storage.note(0, ITEMS);
+    }
     drivers::recall(settings, storage);
-    match log.is_rubbish(&memory) {
+    match memory.is_lost() || log.is_rubbish(&memory) {
         true => Occasion::Defaults,
         false => Occasion::Ready,
     }

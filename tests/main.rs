@@ -72,6 +72,7 @@ mod chain;
 mod check;
 mod control;
 mod corexy;
+mod cuts;
 mod docs;
 mod fine_steps;
 mod gcode_props;

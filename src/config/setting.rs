@@ -420,9 +420,12 @@ impl Setting {
         (row.min..=row.max - i32::from(linear_mode)).contains(&value) && self.suits_driver(value)
     }
 
+    /// `mch`, the machine's profile.
+    pub const MACHINE: Setting = Setting(machines::CHOICE);
+
     /// Whether this is `mch`, the machine's profile.
     pub fn is_machine(self) -> bool {
-        self.0 == machines::CHOICE
+        self == Self::MACHINE
     }
 
     /// Whether this is `spw`, the width of step pulses.

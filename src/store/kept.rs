@@ -57,31 +57,80 @@ pub fn value<M: Memory>(log: &Log, memory: &M, setting: Setting) -> i32 {
     kept.unwrap_or_else(|| setting.default_value())
 }
 
-/// The number of keys that the log may have to hold: one per kept setting, one per value of the tables.
-pub const KEYS: u16 = Setting::KEPT + ROWS as u16 * AXES as u16;
+/// The number of keys that the log may have to hold: one per kept setting, one per value of the tables, and that of
+/// [`Change`].
+pub const KEYS: u16 = Setting::KEPT + ROWS as u16 * AXES as u16 + 1;
 
 /// The key of a number without an item.
 const NO_KEY: u16 = u16::MAX;
 
-/// Copies the stored values of all items into `settings`. At start-up: 10 ms on AVR, and up to 70 more with a full
-/// log; 600 bytes of stack.
+/// A change of many settings at once: to the profile of a machine, or to the defaults.
+///
+/// Its record is written before the settings, and another one, [`Change::NONE`], behind them. A change that has no such
+/// end was cut short by a power failure: it is made again at the start. Settings that have been stored since keep their
+/// values.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Change(i32);
+
+#[small]
+impl Change {
+    /// No change, or its end.
+    pub const NONE: Self = Self(0);
+    /// Added to the value if all settings change.
+    const ALL: i32 = 256;
+
+    /// Returns the change to the profile of these settings; with `all`, of all other settings to their defaults, too.
+    pub fn to(settings: &Settings, all: bool) -> Self {
+        let machine = settings.get(Setting::MACHINE) + 1;
+        Self(if all { machine + Self::ALL } else { machine })
+    }
+
+    /// Returns the value of the change's record.
+    pub fn value(self) -> i32 {
+        self.0
+    }
+
+    /// Whether all settings change, those in EEPROM alone, too.
+    pub fn is_of_all(self) -> bool {
+        self.0 >= Self::ALL
+    }
+
+    /// Makes the change.
+    fn make(self, settings: &mut Settings) {
+        if self.is_of_all() {
+            settings.set_defaults();
+        }
+        let machine = (self.0 % Self::ALL).wrapping_sub(1);
+        if Setting::MACHINE.accepts(machine) {
+            settings.take_over(machine as u8);
+        }
+    }
+}
+
+/// Copies the stored values of all items into `settings`. Returns the change that was cut short, if one was. At
+/// start-up: 10 ms on AVR, and up to 70 more with a full log; 600 bytes of stack.
 #[inline(never)]
 #[small]
-pub fn load<M: Memory>(log: &Log, memory: &M, settings: &mut Settings) {
+pub fn load<M: Memory>(log: &Log, memory: &M, settings: &mut Settings) -> Change {
     if log.is_empty() {
-        return;
+        return Change::NONE;
     }
+    let change = log.newest(memory, record::CHANGE).map_or(Change::NONE, Change);
     let mut keys = [NO_KEY; ITEMS as usize];
     for (number, key) in (0..).zip(&mut keys) {
         *key = Item::from_number(number).map_or(NO_KEY, Item::key);
     }
     log.replay(memory, |record| {
+        if record.key == record::CHANGE && record.value == change.0 {
+            return change.make(settings);
+        }
         let number =
             (0..).zip(&keys).find(|(_, key)| **key == record.key).map(|(number, _)| number);
         if let Some(item) = number.and_then(Item::from_number) {
             item.set(settings, record.value);
         }
     });
+    change
 }
 
 #[cfg(test)]
@@ -100,7 +149,7 @@ mod tests {
         }
         let items = keys.len();
         let cold = (Setting::WARM..Setting::COLD).filter_map(Setting::from_number).map(key);
-        for key in tables::tests::keys().chain(cold) {
+        for key in tables::tests::keys().chain(cold).chain([record::CHANGE]) {
             assert_eq!(keys.insert(key, Item(Setting::from_number(0).unwrap())), None);
             assert_ne!(key, NO_KEY);
         }
@@ -108,6 +157,7 @@ mod tests {
         let drivers = if Capability::Drivers.is_built_in() { 15 } else { 0 };
         assert!(keys.len() <= usize::from(KEYS));
         let cold = 10 + 9 + 2 + 17 + heaters + drivers;
+        let cold = cold + usize::from(keys.contains_key(&record::CHANGE));
         assert_eq!(keys.len(), items + usize::from(ROWS) * AXES + cold);
     }
 }

@@ -15,6 +15,9 @@
 //! last byte. So at any power failure an item has either its old or its new value. Writing goes round the ring, so that
 //! all cells wear alike. Records that are still valid are copied to another slot before their own slot is overwritten.
 //!
+//! A change of many settings at once has a record before them and one behind them ([`kept::Change`]). If power fails
+//! between these, the next start makes the change again.
+//!
 //! Behind the log is a program of the user ([`program`]).
 //!
 //! Items are known by their names, not by their places in a table. Firmware with more settings, or with other settings,

@@ -24,6 +24,9 @@ pub const BEGUN: u8 = 0xFF;
 /// Computed without a table, which would be in RAM.
 const CRC: Crc<u16, NoTable> = Crc::<u16, NoTable>::new(&CRC_16_XMODEM);
 
+/// The key of the records that are no item's: see [`Change`](super::kept::Change).
+pub const CHANGE: u16 = CRC.checksum(b"change of all settings");
+
 /// The value of one item.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Record {

@@ -47,12 +47,14 @@ pub fn raise_for(links: &Links, alarm: Alarm, reason: Status) {
     links.except_at_once(reason);
 }
 
-/// Starts the machine in an alarm after an unexpected reset, so that the operator looks at it first. Called before
-/// anything runs.
-pub fn wake_up_in(links: &Links) {
+/// Starts the machine in an alarm and reports `reason`, so that the operator looks at it first: after an unexpected
+/// reset, or without its settings, when limits and emergency stop may be off. Called before anything runs.
+#[inline(never)]
+#[small]
+pub fn wake_up_in(links: &Links, reason: Status) {
     machine::start_alarmed();
     // The reporter checks this before it waits.
-    links.notices.exception.set(Some(Status::HardReset));
+    links.notices.exception.set(Some(reason));
 }
 
 /// Ends the alarm. Returns [`Status::Again`] while the machine is still slowing down, and the status of an alarm that

@@ -29,7 +29,7 @@ pub mod reader;
 mod realtime;
 pub mod reporter;
 mod row;
-mod setup;
+pub mod setup;
 pub mod spindle;
 mod stop;
 pub mod storage;

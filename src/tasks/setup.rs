@@ -7,7 +7,7 @@ use crate::boards::{ACTIVE, MOTORS, inputs};
 use crate::capability::Capability;
 use crate::config::getters::TRAVEL_NONE;
 use crate::config::groups::system;
-use crate::config::{Settings, StepRatio};
+use crate::config::{Setting, Settings, StepRatio};
 use crate::gcode::heating::Part;
 use crate::gcode::modal::{Defaults, Distance, PathMode, Plane, Units};
 use crate::gcode::setup::{AxisMode, Setup};
@@ -111,6 +111,14 @@ impl Setup for Settings {
     fn homing(&self, axis: u8) -> Result<(), Status> {
         homing::of(self, axis).map(|_| ())
     }
+}
+
+/// Lowers the velocity limits that `setting` affects to what the motors can follow. Returns whether one was lowered.
+#[inline(never)]
+#[small]
+pub fn limit_velocity(settings: &mut Settings, setting: Setting) -> bool {
+    let drivers = MachineLimits::drivers(settings);
+    settings.limit_velocity(setting, |motors| drivers.step_rate_max(motors) as u32)
 }
 
 /// Returns what moves a motor: the position of an axis, or the positions of X and Y together ([`kinematics`]). A motor

@@ -4,8 +4,8 @@
 //! being saved ([`Edit`]), the setting in EEPROM alone that is being saved, and the log, which contains all other rows
 //! and such settings. The task writes the EEPROM, a byte every 3.4 ms, and waits for it by the millisecond. A value
 //! that changes while it is written is written again. One check costs up to 3 ms of thread mode on AVR. If power fails
-//! meanwhile, items that have not been written keep their old values. When the EEPROM is full, status 34 is reported
-//! once, and a row keeps its old values.
+//! meanwhile, items that have not been written keep their old values, unless a change of all of them had begun: see
+//! [`Change`]. When the EEPROM is full, status 34 is reported once, and a row keeps its old values.
 //!
 //! There is room for one row and one such setting. A line that changes another one meanwhile is refused with
 //! [`Status::Again`]. The parser keeps the line and is woken when the row has been saved: 0.3 s later at most, unless
@@ -17,14 +17,14 @@ use super::links::Links;
 use super::ports::COURTESY;
 use super::wake::Wake;
 use crate::capability::Capability;
-use crate::config::Setting;
+use crate::config::{Setting, Settings};
 use crate::gcode::tables::{Edit, TableRow, Tables};
 use crate::hal::after_ms;
 use crate::hal::eeprom::Eeprom;
 use crate::machine;
 use crate::protocol::{STARTUP_MAX, Store};
 use crate::status::Status;
-use crate::store::kept::{self, ITEMS, Item};
+use crate::store::kept::{self, Change, ITEMS, Item};
 use crate::store::log::Put;
 use crate::store::program::{self, Program, Stored};
 use crate::store::{Log, Memory, record, tables};
@@ -32,7 +32,7 @@ use crate::units::{Length, PerAxis};
 
 /// How many keys have no record if every setting and every value of all 21 rows on six axes has been set: then a line
 /// is refused with status 34. The settings of drivers add 15 such keys. The program's area could give up the room.
-const LEFT_OUT: u16 = if Capability::Drivers.is_built_in() { 31 } else { 16 };
+const LEFT_OUT: u16 = if Capability::Drivers.is_built_in() { 32 } else { 17 };
 const _: () = assert!(
     kept::KEYS < Eeprom::LOG / record::SIZE + LEFT_OUT,
     "the log of the EEPROM has too few records for what is kept: make `AREA` of src/store/program.rs smaller by 11 bytes for each"
@@ -43,7 +43,8 @@ const _: () = assert!(program::STARTUP_MAX as usize == STARTUP_MAX);
 /// The state that the storage task shares with other tasks.
 pub struct Storage {
     log: Cell<Log>,
-    /// The settings that may have changed: from this number to before `to`.
+    /// The settings that may have changed: from this number to before `to`. If many change at once, `to` is
+    /// [`TO_MACHINE`] or [`TO_ALL`].
     from: Cell<u8>,
     to: Cell<u8>,
     /// The row that is being saved.
@@ -58,6 +59,13 @@ pub struct Storage {
     awaited: Cell<bool>,
     wake: Wake,
 }
+
+/// The value of `to` while the settings of a machine's profile change: behind them is [`END`].
+const TO_MACHINE: u8 = END + 1;
+/// The value of `to` while all settings change.
+const TO_ALL: u8 = END + 2;
+/// In place of a setting's number: the end of a change.
+const END: u8 = ITEMS;
 
 /// The next item to save.
 #[derive(Clone, Copy)]
@@ -97,6 +105,35 @@ impl Storage {
         self.from.set(self.from.get().min(from));
         self.to.set(self.to.get().max(from + count));
         self.wake.signal();
+    }
+
+    /// Notes that many settings change at once: those of the machine's profile, or all.
+    pub fn note_change(&self, all: bool) {
+        self.note(0, if all { TO_ALL } else { TO_MACHINE });
+    }
+
+    /// Goes on with a change that was cut short. At start-up, before settings in EEPROM alone are read.
+    pub fn resume(&self, change: Change) {
+        if change == Change::NONE {
+            return;
+        }
+        if change.is_of_all() {
+            self.forget_cold();
+        }
+        self.note_change(change.is_of_all());
+    }
+
+    /// Whether many settings change, and the record that says so is to be written next.
+    fn begins(&self) -> bool {
+        self.from.get() == 0 && self.to.get() > ITEMS
+    }
+
+    /// Returns the change that is being saved.
+    fn change(&self, settings: &Settings) -> Change {
+        match self.to.get() {
+            ..=ITEMS => Change::NONE,
+            to => Change::to(settings, to == TO_ALL),
+        }
     }
 
     /// Whether a line waits for a row to be saved. The parser is woken then.
@@ -192,7 +229,10 @@ impl Storage {
         if self.edit.get().is_some() {
             return Some(Work::Edit);
         }
-        if let Some(work) = self.take_cold() {
+        // The record of a change comes before all settings.
+        if !self.begins()
+            && let Some(work) = self.take_cold()
+        {
             return Some(work);
         }
         let number = self.from.get();
@@ -291,11 +331,9 @@ fn next(links: &Links, memory: &Eeprom, work: Work, moved: u16) -> Option<Put> {
             let setting = Setting::from_number(number)?;
             differs(&log, memory, kept::key(setting), value, setting.default_value())?
         }
-        Work::Item(number) => {
-            let item = Item::from_number(number)?;
-            let (value, default) = item.value(&links.settings.borrow());
-            differs(&log, memory, item.key(), value, default)?
-        }
+        // Many settings have changed anew: the record of that change is first.
+        Work::Item(_) if links.storage.begins() => return None,
+        Work::Item(number) => item(links, &log, memory, number)?,
     };
     let put = log.put(memory, key, value, moved);
     links.storage.log.set(log);
@@ -303,6 +341,27 @@ fn next(links: &Links, memory: &Eeprom, work: Work, moved: u16) -> Option<Put> {
         links.except(Status::PersistenceError);
     }
     Some(put)
+}
+
+/// Returns the key and the value of a setting if the log has another value. Before the first setting of a change comes
+/// the record of that, and behind the last one the record of its end.
+#[inline(never)]
+#[small]
+fn item(links: &Links, log: &Log, memory: &Eeprom, number: u8) -> Option<(u16, i32)> {
+    let settings = &links.settings.borrow();
+    let change = match number {
+        0 => links.storage.change(settings),
+        _ => Change::NONE,
+    };
+    if change != Change::NONE || number == END {
+        let change = differs(log, memory, record::CHANGE, change.value(), Change::NONE.value());
+        if change.is_some() || number == END {
+            return change;
+        }
+    }
+    let item = Item::from_number(number)?;
+    let (value, default) = item.value(settings);
+    differs(log, memory, item.key(), value, default)
 }
 
 /// Returns a key and its value, if the log has another value.

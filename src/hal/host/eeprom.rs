@@ -14,10 +14,16 @@ const WRITE_CYCLES: u64 = 54_400;
 struct Cells {
     bytes: RefCell<Vec<u8>>,
     busy_until: Cell<u64>,
+    /// What has been written: addresses and bytes.
+    written: RefCell<Vec<(u16, u8)>>,
 }
 
 machine_static! {
-    fn cells() -> Cells = Cells { bytes: RefCell::new(Vec::new()), busy_until: Cell::new(0) };
+    fn cells() -> Cells = Cells {
+        bytes: RefCell::new(Vec::new()),
+        busy_until: Cell::new(0),
+        written: RefCell::new(Vec::new()),
+    };
 }
 
 /// Returns the bytes in the EEPROM of this thread's machine.
@@ -30,6 +36,11 @@ pub fn contents() -> Vec<u8> {
 /// Puts bytes into the EEPROM before the machine boots.
 pub fn put(contents: &[u8]) {
     *cells().bytes.borrow_mut() = contents.to_vec();
+}
+
+/// Takes what has been written since the last call, address and byte, in order: for tests that cut power at each byte.
+pub fn take_written() -> Vec<(u16, u8)> {
+    cells().written.take()
 }
 
 /// The EEPROM.
@@ -60,6 +71,7 @@ impl Memory for Eeprom {
         if let Some(cell) = bytes.get_mut(usize::from(at)) {
             *cell = byte;
         }
+        cells().written.borrow_mut().push((at, byte));
         cells().busy_until.set(now() + WRITE_CYCLES);
     }
 }

@@ -128,6 +128,7 @@ fn exception(status: Status, machine: &mut impl Machine, out: &mut impl Out) {
         Status::ProgramStopped => message(out, text!("Program stopped [~ to resume]")),
         Status::NoToolLength => message(out, text!("Tool has no length - 0 in force")),
         Status::StepsLate => message(out, text!("Steps came late")),
+        Status::Initializing => message(out, text!("Settings unreadable - defaults in force")),
         lost if Capability::Lathe.is_built_in() => spindle(lost, out),
         _ => {}
     }

@@ -81,6 +81,7 @@ fn exception(status: Status, out: &mut impl Out) {
         Status::EndOfFile | Status::ProgramChecked | Status::NoToolLength => {}
         Status::StepsLate => text(out, text!("echo:steps came late\n")),
         Status::BufferFull => text(out, text!("echo:bytes were lost\n")),
+        Status::Initializing => text(out, text!("Error:settings unreadable, defaults in force\n")),
         status => {
             text(out, text!("Error:"));
             text(out, reason(status));

@@ -6,13 +6,12 @@ use super::{View, set_hardware};
 use crate::baud;
 use crate::capability::Capability;
 use crate::config::Setting;
-use crate::motion::dynamics;
 use crate::protocol::{Remembers, Warning};
 use crate::status::Status;
-use crate::store::kept::ITEMS;
 use crate::tasks::drivers;
 use crate::tasks::heat;
 use crate::tasks::links::Changes;
+use crate::tasks::setup::limit_velocity;
 use crate::tasks::spindle;
 use crate::tasks::turning;
 
@@ -60,11 +59,12 @@ pub(super) fn set(view: &mut View<'_>, setting: Setting, value: i32) -> Result<W
     if is_machine {
         view.settings.take_over(value as u8);
     }
-    let drivers = dynamics::MachineLimits::drivers(&*view.settings);
-    let rate = |motors| drivers.step_rate_max(motors) as u32;
-    let lowered = view.settings.limit_velocity(setting, rate);
+    let lowered = limit_velocity(&mut view.settings, setting);
     view.links.changes.note(Changes::SETTINGS);
-    view.note(setting, lowered || is_machine);
+    match is_machine {
+        true => view.links.storage.note_change(false),
+        false => view.note(setting, lowered),
+    }
     set_hardware(view.links.thread, &view.settings);
     view.links.set_flow(&view.settings);
     Ok(match lowered {
@@ -93,7 +93,7 @@ pub(super) fn restore(view: &mut View<'_>) -> Status {
     drivers::recall(&mut view.settings, view.links.storage);
     spindle::set_all(view.links.thread, view.links.storage);
     heat::set_all(&view.links.heat, &mut view.settings, view.links.storage);
-    view.links.storage.note(0, ITEMS);
+    view.links.storage.note_change(true);
     set_hardware(view.links.thread, &view.settings);
     view.links.set_flow(&view.settings);
     Status::Ok

@@ -69,6 +69,58 @@ fn a_power_cut_leaves_the_old_value_or_the_new() {
 }
 
 #[test]
+fn a_power_cut_leaves_the_old_machine_or_the_new() {
+    let (mut machine, mut host) = booted(&MEGA2560_GRBL);
+    let of = |machine: &mut Machine, host: &mut Host| {
+        ["mch", "1tr", "xvm", "zjm", "4ma"].map(|token| value(machine, host, token) as i64)
+    };
+    kept_after(&mut machine, &mut host, "{mch:1,xvm:777}");
+    let old = of(&mut machine, &mut host);
+    set(&mut machine, &mut host, "{mch:3}");
+    let new = of(&mut machine, &mut host);
+    let mut seen = [0; 2];
+    for ms in [5, 15, 15, 15, 100, 500, 900, 2_000] {
+        host.run_for_ms(&mut machine, ms).unwrap();
+        let (mut other, mut sender) = booted_with(machine.eeprom());
+        let is = of(&mut other, &mut sender);
+        assert!(is == old || is == new, "{is:?}");
+        seen[usize::from(is == new)] += 1;
+    }
+    assert!(seen[0] > 0 && seen[1] > 4, "{seen:?}");
+}
+
+/// Starts with these EEPROM contents, and returns the machine and what it answers in grbl's dialect.
+fn grbl(eeprom: &[u8; 4096], lines: &[u8]) -> (Machine, String) {
+    let mut machine = firmware(&MEGA2560_GRBL);
+    machine.set_eeprom(eeprom);
+    let mut heard = Vec::new();
+    for (text, ms) in [(&b""[..], 200), (b"$I\n", 50), (lines, 300)] {
+        machine.send(text);
+        machine.run_for_ms(ms).unwrap();
+        heard = machine.receive();
+    }
+    (machine, String::from_utf8(heard).unwrap())
+}
+
+#[test]
+fn a_power_cut_leaves_the_old_start_up_line_or_the_new() {
+    let (stored, heard) = grbl(&[0xFF; 4096], b"$N0=G20\n");
+    assert_eq!(heard, "ok\r\n");
+    let mut machine = grbl(stored.eeprom(), b"").0;
+    machine.send(b"$N0=G21\n");
+    let (mut seen, mut heard) = ([0; 2], Vec::new());
+    while heard.is_empty() {
+        machine.run_for_ms(2).unwrap();
+        heard = machine.receive();
+        let lines = grbl(machine.eeprom(), b"$N\n").1;
+        let which = ["$N0=G20\r\n", "$N0=G21\r\n"].map(|line| lines.starts_with(line));
+        seen[which.iter().position(|is| *is).unwrap_or_else(|| panic!("{lines}"))] += 1;
+    }
+    assert_eq!(heard, b"ok\r\n");
+    assert!(seen[0] > 4 && seen[1] > 0, "{seen:?}");
+}
+
+#[test]
 fn rubbish_is_no_setting() {
     let mut cells = [0u8; 4096];
     for (i, cell) in cells.iter_mut().enumerate() {
@@ -76,6 +128,7 @@ fn rubbish_is_no_setting() {
     }
     let (mut machine, mut host) = booted_with(&cells);
     assert_eq!(value(&mut machine, &mut host, "xvm"), 800.0);
+    assert_eq!(value(&mut machine, &mut host, "stat"), 2.0, "an alarm");
     set(&mut machine, &mut host, "{xvm:900}");
     host.run_for_ms(&mut machine, 500).unwrap();
     let left = *machine.eeprom();
