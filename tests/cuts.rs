@@ -226,6 +226,7 @@ fn unreadable_settings_are_an_alarm_until_it_is_cleared() {
         with(&[0x55; 4_096], move |sender| {
             assert_eq!(sender.value("stat"), "2");
             assert!(sender.ask("g1 f500 x1\n", 100).contains(",203,"), "nothing moves");
+            assert!(sender.ask("{mch:1}\n", 100).contains("\"f\":[1,0,"), "settings can be loaded");
             sender.ask(clear, 200);
             assert_eq!(sender.value("stat"), "1");
             sender.ask("g1 f500 x1\n", 500);

@@ -65,10 +65,10 @@ impl Log {
         log
     }
 
-    /// Whether memory is not empty but holds no record. It then holds another program's data, or random bytes. Cost on
-    /// AVR: up to 100,000 cycles, if the memory is empty.
+    /// Whether the log's memory is not empty but holds no record. It then holds another program's data, or random bytes.
+    /// The first slot may have a record that was cut short. Cost on AVR: up to 80,000 cycles, if the memory is empty.
     pub fn is_rubbish<M: Memory>(&self, memory: &M) -> bool {
-        self.is_empty() && (0..M::SIZE).any(|at| memory.read(at) != 0xFF)
+        self.is_empty() && (SIZE..M::LOG).any(|at| memory.read(at) != 0xFF)
     }
 
     /// Returns the value of an item; `None` if it was never stored.

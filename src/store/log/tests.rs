@@ -118,6 +118,8 @@ fn rubbish_is_known() {
     let mut cells = Cells::new();
     assert!(!Log::open(&cells).is_rubbish(&cells));
     cells.bytes[4] = 0;
+    assert!(!Log::open(&cells).is_rubbish(&cells), "the first record was cut short");
+    cells.bytes[14] = 0;
     assert!(Log::open(&cells).is_rubbish(&cells));
     let mut log = Log::open(&cells);
     assert!(put(&mut log, &mut cells, 3, 9));
