@@ -10,21 +10,21 @@
 //! | any | has power | | more heat than the temperature shows: [`HeatTooSlow`](Status::HeatTooSlow) if it heats, else [`HeatRunaway`](Status::HeatRunaway) |
 //! | any | has no power | | 20 degrees hotter than its power explains, and with a target or above 70: [`HeatRunaway`](Status::HeatRunaway) |
 //!
-//! No change of target delays a fault. The time that `heats` or `holds` has left goes on while the temperature is not
-//! near the target, whatever the target is. The last two rows know no target: they compare the heater's power with its
+//! No change of target delays a fault. The time that `heats` or `holds` has left goes on if the new target, too, is more
+//! than [`FAR`] above the temperature. The last two rows know no target: they compare the heater's power with its
 //! temperature, in two accounts.
 //!
 //! **Heat that does not show** (`owed`). Power adds to it, and what the heater may lose to the air is taken off: an
-//! eighth of full power, and more the hotter it is, up to full power at [`Rule::reach`]. A fall of the temperature under
-//! power adds to it, too: 20 degrees at full power are the limit. A rise of [`RISE`] settles it. At full power and
-//! 20 degrees it comes to its limit a tenth later than [`Rule::rise_s`], in one piece or in many. The account
-//! outlives a fault, so a heater that is switched on again at once has the fault again at once.
+//! eighth of full power, and more the hotter the heater is, all of it near [`Rule::reach`]. A fall of the temperature
+//! under power adds to it, too: 20 degrees at full power are the limit. A rise of [`RISE`] settles it. At full power and
+//! 20 degrees a hot end comes to the limit a tenth later than [`Rule::rise_s`], a bed a quarter, in one piece or in many.
+//! The account outlives a fault, so a heater that is switched on again at once has the fault again at once.
 //!
 //! **Heat from nowhere** (`warm`). This temperature follows the reading down, and up as fast as the power explains at
 //! most. A reading above it comes from stored heat, from another heater, or through a transistor that stays on.
 //!
 //! A broken sensor is found earlier ([`Broken`](super::sensor::Broken)). Stepped five times a second. Temperatures are
-//! in 1/64 degree. Cost: 900 cycles; 2,000 while the temperature falls. A reset forgets everything.
+//! in 1/64 degree. Cost: 900 cycles; 2,000 while a heater with power gets colder. A reset forgets everything.
 
 use super::control::STEPS;
 use super::sensor::UNIT;

@@ -13,7 +13,7 @@
 //! [locks](lock) them, and raises an alarm. Any alarm switches them off. While a wait is on ([`Heaters::begin_wait`]),
 //! the planner is woken when the wait is over.
 //!
-//! Thread mode. Cost of a turn: 3,500 cycles; 7,000 in every fifth turn. A late turn switches the heaters late. Under
+//! Thread mode. Cost of a turn: 3,500 cycles; 8,000 in every fifth turn. A late turn switches the heaters late. Under
 //! the hardest motion a turn may be half a second late, because thread mode has little of the CPU.
 
 use core::cell::{Cell, RefCell};
