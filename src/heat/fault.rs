@@ -21,7 +21,9 @@
 //! The account outlives a fault, so a heater that is switched on again at once has the fault again at once.
 //!
 //! **Heat from nowhere** (`warm`). This temperature follows the reading down, and up as fast as the power explains at
-//! most. A reading above it comes from stored heat, from another heater, or through a transistor that stays on.
+//! most. A reading above it comes from stored heat, from another heater, or through a transistor that stays on. Up to
+//! 70 degrees it follows the reading of a heater that is off, a third of a degree a second, because a bed in a closed
+//! printer warms its hot end.
 //!
 //! A broken sensor is found earlier ([`Broken`](super::sensor::Broken)). Stepped five times a second. Temperatures are
 //! in 1/64 degree. Cost: 900 cycles; 2,000 while a heater with power gets colder. A reset forgets everything.
@@ -62,6 +64,9 @@ const LIMIT: i16 = FULL - LOSS;
 /// `warm` rises by this times the power in a step, over [`Rule::rise_s`]: at full power 16 degrees a second for a hot
 /// end and 3.5 for a bed. No heater is faster.
 const GAIN: i16 = UNIT;
+/// `warm` of a heater that is off follows the reading up by this in a step, a third of a degree a second: a bed in a
+/// closed printer warms its hot end.
+const BY_AIR: i16 = UNIT / 16;
 /// The time left while nothing is wrong.
 const FRESH: u16 = u16::MAX;
 
@@ -165,7 +170,8 @@ impl Watch {
     /// Checks that the power explains the temperature.
     fn explain(&mut self, now: i16, power: i16, rule: &Rule) -> Result<(), Status> {
         let above = now.saturating_sub(self.warm);
-        self.warm += above.clamp(-FALL, power * GAIN / rule.rise_s as i16);
+        let by_air = if self.wanted == 0 && now <= WARM { BY_AIR } else { 0 };
+        self.warm += above.clamp(-FALL, (power * GAIN / rule.rise_s as i16).max(by_air));
         let matters = self.wanted != 0 || now > WARM;
         if power == 0 && above > BY_ITSELF && matters { Err(Status::HeatRunaway) } else { Ok(()) }
     }
@@ -312,6 +318,19 @@ mod tests {
             watch.step(degrees(now.min(200.0)), degrees(200.0), 200, &RULE).unwrap();
         }
         assert_eq!(watch.phase(), Phase::Holds);
+    }
+
+    /// A bed heats first, and the hot end above it gets warm without power.
+    #[test]
+    fn what_the_bed_warms_may_be_heated() {
+        for warm in [45.0, 55.0, 69.0] {
+            let mut watch = in_phase(Phase::Off);
+            for step in 0..3_000 {
+                let now = 25.0 + (warm - 25.0) * f64::from(step) / 3_000.0;
+                watch.step(degrees(now), 0, 0, &RULE).unwrap();
+            }
+            watch.step(degrees(warm), degrees(200.0), 0, &RULE).unwrap();
+        }
     }
 
     #[test]
