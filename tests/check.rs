@@ -34,7 +34,7 @@ fn files_as_posts_write_them_run() {
     let files = fs::read_dir("tests/cam").expect("tests/cam");
     let mut paths: Vec<_> = files.map(|file| file.expect("a file").path()).collect();
     paths.sort();
-    assert_eq!(paths.len(), 10);
+    assert_eq!(paths.len(), 12);
     for path in paths {
         let output = check(&path, &["--machine", "router"]);
         let text = said(&output);

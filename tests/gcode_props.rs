@@ -23,10 +23,63 @@ fn line() -> impl Strategy<Value = String> {
     prop::collection::vec(word, 0..7).prop_map(|words| words.join(" "))
 }
 
+/// A plain move, with a blank between its words.
+fn plain_move() -> impl Strategy<Value = String> {
+    let word = "[XYZ]-?[0-9]\\.[0-9]{1,4}";
+    prop_oneof![
+        word.prop_map(|word| format!("G0 {word}")),
+        word.prop_map(|word| format!("G1 {word} F3000")),
+        Just("G91 G1 X1 Y2 F3000".into()),
+        Just("G91 G2 X1 Y1 R2 F3000".into()),
+        Just("G90 G4 P0.1".into()),
+    ]
+}
+
+/// A comment, with others in it.
+fn comment() -> impl Strategy<Value = String> {
+    "[ -\\x27*-~]{0,9}"
+        .prop_recursive(3, 8, 2, |inner| {
+            (inner.clone(), "[a-z ]{0,3}", inner)
+                .prop_map(|(a, between, b)| format!("({a}){between}({b})"))
+        })
+        .prop_map(|text| format!("({text})"))
+}
+
+/// A line that a file may have around its moves, and that does nothing.
+pub fn idle_line() -> impl Strategy<Value = String> {
+    let line = prop_oneof![
+        Just(String::new()),
+        Just("%".into()),
+        "%(prog|[0-9]{4}|pocket|_N_PART_MPF|Gear)[0-9]?[.]nc",
+        "(N[0-9]{1,3} ?)?[oO] ?[0-9]{1,5}( [(]PART[)])?",
+        "[;(][a-z(]{0,9}",
+        "/[GXY0-9 ]{0,9}",
+    ];
+    (prop_oneof![3 => Just(""), 1 => Just("\u{FEFF}")], line)
+        .prop_map(|(mark, line)| format!("{mark}{line}"))
+}
+
+/// A move, and the same with more around it: a mark of UTF-8, a number, comments, blanks.
+pub fn dressed_move() -> impl Strategy<Value = (String, String)> {
+    let mark = prop_oneof![4 => Just(""), 1 => Just("\u{FEFF}"), 1 => Just("  \u{FEFF} ")];
+    let number = prop_oneof![Just(String::new()), "N[0-9]{1,4} ?"];
+    let between =
+        prop_oneof![3 => Just(" ".to_string()), 1 => Just("\t".to_string()), 2 => comment()];
+    let back = prop_oneof![
+        Just(String::new()),
+        comment(),
+        Just("; (end".to_string()),
+        " {0,3}",
+        Just("(open".to_string())
+    ];
+    (plain_move(), mark, number, between, back).prop_map(|(line, mark, number, between, back)| {
+        let text = format!("{mark}{number}{}{back}", line.replacen(' ', &between, 1));
+        (line, text)
+    })
+}
+
 /// Interprets a line and checks what must hold for every line.
 fn interpret(interpreter: &mut Interpreter, line: &[u8]) -> Commands {
-    // The caller takes the lack before each line, so that a refused line finds none.
-    interpreter.take_lack();
     let before = *interpreter;
     let mut out = Commands::default();
     match interpreter.interpret(line, &Usual, &mut out) {
@@ -85,6 +138,25 @@ proptest! {
             }
             let (end, all) = carried_out(&out, start);
             prop_assert!(!all || end == *interpreter.position(), "{:?}", out);
+        }
+    }
+
+    /// What CAM programs write around the moves changes no move.
+    #[test]
+    fn harmless_text_changes_nothing(
+        moves in prop::collection::vec((idle_line(), dressed_move(), "\r?"), 1..12),
+    ) {
+        let (mut plain, mut full) = (Interpreter::new(), Interpreter::new());
+        for (idle, (line, text), end) in moves {
+            let (idle, text) = (idle + &end, text + &end);
+            let mut out = Commands::default();
+            let read = full.interpret(idle.as_bytes(), &Usual, &mut out);
+            prop_assert!(read.is_ok() && out.is_empty(), "{idle:?}: {read:?} {out:?}");
+            let read = full.interpret(text.as_bytes(), &Usual, &mut out);
+            prop_assert!(read.is_ok(), "{text:?}: {read:?}");
+            let expected = interpret(&mut plain, line.as_bytes());
+            prop_assert_eq!(Commands { line: 0, ..out }, expected, "{:?}", text);
+            prop_assert_eq!(full.position(), plain.position());
         }
     }
 

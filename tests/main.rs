@@ -67,6 +67,7 @@ mod advance;
 mod arc_props;
 mod bed;
 mod builder;
+mod cam_files;
 mod canon_props;
 mod chain;
 mod check;

@@ -155,13 +155,13 @@ const ADVICE: &[(Status, &str, &str)] = &[
     ),
     (
         MalformedCommand,
-        "The line is not G-code: a wrong character, two points in a number, a control character.",
-        "Correct the line. O words, `#` and brackets are not supported.",
+        "The line is not G-code: a wrong character, two points in a number, text behind a comment within an open one.",
+        "Correct the line. `#`, brackets and control flow (`o100 sub`) are not supported: let the CAM program write them out.",
     ),
     (
         BadNumber,
-        "A letter without a number, or a fraction where an integer is required.",
-        "Correct the number.",
+        "A letter without a number, as in `o100 sub`, or a fraction where an integer is required.",
+        "Correct the number. O words with a keyword are not supported: let the CAM program write subroutines and loops out.",
     ),
     (
         UnsupportedType,
@@ -228,7 +228,7 @@ const ADVICE: &[(Status, &str, &str)] = &[
     (AxisWordMissing, "The code needs an axis word: X, Y, Z, A, B or C.", "Add one."),
     (
         AxisNotAllowed,
-        "Axis words, but no motion mode is active: after G80, homing or probing.",
+        "Axis words, but no motion mode is active: after G80, homing or probing. The code before G80 does not come back.",
         "Put G0 or G1 on the line.",
     ),
     (AxisInvalid, "The code does not take this axis.", "See the code in gcode.md."),
@@ -317,10 +317,14 @@ const ADVICE: &[(Status, &str, &str)] = &[
         "Check R and Z, and G90 or G91; in G76 R and J.",
     ),
     (TWordMissing, "The code needs T.", "Add the tool number."),
-    (TWordInvalid, "T is not a whole number from 0 to 255.", "Renumber the tool."),
+    (TWordInvalid, "T is not a whole number from 0 to 65,535.", "Renumber the tool."),
     (WordUnused, "A word belongs to no code of the line.", "Remove it, or add its code."),
     (WordRepeated, "The line has two words with one letter.", "Use two lines."),
-    (AxisConflict, "Two codes of the line use the axis words.", "Use two lines."),
+    (
+        AxisConflict,
+        "Two codes of the line use the axis words, such as G0 and G28 in `G0 G91 G28 Z0`.",
+        "Leave out G0 or G1 beside G28 and G30: they move by themselves. Else use two lines.",
+    ),
     (WordConflict, "Two codes of the line use one word.", "Use two lines."),
     (Alarmed, "An alarm is active.", "See alarms.md. Then `{clear:n}`."),
     (LimitHit, "A limit switch was hit.", "`{clear:n}`, move off the switch, home."),

@@ -35,7 +35,7 @@ pub enum Canon {
     /// Switches flood on or off.
     Flood(bool),
     /// The tool that is in the spindle.
-    Tool(u8),
+    Tool(u16),
     /// The factors of rates and speeds.
     Overrides(Overrides),
     /// Sets the coordinates of the present position.

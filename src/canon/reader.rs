@@ -71,7 +71,7 @@ impl<S: Setup> Reader<S> {
 
     fn step(&mut self, step: Step) {
         match step {
-            Step::Tool(number) => self.ready.push_back(Canon::Tool(number)),
+            Step::Tool => self.ready.push_back(Canon::Tool(self.interpreter.tool())),
             Step::Spindle(spindle) => self.spindle(spindle),
             Step::Coolant(coolant) => self.coolant(coolant),
             Step::Override(change) => self.change(change),

@@ -8,6 +8,7 @@ use heapless::Vec;
 use nom::Offset;
 
 use super::codes::{self, Action, Code, NonModal, OverrideCode, StopCode, ToolLength};
+use super::comment;
 use super::decimal::Decimal;
 use super::lexer::{self, Item};
 use super::modal::{
@@ -60,6 +61,8 @@ pub struct Block {
     values: Vec<(u8, Decimal), MOST>,
     /// Whether the line begins with a slash (block delete).
     pub slashed: bool,
+    /// Whether the line begins with a percent sign. Text behind it that is no G-code is the name of a program.
+    pub named: bool,
     /// Where in the line the text of a message lies.
     pub message: Option<(u8, u8)>,
     /// Whether the line has a comment.
@@ -99,6 +102,7 @@ impl Block {
             present: 0,
             values: Vec::new(),
             slashed: false,
+            named: false,
             message: None,
             commented: false,
         }
@@ -109,18 +113,15 @@ impl Block {
         if line.len() > u8::MAX as usize {
             return Err(Status::InputTooLong);
         }
-        let (mut rest, _) = lexer::blanks(line).map_err(status)?;
-        match rest.split_first() {
-            Some((b'/', after)) => {
-                self.slashed = true;
-                if deletes {
-                    return Ok(());
-                }
-                (rest, _) = lexer::blanks(after).map_err(status)?;
+        let (rest, _) = lexer::blanks(line).map_err(status)?;
+        let (mut rest, _) = lexer::blanks(comment::skip_mark(rest)).map_err(status)?;
+        if let Some((&mark @ (b'/' | b'%'), after)) = rest.split_first() {
+            self.slashed = mark == b'/';
+            self.named = mark == b'%';
+            if self.slashed && deletes {
+                return Ok(());
             }
-            // A `%` alone on a line marks the beginning and the end of a program file.
-            Some((b'%', after)) if after.iter().all(|&byte| lexer::is_blank(byte)) => return Ok(()),
-            _ => {}
+            (rest, _) = lexer::blanks(after).map_err(status)?;
         }
         self.items(line, rest)
     }
@@ -153,6 +154,8 @@ impl Block {
                     if is_g { Status::GcodeUnsupported } else { Status::McodeUnsupported };
                 self.code(&value.code().and_then(find).ok_or(unknown)?)
             }
+            // The number of a program. O words of LinuxCNC go on with a keyword, which is no word.
+            b'O' => Ok(()),
             _ => self.value(letter, value),
         }
     }
@@ -234,11 +237,11 @@ impl Block {
         self.values.iter().find(|word| word.0 == slot).map(|word| &word.1)
     }
 
-    /// Converts the X word from a diameter to a radius.
+    /// Converts the word in a slot from a diameter to a radius.
     #[inline(never)]
     #[small]
-    pub fn halve_x(&mut self) {
-        if let Some((_, value)) = self.values.iter_mut().find(|word| word.0 == words::X) {
+    pub fn halve(&mut self, slot: u8) {
+        if let Some((_, value)) = self.values.iter_mut().find(|word| word.0 == slot) {
             *value = value.half();
         }
     }
@@ -376,7 +379,7 @@ mod tests {
 
     #[test]
     fn what_the_machine_does_not_have() {
-        for line in ["G5", "G256", "G28.35", "G61.2", "G59.4", "G-1", "O1", "U1", "V1"] {
+        for line in ["G5", "G256", "G28.35", "G61.2", "G59.4", "G-1", "U1", "V1"] {
             assert_eq!(refusal(line), Status::GcodeUnsupported, "{line}");
         }
         for line in ["M10", "M256", "M30.1", "M3.1"] {
@@ -433,7 +436,6 @@ mod tests {
         assert_eq!(block.read(b" / G1 X1", false), Ok(()));
         assert!(block.slashed && block.has(AXES));
         assert!(read(" % ").is_ok());
-        assert_eq!(refusal("% G1"), Status::MalformedCommand);
         assert_eq!(read("G0 (MSG Hello) X1").unwrap().message, Some((7, 13)));
         assert_eq!(read(";msg,x").unwrap().message, Some((5, 6)));
         assert_eq!(refusal(&" ".repeat(256)), Status::InputTooLong);

@@ -53,24 +53,22 @@ impl State {
             return Err(Status::ArcSpecification);
         }
         let radius = self.radius(block, first, second)?;
-        let turns = turns(block)?;
+        // The first turn is the arc itself, or the full circle.
+        let extra_turns = turns(block)?.saturating_sub(1);
         let start = self.position;
         self.advance(block, false, setup)?;
         let target = self.position;
         if is_far(&start, &target) {
             return Err(Status::OutOfRange);
         }
-        let mut arc =
-            Arc { first, second, linear, center: [Length::ZERO; 2], clockwise, extra_turns: turns };
+        let center = [Length::ZERO; 2];
+        let mut arc = Arc { first, second, linear, center, clockwise, extra_turns };
         arc.center = match radius {
             Some(radius) => radius_form(&start, &target, &arc, radius)?,
             None => self.center_form(block, &start, &target, &arc)?,
         };
         if may_be_too_far(&start, &arc) && !limits::arc_is_within(&start, &target, &arc, None) {
             return Err(Status::OutOfRange);
-        }
-        if arc::closes(&start, &target, &arc) {
-            arc.extra_turns = turns.saturating_sub(1);
         }
         out.motion = Motion::Arc { target, feed, arc };
         Ok(())
@@ -153,7 +151,7 @@ fn is_far(start: &PerAxis<Length>, target: &PerAxis<Length>) -> bool {
     false
 }
 
-/// Returns P, the number of full turns. 0 without P.
+/// Returns P, the number of turns that are begun. 0 without P.
 #[small]
 fn turns(block: &Block) -> Result<u16, Status> {
     match block.get(P) {

@@ -18,8 +18,8 @@ pub const N_MAX: u32 = 0xFF_FFFF;
 pub struct Commands {
     /// The N word, 0 if the line has none; at most [`N_MAX`].
     pub line: u32,
-    /// M6: this tool is in the spindle from now on.
-    pub tool: Option<u8>,
+    /// M6: the tool of the last T word is in the spindle from now on.
+    pub changes_tool: bool,
     /// M3, M4, M5, or S while the spindle turns.
     pub spindle: Option<Spindle>,
     /// M7, M8, M9: the coolants that run, bits of [`Coolant`](super::modal::Coolant).
@@ -61,7 +61,7 @@ impl Commands {
         // All fields are listed, so that a new field cannot be forgotten here.
         let Commands {
             line: _,
-            tool,
+            changes_tool,
             spindle,
             coolant,
             overrides,
@@ -71,7 +71,7 @@ impl Commands {
             blend: _,
             stop,
         } = self;
-        tool.is_none()
+        !*changes_tool
             && spindle.is_none()
             && coolant.is_none()
             && overrides.is_none()
@@ -97,7 +97,7 @@ impl Commands {
     #[inline(always)]
     pub(super) fn clear_beside_motion(&mut self) {
         self.line = 0;
-        self.tool = None;
+        self.changes_tool = false;
         self.spindle = None;
         self.coolant = None;
         self.overrides = None;

@@ -16,12 +16,13 @@ use super::block::Block;
 use super::codes::NonModal;
 use super::command::{Commands, Spindle, Surface};
 use super::fast_path::Writer;
-use super::modal::{Defaults, FeedMode, Modal, MotionMode, SpeedMode, Turn, Units, XMode};
+use super::modal::{Defaults, FeedMode, Modal, MotionMode, Plane, SpeedMode, Turn, Units, XMode};
 use super::printing::Kept;
 use super::setup::Setup;
 use super::state::State;
 use super::sticky::Sticky;
 use super::tables::{Edit, Ram, TableRow, Tables};
+use super::words::{I, R, X};
 use crate::capability::Capability;
 use crate::status::Status;
 use crate::units::{AXES, Length, PerAxis};
@@ -36,6 +37,8 @@ pub struct Info {
     pub deleted: bool,
     /// Whether the line had a comment.
     pub commented: bool,
+    /// Whether the line has asked for the length of a tool without a length, so that 0 is in force.
+    pub lacks_length: bool,
 }
 
 /// The state of the G-code interpreter, and the tables that outlast a program.
@@ -149,12 +152,15 @@ impl<T: Tables> Interpreter<T> {
         out.clear();
         let mut block = Block::new();
         let deletes = setup.deletes_blocks();
-        block.read(line, deletes)?;
-        block.check(self.state.modal.motion)?;
+        let read = block.read(line, deletes);
+        if let Err(status) = read.and_then(|()| block.check(self.state.modal.motion)) {
+            return if block.named { Ok(Info::default()) } else { Err(status) };
+        }
         self.halve(&mut block);
         self.execute_or_undo(&block, setup, out)?;
+        let lacks_length = self.state.lacks_length(&block);
         let Block { message, slashed, commented, .. } = block;
-        Ok(Info { message, deleted: slashed && deletes, commented })
+        Ok(Info { message, deleted: slashed && deletes, commented, lacks_length })
     }
 
     /// Interprets the words of a jog: one feed move. The words have to give the feed rate. They may give units and a
@@ -186,12 +192,24 @@ impl<T: Tables> Interpreter<T> {
         done.map(|()| Info::default())
     }
 
-    /// Converts the X word from a diameter to a radius if G7 is in force, whatever the word is used for.
+    /// Converts the X word from a diameter to a radius if G7 is in force, whatever the word is used for. In a canned
+    /// cycle along X also the other words that are coordinates of X: R, and I of G87.
     #[inline(always)]
     fn halve(&self, block: &mut Block) {
         let mode = block.x_mode.unwrap_or(self.state.modal.x_mode);
         if Capability::Lathe.is_built_in() && mode == XMode::Diameter {
-            block.halve_x();
+            self.halve_words(block);
+        }
+    }
+
+    #[inline(never)]
+    #[small]
+    fn halve_words(&self, block: &mut Block) {
+        block.halve(X);
+        let plane = block.plane.unwrap_or(self.state.modal.plane);
+        if plane == Plane::Yz && block.does().is_some_and(MotionMode::is_cycle) {
+            block.halve(R);
+            block.halve(I);
         }
     }
 
@@ -253,7 +271,6 @@ impl<T: Tables> Interpreter<T> {
             (Ok(()), None) => {}
             (Err(_), _) => {
                 before.restore(&mut self.state);
-                self.state.lacks_length = false;
                 out.clear();
             }
         }
@@ -312,8 +329,8 @@ struct RareBefore {
     tool_length: PerAxis<Length>,
     speed: f32,
     limit: u16,
-    selected: u8,
-    tool: u8,
+    selected: u16,
+    tool: u16,
 }
 
 #[small]
@@ -347,8 +364,8 @@ pub struct Modes {
     homed: u8,
     speed: f32,
     limit: u16,
-    selected: u8,
-    tool: u8,
+    selected: u16,
+    tool: u16,
 }
 
 /// The offsets that are in no table, as they were before check mode began.
@@ -446,18 +463,13 @@ impl<T> Interpreter<T> {
         self.state.modal.system + 1
     }
 
-    /// Whether a line has asked for the length of a tool without a length, so that 0 is in force. Resets the answer.
-    pub fn take_lack(&mut self) -> bool {
-        core::mem::take(&mut self.state.lacks_length)
-    }
-
     /// Returns the tool in the spindle, 0 for none.
-    pub fn tool(&self) -> u8 {
+    pub fn tool(&self) -> u16 {
         self.state.tool
     }
 
     /// Returns the tool of the last T word.
-    pub fn selected_tool(&self) -> u8 {
+    pub fn selected_tool(&self) -> u16 {
         self.state.selected
     }
 

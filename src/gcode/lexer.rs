@@ -3,14 +3,12 @@
 //! Blanks may stand anywhere, inside numbers too (RS274). The parsers are called one after the other and not combined
 //! into trees, because on AVR every level of combinators would copy what it returns.
 
-use nom::branch::alt;
-use nom::bytes::complete::take_till;
-use nom::character::complete::char;
-use nom::combinator::{fail, map, opt, rest};
+use kerf_macros::small;
+use nom::combinator::fail;
 use nom::error::{ErrorKind, ParseError};
-use nom::sequence::{delimited, preceded, terminated};
 use nom::{IResult, Parser};
 
+use super::comment;
 use super::decimal::Decimal;
 use super::number::decimal;
 use crate::status::Status;
@@ -88,12 +86,29 @@ fn letter(input: &[u8]) -> Lexed<'_, u8> {
     }
 }
 
-#[inline(never)]
 /// Reads a comment: `( ... )`, closed or not, or `;` to the end of the line.
+///
+/// Error 101 if the comment is not closed and text stands behind one within it: `(a (b) Y5` may be meant either way.
+#[inline(never)]
+#[small]
 fn comment(input: &[u8]) -> Lexed<'_, Item<'_>> {
-    let inline = delimited(char('('), take_till(|byte| byte == b')'), opt(char(')')));
-    let trailing = preceded(char(';'), rest);
-    terminated(map(alt((inline, trailing)), Item::Comment), blanks).parse(input)
+    let Some((mark, text)) = input.split_first() else { return fail().parse(input) };
+    if *mark == b';' {
+        return Ok((&[], Item::Comment(text)));
+    }
+    let (text, rest) = text.split_at_checked(comment::length(text)).unwrap_or((text, &[]));
+    match rest.split_first() {
+        Some((_, rest)) => blanks(rest).map(|(rest, ())| (rest, Item::Comment(text))),
+        None if hides_words(text) => fail().parse(input),
+        None => Ok((rest, Item::Comment(text))),
+    }
+}
+
+/// Whether text stands behind the last comment within a comment.
+fn hides_words(text: &[u8]) -> bool {
+    let last = text.iter().rposition(|byte| !is_blank(*byte));
+    let closed = text.iter().rposition(|byte| *byte == b')');
+    closed.is_some() && closed != last
 }
 
 /// Returns the text of a comment behind `MSG`, and behind the comma if one follows. `None` if the comment does not
@@ -142,6 +157,25 @@ mod tests {
         let commented = list(&[('G', "1"), (';', "a ; b"), ('X', "2"), (';', " rest (x)")]);
         assert_eq!(items("G1 (a ; b) X2 ; rest (x)"), commented);
         assert_eq!(items("(open"), list(&[(';', "open")]));
+    }
+
+    #[test]
+    fn comments_in_comments() {
+        for (line, text) in [
+            ("(MSG 1/8\" bit (flat))", "MSG 1/8\" bit (flat)"),
+            ("(a (b) c (d (e)) f)", "a (b) c (d (e)) f"),
+            ("(()) ", "()"),
+            ("(a (b) ", "a (b) "),
+            ("(a (b", "a (b"),
+            (";a) (b", "a) (b"),
+        ] {
+            assert_eq!(items(line), list(&[(';', text)]), "{line}");
+        }
+        assert_eq!(items("(a(b))X1(c)"), list(&[(';', "a(b)"), ('X', "1"), (';', "c")]));
+        // Nobody can tell whether the Y word belongs to the comment.
+        for line in ["(a (b) Y5", "G1 X3 (a (b) Y5 ; c", "(a))", "(a) b)"] {
+            assert!(items(line).is_err(), "{line}");
+        }
     }
 
     #[test]

@@ -14,6 +14,7 @@ mod block;
 mod circle;
 pub mod codes;
 pub mod command;
+pub mod comment;
 mod cycle;
 pub mod decimal;
 mod digits;

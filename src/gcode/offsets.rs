@@ -13,7 +13,7 @@ use super::command::{Commands, Motion};
 use super::modal::MotionMode;
 use super::setup::{AxisMode, Setup};
 use super::state::State;
-use super::tables::{Edit, NUMBERED, SYSTEMS, TOOL_AXES, TableRow, Tables};
+use super::tables::{Edit, NUMBERED, SYSTEMS, TOOL_AXES, TOOLS, TableRow, Tables};
 use super::words::{AXES, H, L, P};
 use crate::status::Status;
 use crate::units::{self, FIRST_ROTARY, Length, PerAxis};
@@ -98,23 +98,29 @@ impl State {
         Ok(())
     }
 
-    /// Returns the lengths of tool H, or without H of the tool in the spindle. They are 0 for an empty spindle, and for
-    /// a tool up to [`NUMBERED`] that the tables do not have. The latter is no error, because a program should not be
-    /// refused in its middle; [`State::lacks_length`] is set instead.
+    /// Returns the lengths of the tool that a line names. They are 0 for an empty spindle, and for a tool that the
+    /// tables do not have. The latter is no error, because a program should not be refused in its middle:
+    /// [`State::lacks_length`] tells of it.
     #[small]
-    fn tool_named(
-        &mut self,
-        block: &Block,
-        tables: &impl Tables,
-    ) -> Result<PerAxis<Length>, Status> {
+    fn tool_named(&self, block: &Block, tables: &impl Tables) -> Result<PerAxis<Length>, Status> {
+        let row = TableRow::tool(self.tool_number(block)?);
+        Ok(row.map_or([Length::ZERO; units::AXES], |row| tables.row(row)))
+    }
+
+    /// Returns H, or without H the tool in the spindle: at most [`NUMBERED`].
+    #[inline(never)]
+    #[small]
+    fn tool_number(&self, block: &Block) -> Result<u8, Status> {
         let number = block.get(H).map_or(Ok(self.tool.into()), |word| word.integer());
         let number = number.ok().and_then(|number| u8::try_from(number).ok());
-        let number = number.filter(|number| *number <= NUMBERED).ok_or(Status::HWordInvalid)?;
-        let Some(row) = TableRow::tool(number) else {
-            self.lacks_length = number != 0;
-            return Ok([Length::ZERO; units::AXES]);
-        };
-        Ok(tables.row(row))
+        number.filter(|number| *number <= NUMBERED).ok_or(Status::HWordInvalid)
+    }
+
+    /// Whether a line that has been carried out has asked for the length of a tool that has none.
+    #[small]
+    pub(super) fn lacks_length(&self, block: &Block) -> bool {
+        matches!(block.tool_length, Some(ToolLength::Table | ToolLength::Add))
+            && self.tool_number(block).is_ok_and(|number| number > TOOLS)
     }
 
     /// Carries out the codes of group 0, except the moves to stored positions.

@@ -47,16 +47,14 @@ pub struct State {
     pub shifted: bool,
     /// The tool length in force (G43, G43.1, G43.2).
     pub tool_length: PerAxis<Length>,
-    /// A line has asked for the length of a tool that has none. The parser takes and reports this.
-    pub lacks_length: bool,
     /// S: turns a minute, or m/min with G96.
     pub speed: f32,
     /// D of G96: the most turns a minute; 0 for no limit.
     pub limit: u16,
     /// The tool of the last T word.
-    pub selected: u8,
+    pub selected: u16,
     /// The tool in the spindle: the one that was selected at the last M6.
-    pub tool: u8,
+    pub tool: u16,
     /// How the extruder of a printer interprets its words.
     pub printing: Printing,
     /// The words of canned cycles that stay in force.
@@ -79,7 +77,6 @@ impl State {
             shift: [Length::ZERO; AXES],
             shifted: false,
             tool_length: [Length::ZERO; AXES],
-            lacks_length: false,
             speed: 0.0,
             limit: 0,
             selected: 0,
@@ -211,7 +208,7 @@ impl State {
         }
         if block.changes_tool() {
             self.tool = self.selected;
-            out.tool = Some(self.tool);
+            out.changes_tool = true;
             // The tool change stops the spindle. S on the same line must not start it again.
             self.modal.spindle = Turn::Off;
             out.spindle = None;

@@ -18,8 +18,8 @@ use crate::units::{Length, PerAxis};
 /// One step of a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Step {
-    /// Sets the tool that is in the spindle.
-    Tool(u8),
+    /// The tool that is in the spindle is another one.
+    Tool,
     /// Sets the direction and speed of the spindle.
     Spindle(Spindle),
     /// Sets the coolants that run, bits of [`Coolant`](super::modal::Coolant).
@@ -60,11 +60,7 @@ impl Step {
     pub fn precedes_motion(&self) -> bool {
         matches!(
             self,
-            Step::Tool(_)
-                | Step::Spindle(_)
-                | Step::Coolant(_)
-                | Step::Override(_)
-                | Step::Dwell(_)
+            Step::Tool | Step::Spindle(_) | Step::Coolant(_) | Step::Override(_) | Step::Dwell(_)
         )
     }
 }
@@ -200,9 +196,9 @@ impl Steps {
                 // The spindle has to stop before the tool is changed.
                 Stage::OldSpindle => {
                     let off = Step::Spindle(Spindle { turn: Turn::Off, speed: 0.0 });
-                    (commands.tool.map(|_| off), Stage::Tool)
+                    (commands.changes_tool.then_some(off), Stage::Tool)
                 }
-                Stage::Tool => (commands.tool.map(Step::Tool), Stage::Spindle),
+                Stage::Tool => (commands.changes_tool.then_some(Step::Tool), Stage::Spindle),
                 Stage::Spindle => (commands.spindle.map(Step::Spindle), Stage::Coolant),
                 Stage::Coolant => (commands.coolant.map(Step::Coolant), Stage::Overrides),
                 Stage::Overrides => (commands.overrides.map(Step::Override), Stage::Dwell),

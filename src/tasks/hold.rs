@@ -22,7 +22,7 @@
 //! dwell, or while M0 waits. An idle machine has nothing to hold and ignores the character.
 //!
 //! A `%` flushes only if it arrives in a hold, or if an exclamation mark comes directly after it. Any other `%` begins
-//! or ends a program. The time of arrival decides, because the `%` of a program may still wait behind data when a hold
+//! or ends a program, and the name of the program may follow ([`LinePool::percent`]). The time of arrival decides, because the `%` of a program may still wait behind data when a hold
 //! begins.
 //!
 //! A tilde that comes while the machine slows down takes effect at the standstill. The machine does not resume if an
@@ -325,6 +325,10 @@ fn cut(links: &Links, port: &Port, slot: Option<u8>, event: machine::Event) {
 /// Acts on a real-time character where it stands: the reader has come to its mark, outside comments and behind all
 /// cuts.
 pub fn placed(links: &Links, port: &Port, mark: u8) {
+    if mark == CUT {
+        // A cut, if there is one, undoes this.
+        port.lines.borrow_mut().percent();
+    }
     serve(links);
     if mark == GO {
         go_on(links);

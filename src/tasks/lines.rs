@@ -18,6 +18,7 @@ mod entries;
 use entries::{Entries, Entry};
 use kerf_macros::small;
 
+use crate::gcode::comment::Aside;
 use crate::hal::LINES;
 use crate::hal::ring::Window;
 use crate::hal::serial::TAKEN_RETURN;
@@ -61,28 +62,14 @@ impl LineId {
     pub const NONE: Self = Self(u8::MAX);
 }
 
-/// Whether a place in a line is in a comment.
+/// The byte before the next one, as far as it matters.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Aside {
-    /// The place is in no comment.
-    None,
-    /// The place is in parentheses.
-    Parentheses,
-    /// The place is behind a semicolon.
-    Rest,
-}
-
-impl Aside {
-    /// Returns whether text behind one more byte is in a comment.
-    pub fn after(self, byte: u8) -> Self {
-        match (self, byte) {
-            (_, b'\n' | b'\r') => Self::None,
-            (Self::Rest, _) | (Self::None, b';') => Self::Rest,
-            (_, b'(') => Self::Parentheses,
-            (_, b')') => Self::None,
-            (aside, _) => aside,
-        }
-    }
+enum Before {
+    Other,
+    /// A carriage return: a line feed directly after it belongs to that line end.
+    Return,
+    /// A percent sign that begins a line and flushes nothing. If a name follows, it is kept as part of the line.
+    Percent,
 }
 
 /// The line pool of a port.
@@ -102,8 +89,8 @@ pub struct LinePool {
     besides: u16,
     /// Why the line that is coming in cannot be kept.
     fault: Option<Status>,
-    /// The last byte was a carriage return: a line feed directly after it belongs to that line end.
-    returned: bool,
+    /// The last byte.
+    before: Before,
     /// Empty lines are kept: in text mode they are answered by a prompt.
     keep_empty: bool,
     /// No line is a control line: all are answered in their order.
@@ -134,7 +121,7 @@ impl LinePool {
             partial: 0,
             besides: 0,
             fault: None,
-            returned: false,
+            before: Before::Other,
             keep_empty: false,
             in_order: false,
             #[cfg(feature = "dialect-reprap")]
@@ -326,7 +313,9 @@ impl LinePool {
         let slots = self.bytes.get_mut(at..).unwrap_or(&mut []);
         let slots = slots.get_mut(..most.min(slots.len())).unwrap_or(&mut []);
         let count = copy_printing(text, slots);
-        self.returned &= count == 0;
+        if count > 0 {
+            self.before = Before::Other;
+        }
         self.partial += count;
         let has_end = begins && count > 0 && bytes.get(usize::from(count)) == Some(&b'\n');
         let ends = has_end && self.entries.len() < SLOTS && self.room() > 0;
@@ -342,6 +331,7 @@ impl LinePool {
     fn may_begin(&self, bytes: &[u8]) -> bool {
         match bytes.first() {
             None | Some(b' ' | b'\t' | &ASKS | &TAKEN_RETURN) => false,
+            Some(_) if self.before == Before::Percent => false,
             Some(first) => !may_be_control(*first) || self.ready(),
         }
     }
@@ -349,8 +339,9 @@ impl LinePool {
     /// Takes one byte. Returns whether it completes a line.
     #[inline(never)]
     pub fn put(&mut self, byte: u8) -> bool {
-        let returned = core::mem::replace(&mut self.returned, byte == b'\r');
-        if byte == b'\n' && returned {
+        let now = if byte == b'\r' { Before::Return } else { Before::Other };
+        let before = core::mem::replace(&mut self.before, now);
+        if byte == b'\n' && before == Before::Return {
             self.pass(1);
             return false;
         }
@@ -358,10 +349,23 @@ impl LinePool {
             return self.end_line();
         }
         if self.fault.is_some() || (self.partial == 0 && is_blank(byte)) {
+            if before == Before::Percent {
+                self.before = before;
+            }
             self.pass(1);
             return false;
         }
+        if before == Before::Percent && (byte.is_ascii_alphanumeric() || byte == b'_') {
+            self.keep_byte(b'%');
+        }
         let asks = self.end_question(byte);
+        self.keep_byte(byte);
+        asks
+    }
+
+    /// Adds a byte to the line that is coming in.
+    #[inline(never)]
+    fn keep_byte(&mut self, byte: u8) {
         let at = self.room_at();
         match self.bytes.get_mut(at) {
             Some(slot) if self.partial < self.longest => {
@@ -373,7 +377,21 @@ impl LinePool {
                 self.pass(1);
             }
         }
-        asks
+    }
+
+    /// Takes a percent sign that stands outside comments and flushes nothing. At the beginning of a line it may begin
+    /// the name of a program, `%prog1`; anywhere else it belongs to no line. A sender may also have meant a flush, so
+    /// what begins with no letter or digit, such as JSON, is a line of its own.
+    #[inline(never)]
+    #[small]
+    pub fn percent(&mut self) {
+        match self.slice(self.end.into(), self.partial) {
+            _ if self.is_plain() || self.fault.is_some() => {}
+            [] => self.before = Before::Percent,
+            // A byte order mark.
+            [0xEF, 0xBB, 0xBF] => self.keep_byte(b'%'),
+            _ => {}
+        }
     }
 
     /// Ends the line that is coming in if it is a question mark and `next` begins another line. Returns whether it
@@ -447,7 +465,7 @@ impl LinePool {
     /// Returns whether the next byte is in a comment.
     pub fn aside(&self) -> Aside {
         let text = self.slice(usize::from(self.end), self.partial);
-        text.iter().fold(Aside::None, |aside, byte| aside.after(*byte))
+        text.iter().fold(Aside::NONE, |aside, byte| aside.after(*byte))
     }
 
     /// Whether a control line waits.
@@ -526,6 +544,9 @@ impl LinePool {
     /// Drops the line that is coming in, if it is a data line so far.
     #[inline(never)]
     pub fn terminate_partial(&mut self, status: Status) {
+        if self.before == Before::Percent {
+            self.before = Before::Other;
+        }
         let text = self.slice(usize::from(self.end), self.partial);
         if !text.is_empty() && self.classify(text) == Class::Data {
             self.spoil(status);
@@ -534,12 +555,12 @@ impl LinePool {
 
     /// Sets whether the next byte follows a carriage return.
     pub fn follow(&mut self, returned: bool) {
-        self.returned = returned;
+        self.before = if returned { Before::Return } else { Before::Other };
     }
 
     /// Takes the end of a line; `returned` if it was a carriage return. Returns whether a line has been completed.
     pub fn end(&mut self, returned: bool) -> bool {
-        self.returned = returned;
+        self.follow(returned);
         self.end_line()
     }
 

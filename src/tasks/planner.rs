@@ -427,7 +427,7 @@ impl Planner {
                 self.steps.repeat();
             }
             Step::Stop(Stop::End) => self.pause(QueuedAction::ProgramEnd),
-            Step::Stop(_) | Step::Tool(_) => {
+            Step::Stop(_) | Step::Tool => {
                 let waits = self.links.settings.borrow().waits_at_stop();
                 // The tool is reported; a sender that changes tools handles the stop itself.
                 if waits || matches!(step, Step::Stop(_)) {

@@ -12,11 +12,12 @@ use embassy_futures::yield_now;
 use super::Never;
 use super::hold;
 use super::jog;
-use super::lines::{Aside, LinePool};
+use super::lines::LinePool;
 use super::links::Links;
 use super::overtake::Scan;
 use super::ports::Port;
 use super::realtime;
+use crate::gcode::comment::Aside;
 use crate::hal::event::{Event, next, set_asked};
 use crate::hal::ring::Window;
 use crate::hal::serial::{
@@ -218,7 +219,7 @@ impl Intake {
             self.scan.pass(1);
             let is_line = match byte {
                 CUT | GO if cuts => false,
-                CUT | GO if pool.aside() != Aside::None => return Left::Aside,
+                CUT | GO if pool.aside() != Aside::NONE => return Left::Aside,
                 CUT | GO => return Left::Placed(byte),
                 ..MARKS => self.loss(pool, byte, links),
                 // A line stood here that has overtaken. It has been counted already.
@@ -416,7 +417,7 @@ fn look_for_marks(links: &Links, port: &Port, ring: &Window<'_>) {
     let mut last = port.cut.get();
     for n in 0..ring.len() {
         let (byte, slot) = (ring.get(n), ring.slot(n));
-        if byte < MARKS && aside == Aside::None && last.is_none() {
+        if byte < MARKS && aside == Aside::NONE && last.is_none() {
             hold::ahead(links, port, byte, slot);
         }
         last = last.filter(|last| *last != slot);

@@ -55,9 +55,11 @@ fn radius_form() {
 
 #[test]
 fn turns() {
-    assert_eq!(arc(&[AT_10_0, "G3 X0 Y10 I-10 P2"]).extra_turns, 2);
-    for (line, extra) in [("G3 I-10 P0", 0), ("G3 I-10 P1", 0), ("G3 I-10 P3", 2)] {
-        assert_eq!(arc(&[AT_10_0, line]).extra_turns, extra, "{line}");
+    for line in ["G3 I-10", "G3 X0 Y10 I-10", "G3 X0 Y10 R10"] {
+        for (turns, extra) in [("", 0), ("P0", 0), ("P1", 0), ("P2", 1), ("P3", 2)] {
+            let extra_turns = arc(&[AT_10_0, &std::format!("{line} {turns}")]).extra_turns;
+            assert_eq!(extra_turns, extra, "{line} {turns}");
+        }
     }
     assert_eq!(refusal(&[AT_10_0, "G3 I-10 P-1"]), Status::PWordNegative);
     for line in ["G3 I-10 P1.5", "G3 I-10 P65536"] {

@@ -159,3 +159,27 @@ fn words_stay_as_long_as_the_cycle() {
         assert_eq!(refusal(lines), status, "{lines:?}");
     }
 }
+
+#[test]
+fn along_x_the_heights_of_a_cycle_are_diameters_too() {
+    // Radius 20 is the bottom, radius 21 is R.
+    let at = ["G7 G21 G90 G94", "G0 X50 Y0 Z0", "F100"];
+    let line = |line| steps(&[at[0], at[1], at[2], line]);
+    assert_eq!(line("G19 G99 G81 X40 R42 Y5"), "Y5 X21 x20 X21");
+    assert_eq!(steps(&[at[0], at[1], at[2], "G19", "G99 G81 X40 R42 Y5"]), "Y5 X21 x20 X21");
+    // The words that stay in force are not halved again.
+    assert_eq!(steps(&[at[0], at[1], at[2], "G19 G99 G81 X40 R42 Y5", "Y6"]), "Y6 x20 X21");
+    assert_eq!(line("G91 G19 G99 G81 X-2 R-4 Y5"), "Y5 X23 x22 X23");
+    assert_eq!(line("G20 G19 G99 G81 X1 R2 Y0"), "X25.4 x12.7 X25.4");
+    // A peck is a distance, as I of an arc is.
+    assert_eq!(line("G19 G99 G83 X40 R42 Q1 Y5"), "Y5 X21 x20 X21");
+    // In another plane R is no coordinate of X.
+    assert_eq!(line("G17 G99 G81 X40 R2 Z-1"), "Z2 X20 z-1 Z2");
+    assert_eq!(steps(&["G8 G0 X25", "F100", "G19 G99 G81 X20 R21 Y5"]), "Y5 X21 x20 X21");
+    // K of G87 is a height along Z, and I is one along X.
+    let bore = |line| steps(&["G7 M3 S100 F100", "G0 X50", line]);
+    assert_eq!(
+        bore("G19 G99 G87 X40 R42 Y0 J1 K0 I41"),
+        steps(&["G8 M3 S100 F100", "G0 X25", "G19 G99 G87 X20 R21 Y0 J1 K0 I20.5"])
+    );
+}

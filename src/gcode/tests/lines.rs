@@ -181,10 +181,49 @@ fn program_end_resets() {
 }
 
 #[test]
+fn tools_have_five_digits() {
+    for tool in [0, 99, 255, 256, 390, 8_888, 65_535] {
+        let (state, _) = run(&[&std::format!("M6T{tool}")]);
+        assert_eq!(u32::from(state.tool()), tool);
+        assert_eq!(u32::from(state.selected_tool()), tool);
+    }
+    assert_eq!(refusal(&["T65536"]), Status::TWordInvalid);
+    // 256 is not taken for 0, nor 257 for 1.
+    for tool in ["T256 M6", "T257 M6", "T390 M6", "T65535 M6"] {
+        assert_eq!(refusal(&[tool, "G43"]), Status::HWordInvalid, "{tool}");
+    }
+}
+
+#[test]
+fn program_names_have_no_effect() {
+    for line in
+        ["O1", "o0001 (PART)", "O12345;x", "N10 O7", "%prog1", "% 1234", "%_N_A_MPF", "%O1 x"]
+    {
+        let (_, out) = run(&[line]);
+        assert!(out.is_empty(), "{line}");
+    }
+    for line in ["o100 sub", "o<name> call", "o1 while [1]", "O1 if", "O#1 call", "o1 do", "O"] {
+        assert_eq!(refusal(&[line]), Status::BadNumber, "{line}");
+    }
+    // What is G-code behind a percent sign runs, as behind one that the receive interrupt has taken.
+    assert_eq!(position(&["% G0 X1"])[0], 10_000);
+    assert_eq!(refusal(&["G0 X1 %"]), Status::MalformedCommand);
+}
+
+#[test]
+fn a_mark_of_utf8_is_no_text() {
+    assert_eq!(position(&["\u{FEFF}G0 X1"])[0], 10_000);
+    assert_eq!(position(&["  \u{FEFF} (x) G0 X1"])[0], 10_000);
+    assert!(run(&["\u{FEFF}"]).1.is_empty());
+    assert_eq!(refusal(&["G0 \u{FEFF}X1"]), Status::MalformedCommand);
+    assert_eq!(refusal(&["\u{FFFE}G0 X1"]), Status::MalformedCommand);
+}
+
+#[test]
 fn a_tool_change_stops_the_spindle() {
     let (state, out) = run(&["M3 S100", "T2 M6 S200"]);
     assert_eq!((state.tool(), state.modal().spindle), (2, Turn::Off));
-    assert_eq!((out.tool, out.spindle), (Some(2), None));
+    assert_eq!((out.changes_tool, out.spindle), (true, None));
     let (_, out) = run(&["M3 S100", "M6", "S300"]);
     assert!(out.is_empty());
     let (_, out) = run(&["M3 S100", "M6 M4"]);

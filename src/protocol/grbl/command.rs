@@ -1,5 +1,6 @@
 //! Recognizes which command a line is.
 
+use crate::gcode::comment;
 use crate::units::AXES;
 
 /// The command of a line.
@@ -169,7 +170,7 @@ fn is_jog(words: &[u8]) -> bool {
             b';' => break,
             b'(' => {
                 let rest = words.get(at..).unwrap_or(&[]);
-                at += rest.iter().position(|byte| *byte == b')').map_or(rest.len(), |end| end + 1);
+                at += comment::length(rest) + 1;
             }
             b'F' => feeds = true,
             b'G' => {

@@ -2,6 +2,7 @@
 
 use super::frame::{Frame, Sum, integer};
 use crate::config::Number;
+use crate::gcode::comment::Aside;
 
 /// Returns the code of a block, with its letter in upper case: the first word, if that is G, M or T with a whole
 /// number; `$` with 0 for a line about a setting by its name. `None` otherwise.
@@ -91,12 +92,12 @@ fn behind(block: &[u8], letter: u8) -> Option<&[u8]> {
 /// The bytes of a text that are in no comment. Parentheses count as outside.
 pub struct Bytes<'a> {
     rest: &'a [u8],
-    in_comment: bool,
+    aside: Aside,
 }
 
 impl<'a> Bytes<'a> {
     pub fn of(text: &'a [u8]) -> Self {
-        Self { rest: text, in_comment: false }
+        Self { rest: text, aside: Aside::NONE }
     }
 }
 
@@ -109,14 +110,14 @@ impl Iterator for Bytes<'_> {
         loop {
             let (byte, rest) = self.rest.split_first()?;
             self.rest = rest;
-            match byte {
-                b')' => self.in_comment = false,
-                _ if self.in_comment => continue,
-                b';' => return None,
-                b'(' => self.in_comment = true,
-                _ => {}
+            let before = self.aside;
+            self.aside = before.after(*byte);
+            if before == Aside::NONE && *byte == b';' {
+                return None;
             }
-            return Some(*byte);
+            if before == Aside::NONE || self.aside == Aside::NONE {
+                return Some(*byte);
+            }
         }
     }
 }

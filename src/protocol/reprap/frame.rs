@@ -7,6 +7,7 @@
 //! which does not change the checksum.
 
 use super::command::split_digits;
+use crate::gcode::comment::skip_mark;
 use crate::protocol::Span;
 
 /// What a port keeps about its sender.
@@ -98,7 +99,8 @@ impl Frame {
                 rest = behind;
             }
         }
-        let rest = rest.trim_ascii();
+        // A mark at the beginning of the file: some hosts number its first line like any other.
+        let rest = skip_mark(rest.trim_ascii()).trim_ascii();
         let start = rest.as_ptr().addr().wrapping_sub(line.as_ptr().addr());
         let end = start.wrapping_add(rest.len());
         Self { number, numbered, sum, block: Span { start: start as u8, end: end as u8 } }
@@ -268,6 +270,8 @@ mod tests {
         assert_eq!(parts("N2 G28*1j"), (Some(2), Sum::Wrong, "G28"));
         assert_eq!(parts("M117 5*x"), (None, Sum::None, "M117 5*x"));
         assert_eq!(parts("  "), (None, Sum::None, ""));
+        assert_eq!(parts("\u{FEFF}G28 X"), (None, Sum::None, "G28 X"));
+        assert_eq!(parts("N2 \u{FEFF}; made by*154"), (Some(2), Sum::Right, "; made by"));
         assert_eq!(parts("N M105"), (None, Sum::None, "N M105"));
         assert_eq!(parts("N1.5 M105"), (None, Sum::None, "N1.5 M105"));
         assert_eq!(parts("N2 G28\0*17").1, Sum::Wrong);

@@ -6,6 +6,7 @@ use super::variation::Variation;
 use super::wrapped::pass_on;
 use super::write::Writer;
 use crate::config::{Fixed, Settings};
+use crate::gcode::comment;
 use crate::protocol::{Ending, Machine, Out, Value};
 use crate::status::Status;
 use crate::{plain, progmem, text};
@@ -139,6 +140,8 @@ impl Request {
             return;
         };
         self.item = start;
+        let text = c.line.get(start.into()..self.block.end.into()).unwrap_or(&[]);
+        self.block.end = start + comment::length(text) as u8;
         self.phase = Phase::MessageText;
         if !self.format.is_plain() {
             let mut writer = Writer::message(c.out, &mut self.format);
@@ -152,7 +155,7 @@ impl Request {
         let mut writer = Writer::message(c.out, &mut self.format);
         for _ in 0..super::CHUNK / 2 {
             match byte_of(c.line, self.item, self.block.end) {
-                None | Some(b')') => {
+                None => {
                     if !plain {
                         writer.byte(b'"');
                     }

@@ -177,18 +177,71 @@ fn dropped_lines_keep_their_place_and_control_lines_are_none_of_them() {
 #[test]
 fn comments_are_known() {
     for (text, aside) in [
-        ("g1 (x", Aside::Parentheses),
-        ("g1 (x; (", Aside::Parentheses),
-        ("g1 (x) y", Aside::None),
-        ("g1 ; (x)", Aside::Rest),
-        ("(x)\n;y\ng1", Aside::None),
+        ("g1 (x", true),
+        ("g1 (x; (", true),
+        ("g1 (x (y) z", true),
+        ("g1 (x (y)) z", false),
+        ("g1 (x) y", false),
+        ("g1 ; (x)", true),
+        ("(x)\n;y\ng1", false),
     ] {
         let mut pool = pool();
         feed(&mut pool, text.as_bytes());
-        assert_eq!(pool.aside(), aside, "{text}");
-        let ahead = text.bytes().fold(Aside::None, Aside::after);
-        assert_eq!(ahead, aside, "{text}");
+        assert_eq!(pool.aside() != Aside::NONE, aside, "{text}");
+        let ahead = text.bytes().fold(Aside::NONE, Aside::after);
+        assert_eq!(ahead, pool.aside(), "{text}");
     }
+}
+
+#[test]
+fn a_percent_sign_that_flushes_nothing_begins_a_name() {
+    // The text before the percent sign, the text behind it, and the lines that come of it.
+    for (before, behind, lines) in [
+        ("", "prog1\n", &["%prog1"][..]),
+        ("", " \t1234\r\n", &["%1234"]),
+        ("", "_N_A\rg0\r", &["%_N_A", "g0"]),
+        ("\r", "Gear\n", &["%Gear"]),
+        ("\u{FEFF}", "prog1\n", &["\u{FEFF}%prog1"]),
+        ("", "\n", &[]),
+        ("\u{FEFF}", "\n", &["\u{FEFF}%"]),
+        // These are lines of their own, as behind a flush.
+        ("", "\nx1\n", &["x1"]),
+        ("", "{a:n}\n", &["{a:n}"]),
+        ("", "$x\n", &["$x"]),
+        ("", "?g0\n", &["?", "g0"]),
+        ("", "(x)\n", &["(x)"]),
+        ("g0 ", "x1\n", &["g0 x1"]),
+    ] {
+        for in_pieces in [false, true] {
+            let mut pool = pool();
+            feed(&mut pool, before.as_bytes());
+            pool.percent();
+            let mut rest = behind.as_bytes();
+            while !rest.is_empty() {
+                let (count, _) = if in_pieces { pool.put_text(rest) } else { (0, false) };
+                if count == 0 {
+                    pool.put(rest[0]);
+                }
+                rest = &rest[usize::from(count.max(1))..];
+            }
+            let mut came = std::vec::Vec::new();
+            while let Some((line, _)) = take(&mut pool, true) {
+                came.push(std::string::String::from_utf8(line).unwrap());
+            }
+            assert_eq!(came, lines, "{before:?} % {behind:?}");
+        }
+    }
+    // A flush begins no name, and a printing host has none.
+    let mut pool = pool();
+    pool.percent();
+    pool.terminate_partial(Status::Terminated);
+    feed(&mut pool, b"prog1\n");
+    assert_eq!(take(&mut pool, true), Some((b"prog1".to_vec(), Class::Data)));
+    pool.keep_plain(true);
+    pool.percent();
+    feed(&mut pool, b"prog1\n");
+    let expected = if cfg!(feature = "dialect-reprap") { "prog1" } else { "%prog1" };
+    assert_eq!(take(&mut pool, true), Some((expected.into(), Class::Data)));
 }
 
 #[test]

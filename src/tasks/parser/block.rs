@@ -201,7 +201,7 @@ fn carry_out(links: &Links, block: &[u8], declined: bool) -> (Status, bool) {
                 links.commands_taken.set(true);
                 links.planner_wake.signal();
             }
-            if model.take_lack() {
+            if info.lacks_length {
                 links.except(Status::NoToolLength);
             }
             (Status::Ok, info.commented)

@@ -12,9 +12,17 @@ pub const RULES: &[Rule] = &[
         title: "Lines",
         text: "A line consists of words and comments. It has at most 254 bytes, on the second port 79. Upper and lower case \
 mean the same. Blanks may stand anywhere, even inside numbers. Words may stand in any order. An empty line has \
-no effect, nor has a line with only `%`. The bytes `!`, 4 (`^d`), 5 and 24 (`^x`) act anywhere in a line, even \
+no effect. A byte order mark of UTF-8 at the beginning of a line is ignored. The bytes `!`, 4 (`^d`), 5 and 24 (`^x`) act anywhere in a line, even \
 in comments. `%` and `~` act anywhere except in comments. None of these bytes is part of a line.",
         refusals: &[no(InputTooLong, &[LONG]), no(MalformedCommand, &["G0 *X1"])],
+    },
+    Rule {
+        title: "Program names",
+        text: "`%` at the beginning of a line marks the beginning or the end of a program and has no effect. Text behind it \
+that is no G-code is a name, as in `%prog1`, and has no effect either; G-code behind it runs. O and a number, as in \
+`O0001 (PART)`, have no effect. O words with a keyword, such as `O100 SUB`, are refused. In a hold `%` discards the \
+queue, and what follows is a line of its own.",
+        refusals: &[no(BadNumber, &["O100 SUB"]), no(MalformedCommand, &["G0 X1 #1=2"])],
     },
     Rule {
         title: "Words",
@@ -65,9 +73,9 @@ than F if an axis cannot follow.",
     },
     Rule {
         title: "T",
-        text: "The tool for the next M6, 0 to 255. T has no other effect.",
+        text: "The tool for the next M6, 0 to 65,535. T has no other effect. Tools 1 to 10 have lengths; see G43.",
         refusals: &[
-            no(TWordInvalid, &["T256"]),
+            no(TWordInvalid, &["T65536"]),
             no(TWordInvalid, &["T1.5"]),
             no(TWordInvalid, &["T-1"]),
         ],
@@ -83,9 +91,11 @@ than F if an axis cannot follow.",
     },
     Rule {
         title: "Comments",
-        text: "A comment goes from `(` to `)`, or from `;` to the end of the line. If a comment begins with `MSG`, the response \
-contains the text after it.",
-        refusals: &[no(MalformedCommand, &["G0 X1)"])],
+        text: "A comment goes from `(` to `)`, or from `;` to the end of the line. Parentheses within parentheses count in \
+pairs: `(1/8 bit (flat))`. A comment that is not closed goes to the end of the line; it is refused if text stands \
+behind a comment within it, because that text may be words. If a comment begins with `MSG`, the response contains \
+the text after it.",
+        refusals: &[no(MalformedCommand, &["G0 X1)"]), no(MalformedCommand, &["G0 X1 (a (b) Y1"])],
     },
     Rule {
         title: "Block delete",

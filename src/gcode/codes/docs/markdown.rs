@@ -30,6 +30,11 @@ Differences from some other controllers:
 - G28 and G30 with axis words move only the named axes.
 - G43 without H uses the tool in the spindle; H0 is no tool.
 - M6 stops the spindle. The machine then waits for `~`; with `{psw:0}` it does not wait.
+- P of G2 and G3 counts turns as in LinuxCNC: `P1` is the arc alone. TinyG and g2core add P turns to an arc.
+- With G7 R of a canned cycle along X is a diameter, as X is; in LinuxCNC R is a radius.
+- G0 or G1 beside G28, G30, G10 or G92 is refused if both could use the axis words: leave G0 out.
+- Axis words behind G80, homing or probing need a G0 or G1; no motion code comes back by itself.
+- Comments may contain comments; LinuxCNC refuses them. O words are numbers of programs, never control flow.
 - G88 retracts by itself after its stop.
 - G95 uses the programmed S. With an encoder, feeds are slower while the spindle is slower than S.
 - M48 to M51 act after the moves before them, without a stop; override requests (`mfo`) act at once.

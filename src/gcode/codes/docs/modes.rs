@@ -60,8 +60,9 @@ another mode.",
         g(
             70,
             "Diameter mode",
-            "X words are diameters from this line on, for moves, G10, G92 and all other codes. X moves by half the value. I \
-of an arc is always a radius, and so is X in reports and settings.",
+            "X words are diameters from this line on, for moves, G10, G92 and all other codes. X moves by half the value. In \
+a canned cycle along X (G19) R is a diameter too, and so is I of G87. I of an arc is always a radius, Q is a \
+distance, and X in reports and settings is a radius.",
             &[],
         ),
         g(80, "Radius mode", "X words are radii. Active at power-up and after M2.", &[]),

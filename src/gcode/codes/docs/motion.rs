@@ -171,7 +171,7 @@ const ARC: &str = "Moves along an arc to the axis words, in the active plane. Th
 the third axis. A word of the third axis makes a helix. I, J and K give the centre: with G91.1 relative to the \
 start, where one of the two words may be omitted, with G90.1 relative to the origin. Instead of them R may give \
 the radius; a negative R selects the longer arc. Without an end point in the plane the arc is a full circle. P \
-adds full turns; for a full circle P is the number of turns. The radii at start and end may differ by 5 um or by \
+is the number of turns that are begun: 1 is the arc alone or one circle, and each more adds a full turn. The radii at start and end may differ by 5 um or by \
 a thousandth, but never by more than 1 mm. The smallest R is 0.001 mm. Modal.";
 
 pub const PROBES: Section = Section {
