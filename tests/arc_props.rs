@@ -193,9 +193,9 @@ proptest! {
         let Motion::Arc { arc, target: end, .. } = out.motion else { panic!("no arc") };
         prop_assert_eq!(end, target);
         prop_assert_eq!(arc.center, case.center.map(Length));
-        // P0 of a full circle also means one turn.
+        // P is the number of turns that are begun. P0 means one, too.
         let sweep = if full { TAU } else { case.sweep };
-        let wanted = sweep + TAU * f64::from(if full { turns.saturating_sub(1) } else { turns });
+        let wanted = sweep + TAU * f64::from(turns.saturating_sub(1));
         let chords = Chords::new(&start, &target, &arc, 0.05);
         let count = f64::from(chords.total());
         let (mut turned, mut last) = (0.0, case.polar(&start, 0.0).1);

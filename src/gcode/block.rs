@@ -109,6 +109,9 @@ impl Block {
     }
 
     /// Reads a line into an empty block. If `deletes` is true, a line that begins with a slash is not read any further.
+    // Not inlined, for the same reason as `items`.
+    #[inline(never)]
+    #[small]
     pub fn read(&mut self, line: &[u8], deletes: bool) -> Result<(), Status> {
         if line.len() > u8::MAX as usize {
             return Err(Status::InputTooLong);

@@ -106,9 +106,7 @@ fn comment(input: &[u8]) -> Lexed<'_, Item<'_>> {
 
 /// Whether text stands behind the last comment within a comment.
 fn hides_words(text: &[u8]) -> bool {
-    let last = text.iter().rposition(|byte| !is_blank(*byte));
-    let closed = text.iter().rposition(|byte| *byte == b')');
-    closed.is_some() && closed != last
+    text.iter().any(|byte| *byte == b')') && text.trim_ascii_end().last() != Some(&b')')
 }
 
 /// Returns the text of a comment behind `MSG`, and behind the comma if one follows. `None` if the comment does not

@@ -103,8 +103,9 @@ impl State {
     /// [`State::lacks_length`] tells of it.
     #[small]
     fn tool_named(&self, block: &Block, tables: &impl Tables) -> Result<PerAxis<Length>, Status> {
-        let row = TableRow::tool(self.tool_number(block)?);
-        Ok(row.map_or([Length::ZERO; units::AXES], |row| tables.row(row)))
+        let number = self.tool_number(block)?;
+        let Some(row) = TableRow::tool(number) else { return Ok([Length::ZERO; units::AXES]) };
+        Ok(tables.row(row))
     }
 
     /// Returns H, or without H the tool in the spindle: at most [`NUMBERED`].
@@ -117,6 +118,7 @@ impl State {
     }
 
     /// Whether a line that has been carried out has asked for the length of a tool that has none.
+    #[inline(never)]
     #[small]
     pub(super) fn lacks_length(&self, block: &Block) -> bool {
         matches!(block.tool_length, Some(ToolLength::Table | ToolLength::Add))

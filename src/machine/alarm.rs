@@ -96,7 +96,12 @@ impl Alarm {
 
 /// Whether a block is M2 or M30 and nothing else.
 pub fn is_program_end(block: &[u8]) -> bool {
-    match block.trim_ascii() {
+    // A percent sign before it may have been meant as a flush.
+    let block = match block.trim_ascii() {
+        [b'%', block @ ..] => block,
+        block => block,
+    };
+    match block {
         [m, b'2'] | [m, b'0', b'2'] | [m, b'3', b'0'] => m.eq_ignore_ascii_case(&b'm'),
         _ => false,
     }
@@ -108,10 +113,10 @@ mod tests {
 
     #[test]
     fn the_end_of_a_program_stands_alone() {
-        for block in ["m2", "M2 ", " M30\r", "m02"] {
+        for block in ["m2", "M2 ", " M30\r", "m02", "%m2"] {
             assert!(is_program_end(block.as_bytes()), "{block}");
         }
-        for block in ["", "m", "m20", "m2 x1", "g2", "m3", "m300", "n1 m2"] {
+        for block in ["", "m", "m20", "m2 x1", "g2", "m3", "m300", "n1 m2", "%prog", "%"] {
             assert!(!is_program_end(block.as_bytes()), "{block}");
         }
     }

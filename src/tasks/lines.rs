@@ -356,7 +356,7 @@ impl LinePool {
             return false;
         }
         if before == Before::Percent && (byte.is_ascii_alphanumeric() || byte == b'_') {
-            self.keep_byte(b'%');
+            self.keep_percent();
         }
         let asks = self.end_question(byte);
         self.keep_byte(byte);
@@ -366,6 +366,9 @@ impl LinePool {
     /// Adds a byte to the line that is coming in.
     #[inline(never)]
     fn keep_byte(&mut self, byte: u8) {
+        if self.partial == self.longest {
+            self.drop_percent();
+        }
         let at = self.room_at();
         match self.bytes.get_mut(at) {
             Some(slot) if self.partial < self.longest => {
@@ -389,9 +392,31 @@ impl LinePool {
             _ if self.is_plain() || self.fault.is_some() => {}
             [] => self.before = Before::Percent,
             // A byte order mark.
-            [0xEF, 0xBB, 0xBF] => self.keep_byte(b'%'),
+            [0xEF, 0xBB, 0xBF] => self.keep_percent(),
             _ => {}
         }
+    }
+
+    /// Makes room in a line that has its greatest length with the percent sign before it.
+    #[cold]
+    #[inline(never)]
+    #[small]
+    fn drop_percent(&mut self) {
+        let start = usize::from(self.end);
+        let end = start + usize::from(self.partial);
+        if self.bytes.get(start) == Some(&b'%') && end <= self.bytes.len() {
+            self.bytes.copy_within(start + 1..end, start);
+            self.partial -= 1;
+            self.pass(1);
+        }
+    }
+
+    /// Adds a percent sign to the line that is coming in. The sender does not count it with the line.
+    #[inline(never)]
+    #[small]
+    fn keep_percent(&mut self) {
+        self.keep_byte(b'%');
+        self.besides = self.besides.wrapping_sub(1);
     }
 
     /// Ends the line that is coming in if it is a question mark and `next` begins another line. Returns whether it
@@ -420,7 +445,7 @@ impl LinePool {
     #[inline(never)]
     #[small]
     fn pass(&mut self, count: u8) {
-        self.besides = self.besides.saturating_add(count.into());
+        self.besides = self.besides.wrapping_add(count.into());
     }
 
     /// Returns where the next byte goes. When the lines have reached the end of the buffer, they all move to its

@@ -85,22 +85,6 @@ pub const DIFFERENCES: &[Difference] = &[
              TRAVERSE 5.0000 1.0000 4.0000",
         ]],
     },
-    Difference {
-        name: "turns",
-        why: "RS274/NGC has no P with arcs: as in TinyG, it is the full turns beyond a part of one; \
-              with the other interpreter, the turns begun. Of full circles it is the same",
-        program: &[],
-        motion: &[
-            [
-                "6.0000 0.0000 0.0000 0.0000 0.0000 0.0000 2\n",
-                "6.0000 0.0000 0.0000 0.0000 0.0000 0.0000 3\n",
-            ],
-            [" -1\n", " -2\n"],
-            [" -3\n", " -4\n"],
-            ["5.0000 -2\n", "5.0000 -3\n"],
-            [" 4\n", " 5\n"],
-        ],
-    },
 ];
 
 const SLANT: &str = "RS274/NGC: up to R at the old place, if it is below; across the plane; to R. \

@@ -96,7 +96,6 @@ impl Plain {
 
     fn arc(&mut self, to: &PerAxis<Length>, arc: &Arc, turns: i32) -> String {
         let axes = [arc.first, arc.second].map(usize::from);
-        let closes = axes.iter().all(|axis| self.place[*axis] == to[*axis]);
         let offsets = axes.iter().zip(arc.center).map(|(axis, center)| {
             let offset = center.checked_sub(self.place[*axis]).unwrap();
             format!(" {}{offset}", ["I", "J", "K"][*axis])
@@ -104,8 +103,8 @@ impl Plain {
         let offsets: String = offsets.collect();
         let plane = ["G19", "G18", "G17"][usize::from(arc.linear)];
         let code = if turns < 0 { "G2" } else { "G3" };
-        // P counts full turns.
-        let turns = turns.unsigned_abs() - u32::from(!closes);
+        // P counts the turns that are begun.
+        let turns = turns.unsigned_abs();
         let (path, feed) = (self.path(), self.feed());
         format!("{path}{feed} {plane} {code}{}{offsets} P{turns}", self.go(to))
     }

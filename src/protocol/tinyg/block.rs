@@ -199,7 +199,8 @@ fn leading_number(block: &[u8]) -> i32 {
     let mut number = -1;
     for byte in block {
         match byte {
-            b' ' | b'\t' | b'/' => {}
+            // A byte order mark and a percent sign may stand before it.
+            b' ' | b'\t' | b'/' | b'%' | 0x80.. => {}
             b'N' | b'n' if number < 0 => number = 0,
             // A higher number is not a line number, and more digits would overflow.
             b'0'..=b'9' if (0..LINE_NUMBER_END).contains(&number) => {

@@ -234,6 +234,20 @@ fn a_percent_sign_that_flushes_nothing_begins_a_name() {
     // A flush begins no name, and a printing host has none.
     let mut pool = pool();
     pool.percent();
+    feed(&mut pool, b"prog1\n");
+    // Real-time characters are not counted.
+    assert_eq!(pool.length(LineId(0)), 6);
+    assert_eq!(take(&mut pool, true), Some((b"%prog1".to_vec(), Class::Data)));
+    // A line may be as long as without the percent sign.
+    for (len, class) in [(254, Class::Data), (255, Class::Fault(Status::InputTooLong))] {
+        pool.percent();
+        let line = [&b"g0 ("[..], &std::vec![b'x'; len - 4], b"\n"].concat();
+        feed(&mut pool, &line);
+        assert_eq!(pool.length(LineId(0)), len as u16 + 1);
+        let (text, is) = take(&mut pool, true).unwrap();
+        assert_eq!((&text[..4], is), (&b"g0 ("[..], class), "{len}");
+    }
+    pool.percent();
     pool.terminate_partial(Status::Terminated);
     feed(&mut pool, b"prog1\n");
     assert_eq!(take(&mut pool, true), Some((b"prog1".to_vec(), Class::Data)));

@@ -233,7 +233,7 @@ impl<'a> Reader<'a> {
                 'G' => self.g_code(word.value.tenths(), &mut once, &mut machine_coordinates)?,
                 'M' => end |= self.m_code(word.value.tenths())?,
                 c if self.is_on_a_radius(c) => return Err(format!("{c} in radius mode")),
-                c if LETTERS.contains(&c) || "DEFHIJKLNPQRST".contains(c) => {}
+                c if LETTERS.contains(&c) || "DEFHIJKLNOPQRST".contains(c) => {}
                 c => return Err(format!("the letter {c}")),
             }
         }

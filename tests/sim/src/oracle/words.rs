@@ -32,7 +32,8 @@ pub fn split(line: &str) -> Result<Vec<Word>, String> {
 
 /// Returns a line without comments and blanks, in upper case.
 fn code_of(line: &str) -> String {
-    let line = line.trim();
+    // A file may begin with a byte order mark.
+    let line = line.trim_start_matches('\u{FEFF}').trim();
     let line = match line.strip_prefix('{') {
         Some(_) => match gc_of(line) {
             Some(inner) => inner,
@@ -43,12 +44,13 @@ fn code_of(line: &str) -> String {
     if line.starts_with(['/', '$', '?', '%']) {
         return String::new();
     }
+    // Parentheses within a comment count in pairs.
     let mut depth = 0;
     let mut code = String::new();
     for c in line.chars() {
         match c {
-            '(' => depth = 1,
-            ')' => depth = 0,
+            '(' => depth += 1,
+            ')' => depth = (depth - 1).max(0),
             ';' if depth == 0 => break,
             c if depth == 0 && !c.is_whitespace() => code.push(c.to_ascii_uppercase()),
             _ => {}
@@ -81,6 +83,9 @@ mod tests {
         assert_eq!(letters("G1 (to the left) X1 ; go"), "GX");
         assert_eq!(letters("/G1 X1"), "");
         assert_eq!(letters("(only) ; this"), "");
+        assert_eq!(letters("G1 (1/8 bit (flat) G2) X1 (open"), "GX");
+        assert_eq!(letters("\u{FEFF}O0001 (PART)"), "O");
+        assert_eq!(letters("%prog1"), "");
     }
 
     #[test]
