@@ -106,7 +106,9 @@ fn comment(input: &[u8]) -> Lexed<'_, Item<'_>> {
 
 /// Whether text stands behind the last comment within a comment.
 fn hides_words(text: &[u8]) -> bool {
-    text.iter().any(|byte| *byte == b')') && text.trim_ascii_end().last() != Some(&b')')
+    let text = text.trim_ascii_end();
+    let last = text.iter().rposition(|byte| *byte == b')');
+    last.is_some_and(|at| at + 1 != text.len())
 }
 
 /// Returns the text of a comment behind `MSG`, and behind the comma if one follows. `None` if the comment does not

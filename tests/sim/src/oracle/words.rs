@@ -45,7 +45,7 @@ fn code_of(line: &str) -> String {
         return String::new();
     }
     // Parentheses within a comment count in pairs.
-    let mut depth = 0;
+    let mut depth: i32 = 0;
     let mut code = String::new();
     for c in line.chars() {
         match c {
