@@ -11,6 +11,8 @@ use clap::{Parser, Subcommand};
 use kerf::canon::{Reader, Refusal};
 use kerf::gcode::setup::Usual;
 
+use check::Question;
+
 /// Motion-control firmware; `cargo xtask build` builds the image for a board
 #[derive(Parser)]
 #[command(version)]
@@ -29,6 +31,10 @@ enum Command {
         /// The profile of the machine: careful, router, mill, printer, lathe
         #[arg(long, default_value = "careful")]
         machine: String,
+        /// The dialect of the job: tinyg, grbl, reprap. Without it the file decides: reprap if it heats or extrudes,
+        /// grbl if it has commands such as $H, else tinyg
+        #[arg(long)]
+        dialect: Option<String>,
         /// A setting sent before the job, as the sender would: '{"xvm":800}'
         #[arg(long, value_name = "JSON")]
         set: Vec<String>,
@@ -46,8 +52,10 @@ enum Command {
 /// Runs the command that the arguments name.
 pub fn run() -> ExitCode {
     let file = match Args::parse().command {
-        Command::Check { file, machine, set, zero } => {
-            return check(&file, &machine, &set, zero.as_deref());
+        Command::Check { file, machine, dialect, set, zero } => {
+            let (machine, dialect, settings) = (&machine, dialect.as_deref(), &set);
+            let question = Question { machine, dialect, settings, zero: None };
+            return check(&file, question, zero.as_deref());
         }
         Command::Canon { file } => file,
     };
@@ -64,10 +72,10 @@ pub fn run() -> ExitCode {
 }
 
 /// Prints the result of a dry run. Fails if the machine would not carry the job out.
-fn check(file: &Path, machine: &str, settings: &[String], zero: Option<&str>) -> ExitCode {
-    let answer = read(file).map_err(|error| error.to_string()).and_then(|text| {
+fn check(file: &Path, question: Question, zero: Option<&str>) -> ExitCode {
+    let answer = read(file).map_err(|error| error.to_string()).and_then(|job| {
         let zero = zero.map(place).transpose()?;
-        check::check(&text, &check::Question { machine, settings, zero })
+        check::check(&job, &Question { zero, ..question })
     });
     match answer {
         Ok(answer) => {
@@ -87,10 +95,10 @@ fn place(text: &str) -> Result<[f64; 3], String> {
     numbers.try_into().map_err(|_| format!("{text} is no place: X,Y,Z"))
 }
 
-fn read(file: &Path) -> io::Result<String> {
+fn read(file: &Path) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     open(file)?.read_to_end(&mut bytes)?;
-    Ok(String::from_utf8_lossy(&bytes).into_owned())
+    Ok(bytes)
 }
 
 enum Failure {

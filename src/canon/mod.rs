@@ -34,5 +34,5 @@ mod reader;
 
 pub use advice::{advice, statuses};
 pub use command::Canon;
-pub use program::{Refusal, by_number, commands, text};
+pub use program::{Refusal, by_number, commands, of_alarm, of_error, text};
 pub use reader::Reader;

@@ -21,6 +21,29 @@ pub fn by_number(code: u8) -> Option<Status> {
     statuses().find(|status| number(*status) == code)
 }
 
+/// Returns the statuses that have this number among the errors of grbl's dialect.
+pub fn of_error(code: u8) -> Vec<Status> {
+    statuses().filter(|status| in_grbl(*status).0 == code).collect()
+}
+
+/// Returns the statuses that have this number among the alarms of grbl's dialect.
+pub fn of_alarm(code: u8) -> Vec<Status> {
+    statuses().filter(|status| in_grbl(*status).1 == Some(code)).collect()
+}
+
+/// Returns the number of the error and of the alarm in grbl's dialect.
+#[cfg(feature = "dialect-grbl")]
+fn in_grbl(status: Status) -> (u8, Option<u8>) {
+    use crate::protocol::grbl::{alarm_number, error_number};
+    (error_number(status), alarm_number(status))
+}
+
+/// Returns no number: this build lacks the dialect.
+#[cfg(not(feature = "dialect-grbl"))]
+fn in_grbl(_status: Status) -> (u8, Option<u8>) {
+    (0, None)
+}
+
 /// A line that is refused.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Refusal {

@@ -5,7 +5,7 @@
 // no user. The error of a job that cannot begin says why.
 
 import { Firmware } from './firmware.js';
-import { Lines, answerStatus, parse } from './protocol.js';
+import { Lines, answerStatus, isText, parse } from './protocol.js';
 import { HARMLESS, Sender, homes, linesOf } from './sender.js';
 import { pathOf } from './path.js';
 
@@ -96,6 +96,8 @@ export async function runJob(module, job, progress = () => true) {
   function* sent() {
     for (const line of linesOf(job.text)) {
       if (homes(line.text)) notes.push({ line: line.number, text: 'Homing is taken for done.' });
+      // Such a line has no answer that could be counted.
+      else if (isText(line.text)) notes.push({ line: line.number, text: 'Not tried: a command to the machine, no G-code.' });
       else yield line;
     }
   }

@@ -71,9 +71,19 @@ pub(super) fn turn(rpm: f64, per_turn: u16) {
     let per_turn = per_turn.max(1);
     let edges = rpm.abs() * f64::from(per_turn) * 2.0;
     let half = if edges > 0.0 { (f64::from(ACTIVE.clock_hz) * 60.0 / edges) as u64 } else { 0 };
-    let edges = turning().get().edges % (per_turn * 2);
-    let next = if half > 0 { now() + half } else { NEVER };
-    turning().set(Turning { half, reversed: rpm < 0.0, per_turn, edges, next });
+    let (before, reversed) = (turning().get(), rpm < 0.0);
+    let mut edges = before.edges % (per_turn * 2);
+    // How far a spindle that already turns is from its next edge, as a share of the way between two edges.
+    let mut left = match before.half > 0 && before.per_turn == per_turn {
+        true => before.next.saturating_sub(now()) as f64 / before.half as f64,
+        false => 1.0,
+    };
+    if before.half > 0 && half > 0 && before.reversed != reversed {
+        // It goes back to the edges that it made last.
+        (left, edges) = (1.0 - left, (per_turn * 2 + 2 - edges) % (per_turn * 2));
+    }
+    let next = if half > 0 { now() + (half as f64 * left) as u64 } else { NEVER };
+    turning().set(Turning { half, reversed, per_turn, edges, next });
 }
 
 /// Returns when the spindle makes its next edge.

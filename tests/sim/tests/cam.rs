@@ -1,7 +1,7 @@
 //! Files as the post-processors of CAM programs write them, on the simulated board, and what a dry run predicts for
 //! them.
 
-#[path = "../../../src/cli/check.rs"]
+#[path = "../../../src/cli/check/mod.rs"]
 mod check;
 
 use std::fs;
@@ -26,10 +26,10 @@ fn run(path: &Path) -> Report {
 
 /// Returns the seconds that a dry run predicts, and whether it says that the board may take longer.
 fn estimate(path: &Path) -> (f64, bool) {
-    let text = fs::read_to_string(path).unwrap();
-    let question = Question { machine: "router", settings: &[], zero: None };
+    let job = fs::read(path).unwrap();
+    let question = Question { machine: "router", dialect: None, settings: &[], zero: None };
     let asked =
-        || check::check(&text, &question).map(|answer| (answer.seconds(), answer.is_rushed()));
+        || check::check(&job, &question).map(|answer| (answer.seconds(), answer.is_rushed()));
     // One machine for each thread.
     std::thread::scope(|scope| scope.spawn(asked).join().unwrap()).unwrap()
 }
