@@ -49,12 +49,20 @@ impl Settings {
             };
             self.put_row(&row, Owner::Axis(0), &values);
         }
-        for entry in machines::differences(machine) {
-            self.put_entry(&entry);
+        if machine != machines::ACTIVE {
+            self.put_differences(machines::ACTIVE);
+            self.put_differences(machine);
         }
         self.keep(Setting::of_entry(CHOICE), machine.into());
         for motor in 0..MOTORS as u8 {
             self.derive(motor);
+        }
+    }
+
+    #[inline(never)]
+    fn put_differences(&mut self, machine: u8) {
+        for entry in machines::differences(machine) {
+            self.put_entry(&entry);
         }
     }
 

@@ -503,24 +503,22 @@ impl Setting {
         }
     }
 
-    /// Returns the default of the setting, scaled as stored.
-    pub fn default_value(self) -> i32 {
-        match machines::ACTIVE {
-            0 => self.careful_value(),
-            machine => self.value_on(machine),
-        }
-    }
-
     /// Returns the value of the setting in the profile of a machine, scaled as stored. About 3,000 cycles on AVR.
     pub fn value_on(self, machine: u8) -> i32 {
         if self.is_machine() {
             return machine.into();
         }
-        machines::value(machine, self).unwrap_or_else(|| self.careful_value())
+        if machine == machines::ACTIVE {
+            return self.default_value();
+        }
+        // Two profiles differ by way of the careful machine.
+        let of = |machine| machines::value(machine, self);
+        of(machine).or_else(|| of(machines::ACTIVE)).unwrap_or_else(|| self.default_value())
     }
 
+    /// Returns the default of the setting, scaled as stored.
     #[inline(never)]
-    pub(super) fn careful_value(self) -> i32 {
+    pub fn default_value(self) -> i32 {
         let index = usize::from(self.index());
         let value = match self.owner() {
             Owner::System => system::DEFAULTS.at(index),

@@ -270,6 +270,9 @@ const PLAIN: Values = Values { system: system::PLAIN, motor: motor::PLAIN, axis:
 /// The values of the careful machine, from which the other profiles differ.
 pub(super) const CAREFUL: Values = PLAIN.with(machines::CAREFUL.entries);
 
+/// The values of the profile that the image is built for: the defaults.
+pub(super) const DEFAULT: Values = CAREFUL.on(machines::ACTIVE);
+
 progmem! {
     /// The values of the first four constants of the group `sys` while the machine identifies itself as a g2core.
     pub static G2CORE: [i32; 4] = [10_103, 990, 3, 0];

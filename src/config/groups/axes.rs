@@ -4,7 +4,7 @@ use super::group;
 
 group! {
     /// The groups `x` to `c`. B and C, which never home, lack the rows with `HOMING`.
-    axis: [i32; AXES], CAREFUL.axis => {
+    axis: [i32; AXES], DEFAULT.axis => {
         AM "am": int(0, 3).with(MODE | IDLE), [1, 1, 1, 3, 0, 0],
             bare(text!("axis mode")),
             "0 disabled, 1 standard, 2 inhibited: the position counts, the motors do not move, 3 radius: axis words are lengths, which `ra` converts to angles.";

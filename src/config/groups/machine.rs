@@ -4,7 +4,7 @@ use super::group;
 
 group! {
     /// The group `sys`.
-    system: i32, CAREFUL.system => {
+    system: i32, DEFAULT.system => {
         FB "fb": constant(2), 44_020,
             bare(text!("firmware build")),
             "Build number of the firmware whose protocol Kerf speaks.";

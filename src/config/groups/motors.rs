@@ -16,7 +16,7 @@ const fn motors(first: [i32; 4], more: [i32; 2]) -> [i32; MOTORS] {
 
 group! {
     /// The groups `1` to `4`, and `5` and `6` on a board with more motors.
-    motor: [i32; MOTORS], CAREFUL.motor => {
+    motor: [i32; MOTORS], DEFAULT.motor => {
         MA "ma": int(0, 255), super::motors([0, 1, 2, 3], [4, 5]),
             words(text!("map to axis"), text!(" [0=X,1=Y,2=Z...]")),
             "Axis that the motor moves: 0 X, 1 Y, 2 Z, 3 A, 4 B, 5 C. A value above 7 means no axis. Several motors may move one axis. In images with `corexy`, 6 is X + Y and 7 is X - Y, for the two motors of a CoreXY machine.";
