@@ -8,9 +8,13 @@ use serde_json::Value;
 
 use crate::protocol::{Incoming, Response, classify, control_name, is_idle, state_of};
 use crate::runs::Runs;
+use crate::speech::{self, Speech};
 
 /// Lines in flight by default.
 pub const LINES_IN_FLIGHT: usize = 4;
+
+/// The machine state of motion.
+const RUNS: i64 = 5;
 
 /// Time that the firmware takes to change its speed after the answer, ms.
 const SPEED_CHANGE_MS: u64 = 10;
@@ -38,6 +42,7 @@ pub struct Answered {
 
 /// The sender.
 pub struct Host {
+    speech: Speech,
     limit: usize,
     queue: VecDeque<(usize, String)>,
     awaiting: VecDeque<Line>,
@@ -49,6 +54,9 @@ pub struct Host {
     strays: Vec<String>,
     banners: usize,
     stat: Option<i64>,
+    /// The values that grbl's dialect has shown since the last answer.
+    shown: serde_json::Map<String, Value>,
+    late: u64,
     heard_at: u64,
     idle_since: Option<u64>,
     /// Characters to send ahead of everything else, each with the cycle at which it is sent.
@@ -59,6 +67,7 @@ impl Host {
     /// A sender that keeps up to `limit` lines in flight.
     pub fn new(limit: usize) -> Self {
         Host {
+            speech: Speech::TinyG,
             limit: limit.max(1),
             queue: VecDeque::new(),
             awaiting: VecDeque::new(),
@@ -69,9 +78,39 @@ impl Host {
             strays: Vec::new(),
             banners: 0,
             stat: None,
+            shown: serde_json::Map::new(),
+            late: 0,
             heard_at: 0,
             idle_since: None,
             interjections: VecDeque::new(),
+        }
+    }
+
+    /// Returns this sender, which speaks a dialect from now on.
+    pub fn speaking(mut self, speech: Speech) -> Self {
+        self.speech = speech;
+        self
+    }
+
+    /// The dialect.
+    pub fn speech(&self) -> Speech {
+        self.speech
+    }
+
+    /// How often the firmware has told that steps came late, in grbl's dialect.
+    pub fn late(&self) -> u64 {
+        self.late
+    }
+
+    /// Asks for the machine's state. The answer to it, in TinyG's dialect, has this number.
+    pub fn poll(&mut self, machine: &mut impl Runs, number: usize) {
+        match self.speech {
+            Speech::TinyG => self.send(machine, number, "{stat:n}"),
+            Speech::Grbl => {
+                // Not at rest, until the report says so.
+                self.stat = Some(RUNS);
+                machine.send_now(b'?');
+            }
         }
     }
 
@@ -186,9 +225,17 @@ impl Host {
 
     /// Sends a line at once, ahead of all queued lines and whatever is in flight.
     pub fn send(&mut self, machine: &mut impl Runs, number: usize, text: &str) {
-        machine.send(text.as_bytes());
+        let name = match self.speech {
+            Speech::TinyG => {
+                machine.send(text.as_bytes());
+                control_name(text)
+            }
+            Speech::Grbl => {
+                machine.send(speech::translated(text).as_bytes());
+                None
+            }
+        };
         machine.send(b"\n");
-        let name = control_name(text);
         self.awaiting.push_back(Line { number, text: text.to_string(), name });
     }
 
@@ -247,13 +294,26 @@ impl Host {
     }
 
     fn hear(&mut self, line: &str) {
-        match classify(line) {
+        let incoming = match self.speech {
+            Speech::TinyG => classify(line),
+            Speech::Grbl => speech::classify(line),
+        };
+        match incoming {
             Incoming::Banner => self.banners += 1,
             Incoming::Report(report) => {
                 self.note_state(&report);
+                if let (Speech::Grbl, Value::Object(values)) = (self.speech, &report) {
+                    self.shown.extend(values.clone());
+                }
                 self.reports.push(report);
             }
-            Incoming::Response(response) => self.answer(response),
+            Incoming::Response(mut response) => {
+                if self.speech == Speech::Grbl {
+                    response.body = Value::Object(std::mem::take(&mut self.shown));
+                }
+                self.answer(response);
+            }
+            Incoming::Late => self.late += 1,
             Incoming::OtherGreeting => {}
             Incoming::Other(line) => self.strays.push(line),
         }

@@ -6,7 +6,7 @@ mod watch;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 use kerf::boards::MOTORS;
 
 use crate::host::{Host, LINES_IN_FLIGHT};
@@ -16,9 +16,10 @@ use crate::pauses::Scale;
 use crate::protocol::STATUS_NOOP;
 use crate::report::{Measured, Rejected, Report};
 use crate::runs::Runs;
+use crate::speech::Speech;
 use crate::trace::Trace;
 
-pub use setup::{read_setup, setup_of};
+pub use setup::{read_setup, read_travels, setup_of};
 pub(crate) use watch::{POLL, Watch};
 
 /// Longest time of a reset, ms of AVR time.
@@ -167,6 +168,18 @@ pub(crate) fn ask_settings(
     Ok(())
 }
 
+/// Why the rate of the line cannot be changed.
+const NO_BAUD: &str = "a job in grbl's dialect is sent at 115,200 baud";
+
+/// Returns the dialect in which jobs are sent to a machine.
+pub fn speech_of(machine: &Machine) -> Result<Speech> {
+    let board = machine.board();
+    let speech = Speech::of(board.features);
+    speech.with_context(|| {
+        format!("jobs are sent in TinyG's or grbl's dialect, which the board {} lacks", board.name)
+    })
+}
+
 /// Boots the machine, runs a job on it and returns the report. An error means that the job could not begin; later
 /// problems are in the report. `progress` gets the number of lines answered so far.
 pub fn run(
@@ -175,7 +188,9 @@ pub fn run(
     options: &Options,
     mut progress: impl FnMut(usize),
 ) -> Result<Report> {
-    let mut host = Host::new(options.in_flight);
+    let speech = speech_of(machine)?;
+    ensure!(speech == Speech::TinyG || options.baud.is_none(), "{NO_BAUD}");
+    let mut host = Host::new(options.in_flight).speaking(speech);
     host.boot(machine, BOOT_MS)?;
     if let Some(baud) = options.baud {
         host.change_speed(machine, baud)?;
@@ -271,6 +286,9 @@ impl Run<'_> {
 
     /// Asks the firmware for its own count of late segments; `None` if it does not answer.
     fn late_segments(&mut self) -> Option<u64> {
+        if self.host.speech() == Speech::Grbl {
+            return Some(self.host.late());
+        }
         self.host.ask(self.machine, "{stv:n}", ASK_MS).ok()?.body.get("stv")?.as_u64()
     }
 

@@ -1,8 +1,9 @@
 //! The oracle: computes the end position of a job by an independent G-code interpreter.
 //!
 //! It shares no code with the firmware, and reads only positions, not motion. All arithmetic is in whole numbers. A
-//! position is in units of 0.1 um (0.0001 degree), and each axis word is rounded to that. The steps follow from the
-//! position by one division, halves away from zero.
+//! position is in units of 0.1 um (0.0001 degree), and each axis word is rounded to that. What the rounding leaves is
+//! carried over to the next increment (G91). The steps follow from the position by one division, halves away from
+//! zero.
 
 mod exact;
 mod words;
@@ -14,9 +15,8 @@ use kerf::boards::MOTORS;
 
 use crate::pauses::Travel;
 
-pub use exact::Decimal;
-use exact::divide;
-use words::{Word, split};
+pub use exact::{Decimal, Exact, divide};
+pub use words::{Word, split};
 
 /// Axes, X Y Z A B C.
 pub const AXES: usize = 6;
@@ -25,6 +25,8 @@ pub const UNITS: i128 = 10_000;
 /// Units in an inch.
 const UNITS_PER_INCH: i128 = 254_000;
 const FIRST_ROTARY: usize = 3;
+/// Coordinate systems, and one that is not used.
+const SYSTEMS: usize = 10;
 const LETTERS: [char; AXES] = ['X', 'Y', 'Z', 'A', 'B', 'C'];
 
 /// A motor's settings.
@@ -182,6 +184,7 @@ pub fn longest_dwell_ms<'a>(
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Once {
     Dwell,
+    Tap,
     Offsets,
     SetPosition,
     SetZero(i64),
@@ -190,6 +193,8 @@ enum Once {
 struct Reader<'a> {
     setup: &'a Setup,
     position: [i64; AXES],
+    /// What rounding has left of the position.
+    rests: [i64; AXES],
     /// The position from which steps count; G28.3 moves it.
     origin: [i64; AXES],
     steps: Vec<i64>,
@@ -198,7 +203,7 @@ struct Reader<'a> {
     diameters: bool,
     incremental: bool,
     system: usize,
-    systems: [[i64; AXES]; 7],
+    systems: [[i64; AXES]; SYSTEMS],
     zero: [i64; AXES],
     zero_on: bool,
     longest_dwell_ms: u64,
@@ -209,6 +214,7 @@ impl<'a> Reader<'a> {
         Reader {
             setup,
             position: [0; AXES],
+            rests: [0; AXES],
             origin: [0; AXES],
             steps: vec![0; setup.motors.len()],
             moving: true,
@@ -216,7 +222,7 @@ impl<'a> Reader<'a> {
             diameters: false,
             incremental: false,
             system: 1,
-            systems: [[0; AXES]; 7],
+            systems: [[0; AXES]; SYSTEMS],
             zero: [0; AXES],
             zero_on: false,
             longest_dwell_ms: 0,
@@ -239,6 +245,7 @@ impl<'a> Reader<'a> {
         }
         match once {
             Some(Once::Dwell) => self.dwell(&words),
+            Some(Once::Tap) => self.moving = false,
             Some(Once::Offsets) => self.offsets(&words)?,
             Some(Once::SetPosition) => self.set_position(&words),
             Some(Once::SetZero(code)) => self.set_zero(code, &words),
@@ -259,6 +266,8 @@ impl<'a> Reader<'a> {
     ) -> Result<(), String> {
         match tenths {
             0 | 10 | 20 | 30 | 320 | 330 | 760 => self.moving = true,
+            // A tap ends where it begins.
+            331 => *once = Some(Once::Tap),
             800 => self.moving = false,
             40 => *once = Some(Once::Dwell),
             100 => *once = Some(Once::Offsets),
@@ -272,6 +281,7 @@ impl<'a> Reader<'a> {
             910 => self.incremental = true,
             530 => *machine = true,
             540 | 550 | 560 | 570 | 580 | 590 => self.system = (tenths / 10 - 53) as usize,
+            591..=593 => self.system = (tenths - 584) as usize,
             // Codes without effect on the end position: planes, feed modes, path modes, arc distance, cutter
             // compensation and tool length off, retract modes.
             170 | 180 | 190 | 930 | 940 | 950 | 610 | 611 | 640 | 901 | 911 | 400 | 490 | 980
@@ -299,7 +309,7 @@ impl<'a> Reader<'a> {
     }
 
     /// The axis words of a line, in units.
-    fn axis_words(&self, words: &[Word]) -> [Option<i64>; AXES] {
+    fn axis_words(&self, words: &[Word]) -> [Option<Exact>; AXES] {
         let mut values = [None; AXES];
         for word in words {
             let Some(axis) = LETTERS.iter().position(|l| *l == word.letter) else { continue };
@@ -309,8 +319,7 @@ impl<'a> Reader<'a> {
             let inches = self.inches && axis < FIRST_ROTARY;
             let unit = if inches { UNITS_PER_INCH } else { UNITS };
             // In diameter mode an X word is twice the distance.
-            let unit = if self.diameters && axis == 0 { unit / 2 } else { unit };
-            values[axis] = Some(word.value.scaled(unit));
+            values[axis] = Some(word.value.exact(unit, self.diameters && axis == 0));
         }
         values
     }
@@ -323,13 +332,14 @@ impl<'a> Reader<'a> {
     fn travel(&mut self, words: &[Word], machine_coordinates: bool) {
         for (axis, value) in self.axis_words(words).into_iter().enumerate() {
             let Some(value) = value else { continue };
-            self.position[axis] = if machine_coordinates {
-                value
+            let (from, value) = if machine_coordinates {
+                (0, value)
             } else if self.incremental {
-                self.position[axis] + value
+                (self.position[axis], value.with(self.rests[axis]))
             } else {
-                self.offset(axis) + value
+                (self.offset(axis), value)
             };
+            (self.position[axis], self.rests[axis]) = (from + value.units, value.rest);
         }
     }
 
@@ -345,12 +355,20 @@ impl<'a> Reader<'a> {
             word.and_then(|w| w.value.as_whole())
         };
         let (form, system) = (number('L'), number('P'));
-        let Some(system @ 1..=6) = system else { return Err("G10 without P1 to P6".into()) };
+        let system = match (form, system) {
+            // The table of tools, which moves nothing.
+            (Some(1 | 10), _) => return Ok(()),
+            (_, Some(0)) => self.system,
+            (_, Some(system @ 1..=9)) => system as usize,
+            _ => return Err("G10 without P0 to P9".into()),
+        };
         for (axis, value) in self.axis_words(words).into_iter().enumerate() {
             let Some(value) = value else { continue };
-            self.systems[system as usize][axis] = match form {
-                Some(2) | None => value,
-                Some(20) => self.position[axis] - value,
+            // L20 counts from the offset that is in force.
+            let zero = if self.zero_on { self.zero[axis] } else { 0 };
+            self.systems[system][axis] = match form {
+                Some(2) | None => value.units,
+                Some(20) => self.position[axis] - zero - value.units,
                 Some(other) => return Err(format!("G10 L{other}")),
             };
         }
@@ -360,7 +378,8 @@ impl<'a> Reader<'a> {
     fn set_position(&mut self, words: &[Word]) {
         self.count_steps();
         for (axis, value) in self.axis_words(words).into_iter().enumerate() {
-            self.position[axis] = value.unwrap_or(self.position[axis]);
+            let Some(value) = value else { continue };
+            (self.position[axis], self.rests[axis]) = (value.units, value.rest);
         }
         self.origin = self.position;
     }
@@ -375,7 +394,8 @@ impl<'a> Reader<'a> {
                 for (axis, value) in self.axis_words(words).into_iter().enumerate() {
                     let Some(value) = value else { continue };
                     let system = self.systems[self.system][axis];
-                    self.zero[axis] = self.position[axis] - system - value;
+                    self.zero[axis] = self.position[axis] - system - value.units;
+                    self.rests[axis] = value.rest;
                 }
             }
         }

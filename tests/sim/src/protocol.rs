@@ -11,8 +11,10 @@ pub enum Incoming {
     Response(Response),
     /// An unsolicited report: `sr`, `qr`, `er` and so on.
     Report(Value),
-    /// A greeting in another dialect. It comes where no dialect is settled yet.
+    /// A greeting in another dialect, which comes where no dialect is settled yet, or a message for people.
     OtherGreeting,
+    /// A message that steps came late.
+    Late,
     /// Anything else.
     Other(String),
 }

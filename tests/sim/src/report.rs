@@ -184,6 +184,8 @@ pub struct Report {
     pub followed: Option<Followed>,
     /// The heaters of a print.
     pub heat: Vec<Heat>,
+    /// What a print was told at lines that were passed over, such as an unknown M code.
+    pub told: Vec<String>,
     /// The interrupts that were served.
     pub vectors: Vec<VectorReport>,
     /// Motors and axes, as the firmware reports them.
@@ -232,6 +234,7 @@ impl Report {
             threads: None,
             followed: None,
             heat: Vec::new(),
+            told: Vec::new(),
             vectors: vector_reports(machine),
             setup: measured.setup.clone(),
         };
@@ -248,10 +251,11 @@ impl Report {
     }
 
     /// Adds the results that only prints have. Steps that do not follow the file are a problem of the job.
-    pub fn add_print(&mut self, followed: Option<Followed>, heat: Vec<Heat>) {
+    /// `told` is what the firmware has said to lines that it passed over.
+    pub fn add_print(&mut self, followed: Option<Followed>, heat: Vec<Heat>, told: Vec<String>) {
         self.problems.extend(followed.as_ref().and_then(Followed::problem));
         self.ok = self.problems.is_empty();
-        (self.followed, self.heat) = (followed, heat);
+        (self.followed, self.heat, self.told) = (followed, heat, told);
     }
 
     /// Number of pauses or of standstills of the step timer, whichever is larger.

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use anyhow::{Context, Result, anyhow, ensure};
+use anyhow::{Context, Result, anyhow};
 use indicatif::{ProgressBar, ProgressStyle};
 use kerf::boards::{self, Board};
 use kerf_sim::Machine;
@@ -29,12 +29,11 @@ pub fn board(name: &str) -> Result<&'static Board> {
 pub fn run(args: &RunArgs) -> Result<bool> {
     let lines = job::read_lines(&args.job)?;
     let board = board(&args.target.board)?;
-    let speaks = board.features.contains(&"dialect-tinyg");
-    ensure!(speaks, "jobs are sent in TinyG's dialect, which the board {} lacks", board.name);
     if emulated::is_emulated(board) {
         return run_emulated(args, board, &lines);
     }
     let mut machine = Machine::load(&args.target.elf, board)?;
+    job::speech_of(&machine)?;
     let mut settings = Vec::new();
     if let Some(pulses) = args.spindle {
         let lathe = Build::lathe(board, pulses);

@@ -24,6 +24,8 @@ pub trait Runs {
     fn garbled(&self) -> u64;
     /// The cycle of the last step, if there was one.
     fn last_step(&self) -> Option<u64>;
+    /// Lets what is driven by the pulses of a timer follow them, if there is such a thing.
+    fn follow_pulses(&mut self) {}
 }
 
 impl Runs for Machine {
@@ -61,5 +63,9 @@ impl Runs for Machine {
 
     fn last_step(&self) -> Option<u64> {
         self.recorder().last_step()
+    }
+
+    fn follow_pulses(&mut self) {
+        Machine::follow_pulses(self);
     }
 }

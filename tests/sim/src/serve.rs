@@ -10,8 +10,9 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result};
 use kerf::boards::Board;
 use kerf_sim::emulated::is_emulated;
+use kerf_sim::job::{read_setup, read_travels};
 use kerf_sim::mechanics::Build;
-use kerf_sim::{Image, Machine};
+use kerf_sim::{Host, Image, Machine, Speech};
 
 use crate::arrival::Arrival;
 use crate::cli::{ServeArgs, Speed};
@@ -39,8 +40,11 @@ const MAX_LAG: Duration = Duration::from_millis(200);
 /// The message when a sender opens the port.
 const OPENED: &str = "the port has been opened: the board resets, as a real one does, and no longer knows where it is";
 
-/// Height of the plate for probing, from the lower hard end of Z, mm.
-const PLATE_MM: f64 = 45.0;
+/// Height of the plate for probing above the lower hard end of Z, as a share of the way to the upper one.
+const PLATE: f64 = 0.45;
+
+/// Longest time from the reset of the second board to its greeting, ms of AVR time.
+const BOOT_MS: u64 = 1_500;
 
 /// Bytes that may wait for the serial line, as in the buffer of a real port.
 const BACKLOG: usize = 256;
@@ -48,6 +52,8 @@ const BACKLOG: usize = 256;
 struct Server {
     machine: Machine,
     image: Image,
+    /// What is around the board.
+    build: Build,
     baud: u32,
     pty: Pty,
     gdb: Option<Gdb>,
@@ -98,9 +104,37 @@ pub fn serve(args: &ServeArgs) -> Result<bool> {
     Ok(end.is_ok() && arrived)
 }
 
-/// The machine that a sender finds: in the middle of its travel, with a plate for probing below it.
-fn around(board: &Board) -> Build {
-    Build { plate: Some(PLATE_MM), ..Build::of(board) }
+/// The machine that a sender finds: in the middle of its travel, with a plate for probing below it. Its motors and its
+/// travel are those of the firmware's settings, which a second board with the same EEPROM tells. If that board does not
+/// answer in a dialect with settings, they are those of the default settings.
+fn around(image: &Image, board: &'static Board, like: Option<&Machine>) -> Build {
+    let dialects = [("dialect-tinyg", Speech::TinyG), ("dialect-grbl", Speech::Grbl)];
+    let known = dialects.into_iter().filter(|(feature, _)| board.features.contains(feature));
+    let mut told = known.filter_map(|(_, speech)| told(image, board, like, speech).ok());
+    with_plate(told.next().unwrap_or_else(|| Build::of(board)))
+}
+
+/// Puts a plate for probing below the tool.
+fn with_plate(build: Build) -> Build {
+    Build { plate: Some(build.axes[2].travel * PLATE), ..build }
+}
+
+/// Asks a second board for its settings.
+fn told(
+    image: &Image,
+    board: &'static Board,
+    like: Option<&Machine>,
+    speech: Speech,
+) -> Result<Build> {
+    let mut twin = Machine::new(image.clone(), board)?;
+    if let Some(like) = like {
+        twin.set_eeprom(like.eeprom());
+    }
+    let mut host = Host::new(1).speaking(speech);
+    host.boot(&mut twin, BOOT_MS)?;
+    let setup = read_setup(&mut twin, &mut host)?;
+    let travels = read_travels(&mut twin, &mut host)?;
+    Ok(Build::fitted(board, &setup, travels))
 }
 
 /// Stops when the standard input ends. Then the program that started this one waits for the result, or has ended.
@@ -123,8 +157,10 @@ fn wait(pty: &Pty, rests: bool) -> Result<Peer> {
 impl Server {
     fn new(args: &ServeArgs) -> Result<Self> {
         let image = Image::read(&args.target.elf)?;
-        let mut machine = Machine::new(image.clone(), board(&args.target.board)?)?;
-        machine.build(&around(machine.board()));
+        let board = board(&args.target.board)?;
+        let mut machine = Machine::new(image.clone(), board)?;
+        let build = around(&image, board, None);
+        machine.build(&build);
         machine.build_heaters();
         machine.set_baud(args.baud);
         machine.follow_speed();
@@ -136,6 +172,7 @@ impl Server {
             anchor: (Instant::now(), machine.cycle()),
             machine,
             image,
+            build,
             baud: args.baud,
             gdb: args.gdb.map(Gdb::listen).transpose()?,
             pty,
@@ -191,6 +228,9 @@ impl Server {
 
     fn reset(&mut self) -> Result<()> {
         eprintln!("{OPENED}");
+        if self.machine.eeprom_writes() > 0 {
+            self.build = around(&self.image, self.machine.board(), Some(&self.machine));
+        }
         let mut fresh = self.fresh()?;
         fresh.set_eeprom(self.machine.eeprom());
         self.machine = fresh;
@@ -203,7 +243,7 @@ impl Server {
     /// Returns another machine with empty memory.
     fn fresh(&self) -> Result<Machine> {
         let mut fresh = Machine::new(self.image.clone(), self.machine.board())?;
-        fresh.build(&around(fresh.board()));
+        fresh.build(&self.build);
         fresh.build_heaters();
         fresh.set_baud(self.baud);
         fresh.follow_speed();

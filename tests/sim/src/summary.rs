@@ -5,7 +5,7 @@ use std::fmt::{self, Display, Formatter};
 use crate::report::{PauseReport, Report, WindowReport};
 use crate::threads::Threads;
 
-/// Most refused lines that are shown; the rest is only counted.
+/// Most refused lines, and lines passed over, that are shown; the rest is only counted.
 const REJECTED_SHOWN: usize = 20;
 /// Most pauses that are shown; the rest is only counted.
 const PAUSES_SHOWN: usize = 10;
@@ -32,6 +32,9 @@ impl Display for Report {
         }
         for heat in &self.heat {
             row(f, heat.heater, heat)?;
+        }
+        for told in self.told.iter().take(REJECTED_SHOWN) {
+            row(f, "passed over", told)?;
         }
         if let Some(why) = &self.unchecked {
             row(f, "ends not checked", why)?;

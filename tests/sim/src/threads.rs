@@ -1,29 +1,92 @@
-//! Checks the threads of a job: the position of Z at each index pulse of the spindle.
+//! Checks the threads of a job: the position of the axes at each index pulse of the spindle.
 //!
-//! The leads are read from the job's own lines (G33 and G32: K, G76: P), and everything else from the pins. A turn in
-//! which Z moves by a lead, and X not at all, is a turn of a thread. The position of Z at the index pulse, modulo the
-//! lead, is the *phase*. It must be equal in all turns of all passes. A compound slide (Q of G76) shifts a pass by its
-//! depth, which is read from X. Lengths are in millimetres; a job in inches is not checked.
+//! The leads are read from the job's own lines (G33 and G32: K, G76: P), and everything else from the pins. The lead is
+//! that of the axis that moves farthest, X or Z. A turn in which this axis moves by the lead, and the other one as the
+//! line says, is a turn of a thread. Turns that follow each other are a pass. It begins at an index pulse where the
+//! axes stand at the start of a line. The position of the leading axis at the index pulse, counted from there and
+//! modulo the lead, is the *phase*. It must be equal in all turns of all passes with this lead. So each start of a
+//! thread with several starts is shifted by as much as its line. A compound slide (Q of G76) shifts a pass by its
+//! depth, which is read from X. Lengths are in millimetres.
 
 use serde::Serialize;
 
 use crate::machine::Machine;
-use crate::oracle::{MotorSetup, Setup, UNITS};
+use crate::oracle::{self, MotorSetup, Setup, UNITS, Word};
 use crate::plot::{Position, SAMPLE_S, positions};
 
-/// X and Z among the axes.
+/// X and Z, among the axes and in a [`Place`].
+const AXES: [usize; 2] = [0, 2];
 const X: usize = 0;
-const Z: usize = 2;
+const Z: usize = 1;
 
-/// Share of the lead by which the distance in a turn may differ from it, far more than the error allowed for a phase.
-const ALIKE: f64 = 0.02;
+/// Positions of X and Z, mm.
+type Place = [f64; 2];
 
-/// The thread that a line commands.
+/// How far from the lead the distance in a turn may be, steps. The axes catch up in a turn that is farther off, or
+/// brake.
+const ALIKE: f64 = 2.0;
+/// Turns before the first one at full speed in which the start of a pass is searched.
+const STARTING: usize = 12;
+/// How far from the start of a line a pass may begin, and how far from a slope the other axis may be, steps.
+const NEAR: f64 = 1.5;
+const BESIDE: f64 = 2.0;
+
+/// The threads that a line commands.
 #[derive(Clone, Copy, Debug)]
 struct Asked {
     lead: f64,
     /// How much further Z begins for each mm that X is further out.
     slide: f64,
+    /// Whether X stands still in a pass (G76).
+    steady: bool,
+    /// Where the line begins and ends.
+    from: Place,
+    to: Place,
+}
+
+impl Asked {
+    /// The axis that moves farthest.
+    fn leader(&self) -> usize {
+        let [x, z] = [X, Z].map(|axis| (self.to[axis] - self.from[axis]).abs());
+        if x > z && !self.steady { X } else { Z }
+    }
+
+    /// The direction of this axis, 1 or -1.
+    fn way(&self) -> f64 {
+        let leader = self.leader();
+        (self.to[leader] - self.from[leader]).signum()
+    }
+
+    /// How far the other axis moves with each mm of the one that moves farthest.
+    fn slope(&self) -> f64 {
+        let leader = self.leader();
+        let [far, other] = [leader, 1 - leader].map(|axis| self.to[axis] - self.from[axis]);
+        if self.steady || far == 0.0 { 0.0 } else { other / far }
+    }
+
+    /// Whether the axes move by this thread from `a` to `b`, in a turn. `step` is that of each axis.
+    fn is_turn(&self, a: Place, b: Place, step: Place) -> bool {
+        let leader = self.leader();
+        let [far, other] = [leader, 1 - leader].map(|axis| b[axis] - a[axis]);
+        let beside = (other - far * self.slope()).abs();
+        let most = if self.slope() == 0.0 { 0.0 } else { BESIDE * step[1 - leader] };
+        (far * self.way() - self.lead).abs() <= ALIKE * step[leader] && beside <= most
+    }
+
+    /// Returns how far the leading axis is from the start of its pass, in the direction of the thread.
+    fn gone(&self, at: Place) -> f64 {
+        let slid = self.slide * self.way() * (at[X] - self.from[X]);
+        let leader = self.leader();
+        (at[leader] - self.from[leader] - slid) * self.way()
+    }
+
+    /// Whether a pass begins here.
+    fn begins(&self, at: Place, step: Place) -> bool {
+        let leader = self.leader();
+        let beside = (at[1 - leader] - self.from[1 - leader]).abs();
+        self.gone(at).abs() <= NEAR * step[leader]
+            && (self.steady || beside <= NEAR * step[1 - leader])
+    }
 }
 
 /// The threads that were cut.
@@ -31,104 +94,104 @@ struct Asked {
 pub struct Threads {
     /// Number of passes.
     pub passes: usize,
-    /// Number of turns at a steady depth, in all passes.
+    /// Number of turns by the lead, in all passes.
     pub turns: usize,
+    /// Number of lines that ask for a thread.
+    pub lines: usize,
     /// From the lowest phase to the highest.
     pub spread_mm: f64,
     /// Most spread that is allowed: a step, and one more with a compound slide.
     pub most_mm: f64,
-    /// Errors over the length, for each pass: the position of Z, and its distance from where the spindle's angle puts
-    /// it.
+    /// Errors over the length, for each pass: the position of the leading axis, and its distance from where the
+    /// spindle's angle puts it.
     #[serde(skip)]
     pub errors: Vec<Vec<(f64, f64)>>,
 }
 
-/// A turn of the spindle in which Z follows it.
+/// A turn of the spindle in which the axes follow it.
 struct Turn {
     /// Cycles of the index pulses at both ends of the turn.
     cycles: [u64; 2],
-    /// Positions of Z at both ends of the turn.
-    z: [f64; 2],
+    /// Positions of the leading axis at both ends of the turn.
+    places: [f64; 2],
+    leader: usize,
     phase: f64,
     lead: f64,
 }
+
+/// An index pulse: its cycle, and where X and Z were.
+type Index = (u64, Place);
 
 impl Threads {
     /// Evaluates the threads of a job. The recorder may have kept a log of its steps. `None` if the job has no
     /// threads.
     pub fn of(machine: &Machine, setup: &Setup, lines: &[(usize, String)]) -> Option<Threads> {
-        let asked: Vec<Asked> = lines.iter().filter_map(|(_, line)| asked(line)).collect();
-        let mechanics = machine.mechanics()?;
+        let motors = AXES.map(|axis| motor_of(setup, axis));
+        let [Some(x), Some(z)] = motors else { return None };
+        let step = [x, z].map(|motor| step_of(&setup.motors[motor]));
+        let asked = all_asked(lines, setup, [x, z], step);
         if asked.is_empty() {
             return None;
         }
-        let (x_motor, z_motor) = (motor_of(setup, X)?, motor_of(setup, Z)?);
-        let [x_step, z_step] = [x_motor, z_motor].map(|motor| step_of(&setup.motors[motor]));
-        let turns: Vec<Option<Turn>> = mechanics
+        let indexed: Vec<Index> = machine
+            .mechanics()?
             .indexed()
-            .windows(2)
-            .map(|pair| {
-                let [x, z] = [(x_motor, x_step), (z_motor, z_step)]
-                    .map(|(motor, step)| [0, 1].map(|end: usize| pair[end].1[motor] as f64 * step));
-                let went = (z[1] - z[0]).abs();
-                let of = asked.iter().find(|of| (went - of.lead).abs() < ALIKE * of.lead)?;
-                let unslid = z[1] - of.slide * (z[1] - z[0]).signum() * x[1];
-                let phase = unslid / of.lead - (unslid / of.lead).floor();
-                let cycles = [pair[0].0, pair[1].0];
-                (x[0] == x[1]).then_some(Turn { cycles, z, phase, lead: of.lead })
+            .iter()
+            .map(|(cycle, steps)| {
+                (*cycle, [X, Z].map(|axis| steps[[x, z][axis]] as f64 * step[axis]))
             })
             .collect();
-        Some(Self::sum_up(machine, setup, &turns, z_step, asked.iter().any(|of| of.slide != 0.0)))
+        let passes = passes(&indexed, &asked, step);
+        Some(Self::sum_up(machine, setup, &passes, &asked, step))
     }
 
     fn sum_up(
         machine: &Machine,
         setup: &Setup,
-        turns: &[Option<Turn>],
-        step: f64,
-        slides: bool,
+        passes: &[Vec<Turn>],
+        asked: &[Asked],
+        step: Place,
     ) -> Threads {
-        let mean = turns.iter().flatten().next().map_or(0.0, |turn| turn.phase);
-        // Difference from the first phase. Phases wrap from 1 to 0, so the difference is taken modulo 1.
+        // Difference from the first phase of this lead. Phases wrap from 1 to 0, so it is taken modulo 1.
         let off = |turn: &Turn| {
-            let off = turn.phase - mean;
+            let first = passes.iter().flatten().find(|first| first.lead == turn.lead);
+            let off = turn.phase - first.map_or(0.0, |first| first.phase);
             (off - off.round()) * turn.lead
         };
-        let (low, high) = turns
+        let (low, high) = passes
             .iter()
             .flatten()
             .map(off)
             .fold((0.0f64, 0.0f64), |(low, high), off| (low.min(off), high.max(off)));
-        let passes: Vec<&[Option<Turn>]> =
-            turns.split(Option::is_none).filter(|pass| !pass.is_empty()).collect();
         let samples = positions(machine, setup);
         let begin = machine.recorder().log().first().map_or(0, |step| step.cycle);
+        let seconds = |cycle: u64| machine.seconds(cycle.saturating_sub(begin));
         let errors = passes
             .iter()
             .map(|pass| {
-                pass.iter()
-                    .flatten()
-                    .flat_map(|turn| {
-                        errors(turn, off(turn), &samples, |cycle| {
-                            machine.seconds(cycle.saturating_sub(begin))
-                        })
-                    })
-                    .collect()
+                pass.iter().flat_map(|turn| errors(turn, off(turn), &samples, seconds)).collect()
             })
             .collect();
+        let most = asked.iter().map(|of| step[of.leader()]).fold(0.0, f64::max);
+        let slides = asked.iter().any(|of| of.slide != 0.0);
         Threads {
             passes: passes.len(),
-            turns: turns.iter().flatten().count(),
+            turns: passes.iter().flatten().count(),
+            lines: asked.len(),
             spread_mm: high - low,
-            most_mm: if slides { 2.0 * step } else { step },
+            most_mm: if slides { 2.0 * most } else { most },
             errors,
         }
     }
 
     /// Returns what is wrong with the threads; `None` if nothing is.
     pub fn problem(&self) -> Option<String> {
-        if self.turns == 0 {
-            return Some("the job has threads, but Z never went by a lead in a turn".into());
+        let (passes, lines) = (self.passes, self.lines);
+        if passes < lines {
+            return Some(format!(
+                "{lines} lines with threads, but {passes} passes that begin where a line does and \
+                 go by its lead in a turn"
+            ));
         }
         let (is, most) = (self.spread_mm, self.most_mm);
         (is > most + 1e-9)
@@ -136,7 +199,44 @@ impl Threads {
     }
 }
 
-/// Returns the samples of a turn: the position of Z, and its error.
+/// Returns the turns of each pass.
+fn passes(indexed: &[Index], asked: &[Asked], step: Place) -> Vec<Vec<Turn>> {
+    let is_turn = |of: &Asked, n: usize| of.is_turn(indexed[n].1, indexed[n + 1].1, step);
+    let last = indexed.len().saturating_sub(1);
+    let mut passes: Vec<(&Asked, Vec<Turn>)> = Vec::new();
+    let mut behind = 0;
+    for n in 0..last {
+        // The nearest start counts: those of other passes may be shortly before it.
+        let before = (n.saturating_sub(STARTING).max(behind)..=n).rev();
+        let begun = |at: usize| {
+            asked.iter().find(|of| is_turn(of, n) && of.begins(indexed[at].1, step))
+        };
+        let turn = |of: &Asked| turn(of, &indexed[n], &indexed[n + 1]);
+        let starts = before.into_iter().find_map(begun);
+        match (passes.last_mut(), starts) {
+            // The pass goes on, perhaps behind a turn that went by another distance.
+            (Some((of, turns)), None) if is_turn(of, n) => turns.push(turn(of)),
+            (_, Some(of)) => passes.push((of, vec![turn(of)])),
+            _ => continue,
+        }
+        behind = n + 1;
+    }
+    passes.into_iter().map(|(_, turns)| turns).collect()
+}
+
+fn turn(of: &Asked, a: &Index, b: &Index) -> Turn {
+    let leader = of.leader();
+    let gone = of.gone(b.1) / of.lead;
+    Turn {
+        cycles: [a.0, b.0],
+        places: [a.1[leader], b.1[leader]],
+        leader,
+        phase: gone - gone.floor(),
+        lead: of.lead,
+    }
+}
+
+/// Returns the samples of a turn: the position of the leading axis, and its error.
 fn errors(
     turn: &Turn,
     off: f64,
@@ -146,35 +246,72 @@ fn errors(
     let [from, to] = turn.cycles.map(&seconds);
     let [first, last] =
         [from, to].map(|time| ((time / SAMPLE_S).ceil() as usize).min(samples.len()));
-    let way = turn.lead * (turn.z[1] - turn.z[0]).signum();
+    let way = (turn.places[1] - turn.places[0]).signum();
     (first..last)
         .map(|n| {
             let share = (n as f64 * SAMPLE_S - from) / (to - from);
-            let z = samples[n][Z];
-            // The end of the turn is `off` from its ideal place.
-            let ideal = turn.z[1] - off - way * (1.0 - share);
-            (z, z - ideal)
+            let place = samples[n][AXES[turn.leader]];
+            // The end of the turn is `off` from its ideal place, in its own direction.
+            let ideal = turn.places[1] - way * (off + turn.lead * (1.0 - share));
+            (place, place - ideal)
         })
         .collect()
 }
 
-/// Returns the lead and the slide of a line; `None` for a line without a thread.
-fn asked(line: &str) -> Option<Asked> {
-    let line = line.split(['(', ';']).next().unwrap_or_default().to_ascii_uppercase();
-    let word = |letter: char| {
-        let rest = line.split(letter).nth(1)?;
-        let end = rest.find(|c: char| !(c.is_ascii_digit() || "+-.".contains(c)));
-        rest[..end.unwrap_or(rest.len())].parse::<f64>().ok()
-    };
-    let is = |code: &str| line.split_whitespace().any(|word| word == code);
-    if is("G76") {
-        let slide = word('Q').unwrap_or(0.0).to_radians().tan();
-        // X grows with the depth of an inner thread.
-        let slide = slide * word('I').unwrap_or(0.0).signum();
-        return Some(Asked { lead: word('P')?, slide });
+/// The modes of a job that matter to its threads.
+#[derive(Default)]
+struct Modes {
+    inches: bool,
+    /// Whether G33 or G32 is active.
+    threads: bool,
+}
+
+impl Modes {
+    /// Returns the lead, the slide, and whether X stands still; `None` for a line without a thread.
+    fn read(&mut self, words: &[Word]) -> Option<(f64, f64, bool)> {
+        let word = |letter: char| words.iter().find(|word| word.letter == letter).map(Word::number);
+        let codes = words.iter().filter(|word| word.letter == 'G').map(|word| word.value.tenths());
+        let mut compound = false;
+        for code in codes {
+            match code {
+                200 => self.inches = true,
+                210 => self.inches = false,
+                320 | 330 => self.threads = true,
+                760 => (self.threads, compound) = (false, true),
+                0 | 10 | 20 | 30 | 331 | 800 | 380..=385 | 730 | 810..=890 => self.threads = false,
+                _ => {}
+            }
+        }
+        let unit = if self.inches { 25.4 } else { 1.0 };
+        if compound {
+            let slide = word('Q').unwrap_or(0.0).to_radians().tan();
+            // X grows with the depth of an inner thread.
+            let slide = slide * word('I').unwrap_or(0.0).signum();
+            return Some((word('P')? * unit, slide, true));
+        }
+        let moves = word('X').or(word('Z')).is_some();
+        (self.threads && moves).then_some((word('K')? * unit, 0.0, false))
     }
-    let lead = if is("G33") || is("G32") { word('K')? } else { return None };
-    Some(Asked { lead, slide: 0.0 })
+}
+
+/// Returns the threads of all lines up to the first one whose end is not known.
+fn all_asked(
+    lines: &[(usize, String)],
+    setup: &Setup,
+    motors: [usize; 2],
+    step: Place,
+) -> Vec<Asked> {
+    let ends = oracle::ends(lines.iter().map(|(n, line)| (*n, line.as_str())), setup);
+    let (mut modes, mut from, mut all) = (Modes::default(), Place::default(), Vec::new());
+    for ((_, line), (_, steps)) in lines.iter().zip(ends) {
+        let to = [X, Z].map(|axis| steps[motors[axis]] as f64 * step[axis]);
+        let words = oracle::split(line).unwrap_or_default();
+        if let Some((lead, slide, steady)) = modes.read(&words) {
+            all.push(Asked { lead, slide, steady, from, to });
+        }
+        from = to;
+    }
+    all
 }
 
 /// Returns the first motor of an axis.
@@ -190,15 +327,66 @@ fn step_of(motor: &MotorSetup) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::asked;
+    use super::*;
+
+    fn lead(line: &str) -> Option<f64> {
+        let words = oracle::split(line).unwrap();
+        Modes::default().read(&words).map(|(lead, ..)| lead)
+    }
 
     #[test]
     fn leads_are_read_from_lines() {
-        let lead = |line| asked(line).map(|of| of.lead);
-        assert_eq!(lead("g33 z-5 k1.25"), Some(1.25));
+        assert_eq!(lead("g33z-5 k1.25"), Some(1.25));
         assert_eq!(lead("G76 P1.5 Z-12 I-1 J.2 K.8"), Some(1.5));
         assert_eq!(lead("G1 X1 K2 (G33)"), None);
-        let slide = asked("G76 P1 Z-5 I-1 J.2 K.8 Q45").unwrap().slide;
-        assert!((slide + 1.0).abs() < 1e-9);
+        assert_eq!(lead("G20 G33 X1 K0.05"), Some(0.05 * 25.4));
+        let slide = Modes::default().read(&oracle::split("G76 P1 Z-5 I-1 J.2 K.8 Q45").unwrap());
+        assert!((slide.unwrap().1 + 1.0).abs() < 1e-9);
+    }
+
+    const STEP: Place = [0.005, 0.005];
+
+    fn asked(lead: f64, from: Place, to: Place) -> Asked {
+        Asked { lead, slide: 0.0, steady: false, from, to }
+    }
+
+    /// Returns index pulses: a rest at the start, a turn of `late` less than the lead, then whole leads, and a jump
+    /// back.
+    fn cut(of: &Asked, late: f64, turns: usize) -> Vec<Index> {
+        let length = [X, Z].map(|axis| of.to[axis] - of.from[axis]);
+        let leader = of.leader();
+        let at = |gone: f64| {
+            [X, Z].map(|axis| of.from[axis] + length[axis] / length[leader].abs() * gone)
+        };
+        let gone = (1..=turns).map(|n| n as f64 * of.lead - late);
+        let places = [0.0, 0.0].into_iter().chain(gone).map(at);
+        places.map(|place| (0, place)).collect()
+    }
+
+    fn found(all: &[Asked], late: &[f64]) -> Vec<Vec<Turn>> {
+        let indexed: Vec<_> =
+            all.iter().zip(late).flat_map(|(of, late)| cut(of, *late, 5)).collect();
+        passes(&indexed, all, STEP)
+    }
+
+    #[test]
+    fn threads_along_each_axis_and_on_a_slope_are_found() {
+        let lines =
+            [[[12.0, 2.0], [4.0, 2.0]], [[4.0, 2.0], [6.0, -8.0]], [[6.0, -8.0], [20.0, 3.0]]];
+        for [from, to] in lines {
+            let passes = found(&[asked(1.5, from, to)], &[0.2]);
+            assert_eq!((passes.len(), passes[0].len()), (1, 4), "{to:?}");
+        }
+    }
+
+    #[test]
+    fn each_start_counts_from_its_own_line() {
+        let starts = [4.0, 5.0, 6.0].map(|z| asked(3.0, [10.0, z], [10.0, -9.0]));
+        let phases = |late: &[f64]| {
+            let phase = |pass: &Vec<Turn>| (pass[0].phase * 3.0 * 1e6).round() / 1e6;
+            found(&starts, late).iter().map(phase).collect::<Vec<_>>()
+        };
+        assert_eq!(phases(&[0.2; 3]), [2.8; 3]);
+        assert_eq!(phases(&[0.2, 0.2, 0.3]), [2.8, 2.8, 2.7]);
     }
 }

@@ -1,6 +1,7 @@
 //! Homing on the image, with carriages and with switches that bounce and stick.
 
 use kerf::boards::{Board, MEGA2560_GRBL, RAMPS14_CNC, inputs};
+use kerf_sim::job::{read_setup, read_travels};
 use kerf_sim::mechanics::{Bounce, Build, Wiring};
 use kerf_sim::{Host, Machine};
 
@@ -128,5 +129,39 @@ fn a_hold_in_any_stage_of_homing_changes_nothing_of_its_end() {
         host.run_for_ms(&mut machine, 50).unwrap();
         let off = places(&machine)[0] - ENDS;
         assert!(off.abs() <= 1, "{off} steps, held after {ms} ms");
+    }
+}
+
+/// The machine that `serve` puts around a board has the motors, directions and travel of the settings.
+#[test]
+fn a_machine_that_fits_its_settings_homes() {
+    // The router has a second motor on Y, which faces the first one.
+    for profile in ["{mch:1}", "{mch:2}", "{mch:3}"] {
+        let (mut machine, mut host) = booted(&MEGA2560_GRBL);
+        for line in [profile, "{2po:1}", "{sv:0}"] {
+            set(&mut machine, &mut host, line);
+        }
+        let setup = read_setup(&mut machine, &mut host).unwrap();
+        let travels = read_travels(&mut machine, &mut host).unwrap();
+        let mut build = Build::fitted(&MEGA2560_GRBL, &setup, travels);
+        assert!((build.axes[0].travel - travels[0] * 4.0 / 3.0).abs() < 1e-9);
+        let switches = [0, 1, 2].map(|n| {
+            let axis = ["x", "y", "z"][n];
+            let told = host.ask(&mut machine, &format!("{{{axis}sx:n}}"), 1_000).unwrap();
+            matches!(told.body[format!("{axis}sx")].as_i64(), Some(1 | 3))
+        });
+        // Near the switches, to save time in the simulator.
+        for (axis, upper) in build.axes.iter_mut().zip(switches) {
+            axis.start = if upper { axis.travel - 12.0 } else { 12.0 };
+        }
+        machine.build(&build);
+        assert_eq!(home(&mut machine, &mut host, "g28.2 x0 y0 z0"), None, "{profile}");
+        let homed = host.ask(&mut machine, "{home:n}", 1_000).unwrap();
+        assert_eq!(homed.body["home"], 1, "{profile}");
+        for (n, upper) in switches.into_iter().enumerate() {
+            let (at, travel) = (machine.mechanics().unwrap().position(n), build.axes[n].travel);
+            let off = if upper { travel - at } else { at };
+            assert!((2.0..12.0).contains(&off), "{profile}: axis {n} is {off} mm from its end");
+        }
     }
 }

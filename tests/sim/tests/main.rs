@@ -51,6 +51,7 @@ mod hold;
 mod homing;
 mod interpreter;
 mod jobs;
+mod judged;
 mod lathe;
 mod machines;
 mod mechanics;

@@ -37,6 +37,21 @@ pub fn setup_of(mut value: impl FnMut(&str) -> Result<Value>) -> Result<Setup> {
     Ok(Setup { motors, modes })
 }
 
+/// Reads the travel of X, Y and Z, mm: from `tn` to `tm`.
+pub fn read_travels(machine: &mut impl Runs, host: &mut Host) -> Result<[f64; 3]> {
+    let mut travels = [0.0; 3];
+    for (travel, axis) in travels.iter_mut().zip(AXIS_NAMES) {
+        let mut end = |end: &str| -> Result<f64> {
+            let name = format!("{axis}{end}");
+            let response = host.ask(machine, &format!("{{{name}:n}}"), ASK_MS)?;
+            let value = response.body.get(&name).and_then(Value::as_f64);
+            value.with_context(|| format!("no {name} in {}", response.raw))
+        };
+        *travel = end("tm")? - end("tn")?;
+    }
+    Ok(travels)
+}
+
 fn motor_of(mut value: impl FnMut(&str) -> Option<Value>) -> Option<MotorSetup> {
     let mut number = |key| Decimal::parse(&value(key)?.as_number()?.to_string());
     let drives = usize::try_from(number("ma")?.as_whole()?).ok()?;

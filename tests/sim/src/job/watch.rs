@@ -60,6 +60,7 @@ impl Watch {
     pub fn settle(&mut self, machine: &mut impl Runs, host: &mut Host) -> Result<()> {
         let began = machine.cycle();
         loop {
+            machine.follow_pulses();
             host.run_for_ms(machine, STILL_MS / 4)?;
             let moved = machine.last_step().unwrap_or(0).max(began);
             let still = machine.cycle() - moved;
@@ -85,6 +86,6 @@ impl Watch {
 
     fn poll(&mut self, machine: &mut impl Runs, host: &mut Host) {
         self.polled_at = Some(machine.cycle());
-        host.send(machine, POLL, "{stat:n}");
+        host.poll(machine, POLL);
     }
 }

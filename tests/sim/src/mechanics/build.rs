@@ -3,7 +3,7 @@
 use kerf::boards::{Board, MOTORS, Pin};
 
 use super::line::Bounce;
-use crate::oracle::{Setup, UNITS};
+use crate::oracle::{MotorSetup, Setup, UNITS};
 
 /// A machine around the chip. Lengths are in millimetres. Positions count from the lower hard end of an axis.
 #[derive(Clone, Debug)]
@@ -165,6 +165,28 @@ impl Build {
         }
     }
 
+    /// A machine whose motors and travel match the firmware's settings. It stands in the middle of its travel, which is
+    /// a third longer than that of the settings: by the default settings it is [`Build::of`]. An axis without a travel
+    /// keeps that one.
+    pub fn fitted(board: &Board, setup: &Setup, travels: [f64; 3]) -> Build {
+        let mut build = Build::of(board);
+        for (axis, travel) in build.axes.iter_mut().zip(travels).filter(|(_, travel)| *travel > 0.0)
+        {
+            (axis.travel, axis.start) = (travel * LONGER, travel * LONGER / 2.0);
+            axis.max = axis.max.map(|max| Switch { at: axis.travel - BEFORE_END, ..max });
+        }
+        let per_mm = |of: &MotorSetup| of.steps(1_000 * UNITS as i64) as f64 / 1e3;
+        // The first motor of an axis drives it.
+        for (motor, of) in setup.motors.iter().enumerate().rev().filter(|(_, of)| of.besides == 0) {
+            let Some(axis) = build.axes.get_mut(of.axis) else { continue };
+            (axis.motor, axis.reversed, axis.steps_per_mm) = (motor, of.inverted, per_mm(of));
+        }
+        match setup.motors.iter().find(|of| of.besides != 0) {
+            Some(of) => build.core_xy(per_mm(of)),
+            None => build,
+        }
+    }
+
     /// A printer of 200 by 200 by 200 mm that stands near its lower ends. It has switches there, and its motors match
     /// the firmware's settings.
     pub fn printer(board: &Board, setup: &Setup) -> Build {
@@ -198,6 +220,9 @@ impl Build {
         self
     }
 }
+
+/// How much longer a machine is than the travel of its settings.
+const LONGER: f64 = 4.0 / 3.0;
 
 /// Distance of a switch from its hard end, mm.
 const BEFORE_END: f64 = 2.0;

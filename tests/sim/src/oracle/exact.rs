@@ -51,6 +51,51 @@ impl Decimal {
     }
 }
 
+/// Decimals of a word that count. In inches one less does.
+const COUNTED: u32 = 8;
+/// Parts of a unit in which rests are counted.
+const PARTS: i128 = 10_000;
+
+/// A length in whole units, and the rest that was left when it was rounded, in parts of a unit.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Exact {
+    /// The length.
+    pub units: i64,
+    /// The rest.
+    pub rest: i64,
+}
+
+impl Exact {
+    /// Adds the rest of an earlier word, as an increment does.
+    pub fn with(self, rest: i64) -> Exact {
+        let (half, whole) = (PARTS as i64 / 2, PARTS as i64);
+        let rest = self.rest + rest;
+        let more = i64::from(rest >= half) - i64::from(rest <= -half);
+        Exact { units: self.units + more, rest: rest - more * whole }
+    }
+}
+
+impl Decimal {
+    /// Converts a length that is written in a unit of so many units; with `halved` half of it. Decimals that do not
+    /// count are cut off.
+    pub fn exact(self, unit: i128, halved: bool) -> Exact {
+        let decimals = |digits: i128, to: u32| match self.places > to {
+            true => digits / 10i128.pow(self.places - to),
+            false => digits * 10i128.pow(to - self.places),
+        };
+        let counted = decimals(self.digits, COUNTED);
+        let counted = if halved { counted / 2 } else { counted };
+        // A tenth of the last decimal of an inch is no whole number of parts.
+        let (counted, one) = match unit % PARTS {
+            0 => (counted, COUNTED),
+            _ => (counted / 10, COUNTED - 1),
+        };
+        let parts = counted * unit * PARTS / 10i128.pow(one);
+        let units = divide(parts, PARTS);
+        Exact { units: units as i64, rest: (parts - units * PARTS) as i64 }
+    }
+}
+
 /// Divides and rounds to the nearest whole number, halves away from zero.
 pub fn divide(a: i128, b: i128) -> i128 {
     let (a, b) = if b < 0 { (-a, -b) } else { (a, b) };
@@ -69,6 +114,25 @@ mod tests {
             [(5, 2, 3), (-5, 2, -3), (7, 3, 2), (8, 3, 3), (-8, 3, -3), (0, 3, 0), (1, 3, 0)];
         for (a, b, want) in cases {
             assert_eq!(divide(a, b), want, "{a} / {b}");
+        }
+    }
+
+    #[test]
+    fn increments_add_up() {
+        // Random increments of up to eight decimals: the sum is the exact sum, to half a unit.
+        let mut seed = 1u64;
+        for unit in [10_000, 254_000] {
+            let (mut place, mut rest, mut sum) = (0i64, 0i64, 0i128);
+            for _ in 0..1_000 {
+                seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+                let decimals = if unit == 10_000 { 8 } else { 7 };
+                let digits = i128::from(seed >> 40) - (1 << 23);
+                let word = Decimal { digits, places: decimals }.exact(unit, false).with(rest);
+                (place, rest) = (place + word.units, word.rest);
+                sum += digits * unit;
+                let off = sum - i128::from(place) * 10i128.pow(decimals);
+                assert!(off.abs() * 2 <= 10i128.pow(decimals), "{off}");
+            }
         }
     }
 

@@ -41,6 +41,32 @@ fn absolute_and_incremental() {
 }
 
 #[test]
+fn what_rounding_leaves_is_carried_over() {
+    let increments = |word: &str, n: usize| format!("G91 G0\n{}", format!("{word}\n").repeat(n));
+    // 30 times 0.0333333 are 0.999999, which is nearest to 1.0000.
+    ends_at(&increments("X0.0333333 Y-0.0333333", 30), 10_000, -10_000);
+    // 10,000 times a millionth of an inch, and of half an inch.
+    ends_at(&format!("G20 {}", increments("X0.000001", 10_000)), 2_540, 0);
+    ends_at(&format!("G7 {}", increments("X0.000002", 10_000)), 100, 0);
+    // An absolute word leaves a rest, too.
+    ends_at("G0 X0.00004\nG91 X0.00004", 1, 0);
+    ends_at("G0 X0.00004\nG92 X0\nG91 X0.00004", 0, 0);
+}
+
+#[test]
+fn all_nine_systems_and_the_table_of_tools() {
+    ends_at("G10 L2 P9 X10\nG59.3 G0 X1", 110_000, 0);
+    ends_at("G59.1 G10 L20 P0 X1\nG0 X5", 40_000, 0);
+    ends_at("G10 L1 P2 Z5\nG10 L10 P1 Z2\nG0 X5", 50_000, 0);
+    ends_at("G0 X5\nG92 X2\nG10 L20 P1 X2\nG0 X0", 30_000, 0);
+}
+
+#[test]
+fn a_tap_ends_where_it_begins() {
+    ends_at("G0 X5 Y1\nG33.1 Y-9 K1\nG0 X6", 60_000, 10_000);
+}
+
+#[test]
 fn inches_are_exact_and_apply_to_their_own_line() {
     ends_at("G20 X1 Y-0.5\nG21 Y0.0001", 254_000, 1);
 }

@@ -11,6 +11,14 @@ pub struct Word {
     pub value: Decimal,
 }
 
+impl Word {
+    /// Returns the number, rounded.
+    pub fn number(&self) -> f64 {
+        let (up, down) = self.value.ratio();
+        up as f64 / down as f64
+    }
+}
+
 /// Returns the words of a line. A line that is blank, deleted, a comment, or no G-code at all has none.
 pub fn split(line: &str) -> Result<Vec<Word>, String> {
     let text = code_of(line);

@@ -237,7 +237,7 @@ impl Run<'_> {
         );
         let heat = self.heat.heat(self.machine, self.began);
         let followed = self.corners.is_ok().then_some(followed);
-        report.add_print(followed, heat);
+        report.add_print(followed, heat, self.session.take_told());
         report
     }
 }

@@ -1,10 +1,11 @@
 //! The oracle of prints: computes the end of each line, independently of the firmware.
 //!
-//! It shares no code with the firmware. A position is in units of 0.1 um, and each word is rounded to that. E is the
-//! fourth axis.
+//! It shares no code with the firmware. A position is in units of 0.1 um, and each word is rounded to that. What the
+//! rounding leaves is carried over to the next relative word. E, or A, is the fourth axis: it makes what M221 says of
+//! its words, and G10 and G11 move it without its words.
 
 use crate::job::Lines;
-use crate::oracle::{AXES, Decimal, Unclear};
+use crate::oracle::{AXES, Decimal, Exact, Unclear, divide};
 
 /// Units in an inch and in a millimetre.
 const INCH: i128 = 254_000;
@@ -80,6 +81,22 @@ pub fn asked(line: &str) -> Asked {
     }
 }
 
+/// Returns the value of the first word with this letter.
+fn word(words: &[(char, Decimal)], of: char) -> Option<Decimal> {
+    words.iter().find(|(letter, _)| *letter == of).map(|(_, value)| *value)
+}
+
+/// Returns S as a length.
+fn length(words: &[(char, Decimal)]) -> Option<i64> {
+    word(words, 'S').map(|s| s.scaled(MM))
+}
+
+/// Whether a line moves the machine: such a line must not be passed over.
+pub fn moves(line: &str) -> bool {
+    let code = parts(line).map(|(code, _)| code).unwrap_or_default();
+    matches!(code.as_str(), "G0" | "G1" | "G2" | "G3" | "G10" | "G11" | "G28")
+}
+
 /// Reads a whole file. Returns a corner for each line.
 pub fn read(lines: &Lines) -> Result<Vec<Corner>, Unclear> {
     let mut reader = Reader::default();
@@ -90,15 +107,43 @@ pub fn read(lines: &Lines) -> Result<Vec<Corner>, Unclear> {
     lines.iter().map(corner).collect()
 }
 
-#[derive(Default)]
 struct Reader {
     position: [i64; AXES],
+    /// What rounding has left of the position.
+    rests: [i64; AXES],
     /// The offset that G92 has set.
     offset: [i64; AXES],
     relative: bool,
     relative_e: bool,
     inches: bool,
+    /// The filament that M221 makes of that in the words, thousandths.
+    flow: i128,
+    /// How far G10 retracts, and how much more G11 brings back, units.
+    retraction: i64,
+    extra: i64,
+    retracted: bool,
 }
+
+impl Default for Reader {
+    fn default() -> Self {
+        Reader {
+            position: [0; AXES],
+            rests: [0; AXES],
+            offset: [0; AXES],
+            relative: false,
+            relative_e: false,
+            inches: false,
+            flow: 1_000,
+            retraction: 2 * MM as i64,
+            extra: 0,
+            retracted: false,
+        }
+    }
+}
+
+/// Codes that make the end of later lines unclear, if they have words: other steps, another origin, a bed that is
+/// followed.
+const UNCLEAR: [&str; 5] = ["M92", "M206", "M420", "M428", "M665"];
 
 impl Reader {
     /// Executes a line. Returns whether it homes.
@@ -114,9 +159,15 @@ impl Reader {
             "M83" => self.relative_e = true,
             "G92" => self.call(&words),
             "G28" => return Ok(self.home(&words)),
-            "M220" | "M221" if words.first().is_some_and(|(_, v)| v.scaled(1) != 100) => {
-                return Err(code);
-            }
+            "M221" => self.flow = word(&words, 'S').map_or(self.flow, |s| s.scaled(10).into()),
+            "M207" => self.retraction = length(&words).unwrap_or(self.retraction),
+            "M208" => self.extra = length(&words).unwrap_or(self.extra),
+            "M999" => self.retracted = false,
+            // With words G10 sets the temperature of a tool.
+            "G10" if words.is_empty() => self.retract(true),
+            "G10" => {}
+            "G11" => self.retract(false),
+            code if UNCLEAR.contains(&code) && !words.is_empty() => return Err(code.to_owned()),
             _ if code.starts_with('M') || code.starts_with('T') => {}
             "G4" | "G17" | "G94" => {}
             _ => return Err(code),
@@ -125,11 +176,15 @@ impl Reader {
     }
 
     /// Returns the words of axes, in units.
-    fn axes(&self, words: &[(char, Decimal)]) -> [Option<i64>; LETTERS.len()] {
-        let unit = if self.inches { INCH } else { MM };
-        LETTERS.map(|axis| {
-            let word = words.iter().find(|(letter, _)| *letter == axis);
-            word.map(|(_, value)| value.scaled(unit))
+    fn axes(&self, words: &[(char, Decimal)]) -> [Option<Exact>; LETTERS.len()] {
+        std::array::from_fn(|axis| {
+            // The filament is in mm always.
+            let unit = if self.inches && axis != E { INCH } else { MM };
+            let value = match axis {
+                E => word(words, 'E').or_else(|| word(words, 'A')),
+                _ => word(words, LETTERS[axis]),
+            };
+            value.map(|value| value.exact(unit, false))
         })
     }
 
@@ -137,20 +192,42 @@ impl Reader {
         for (axis, value) in self.axes(words).into_iter().enumerate() {
             let Some(value) = value else { continue };
             let relative = if axis == E { self.relative_e } else { self.relative };
-            let from = if relative { self.position[axis] } else { self.offset[axis] };
-            self.position[axis] = from + value;
+            let (from, value) = match relative {
+                true => (self.position[axis], value.with(self.rests[axis])),
+                false => (self.offset[axis], value),
+            };
+            let (end, before) = (from + value.units, self.position[axis]);
+            (self.position[axis], self.rests[axis]) = (end, value.rest);
+            if axis == E {
+                let flows = divide(i128::from(end - before) * self.flow, 1_000) as i64;
+                self.extrude(flows - (end - before));
+            }
         }
+    }
+
+    /// Moves the extruder, and the place from which its words count.
+    fn extrude(&mut self, by: i64) {
+        self.position[E] += by;
+        self.offset[E] += by;
+    }
+
+    fn retract(&mut self, back: bool) {
+        if self.retracted != back {
+            self.extrude(if back { -self.retraction } else { self.retraction + self.extra });
+        }
+        self.retracted = back;
     }
 
     /// G92: sets the coordinates of the position; without words all are 0.
     fn call(&mut self, words: &[(char, Decimal)]) {
         let mut values = self.axes(words);
-        if values == [None; LETTERS.len()] {
-            values = [Some(0); LETTERS.len()];
+        if words.is_empty() {
+            values = [Some(Exact::default()); LETTERS.len()];
         }
         for (axis, value) in values.into_iter().enumerate() {
             let Some(value) = value else { continue };
-            self.offset[axis] = self.position[axis] - value;
+            self.offset[axis] = self.position[axis] - value.units;
+            self.rests[axis] = value.rest;
         }
     }
 
@@ -159,7 +236,7 @@ impl Reader {
         let named = |axis: usize| words.iter().any(|(letter, _)| *letter == LETTERS[axis]);
         let all = !(0..HOMED).any(named);
         for axis in (0..HOMED).filter(|axis| all || named(*axis)) {
-            (self.position[axis], self.offset[axis]) = (0, 0);
+            (self.position[axis], self.offset[axis], self.rests[axis]) = (0, 0, 0);
         }
         true
     }
@@ -186,6 +263,19 @@ mod tests {
         assert_eq!(end("g1x5\nG92\ng1x5"), [100_000, 0, 0, 0]);
         assert_eq!(end("M117 G1 X5\nM104 S200"), [0; 4]);
         assert!(read(&lines_of("G29")).is_err());
+        assert_eq!(end("G1 X5 E3\nG92 A0\nG1 X6 A2"), [60_000, 0, 0, 50_000]);
+        assert_eq!(end("G20\nG1 E1"), [0, 0, 0, 10_000]);
+        assert!(read(&lines_of("M92 X80")).is_err() && read(&lines_of("M92")).is_ok());
+    }
+
+    #[test]
+    fn filament_adds_up() {
+        assert_eq!(end(&format!("M83\n{}", "G1 E.000033\n".repeat(30)))[E], 10);
+        assert_eq!(end("M221 S50\nG1 E2\nM221 S200\nG1 E3\nM221 S100\nG1 E4")[E], 40_000);
+        assert_eq!(end("G1 E5\nG10\nG10\nG1 X1\nG11\nG11\nG1 E6")[E], 60_000);
+        assert_eq!(end("M207 S1.5\nM208 S0.5\nG1 E5\nG10")[E], 35_000);
+        assert_eq!(end("M207 S1.5\nM208 S0.5\nG1 E5\nG10\nG11\nG1 E6")[E], 65_000);
+        assert_eq!(end("G1 E5\nG10 P0 S205\nM220 S50\nG1 E6")[E], 60_000);
     }
 
     #[test]

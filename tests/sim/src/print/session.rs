@@ -2,6 +2,7 @@
 
 use anyhow::{Result, bail};
 
+use super::reading;
 use crate::machine::Machine;
 use crate::report::Rejected;
 
@@ -17,6 +18,8 @@ pub struct Session {
     heard: Vec<String>,
     answered: usize,
     rejected: Vec<Rejected>,
+    /// What the firmware has said to lines that it has not refused.
+    told: Vec<String>,
     strays: Vec<String>,
     starts: usize,
     late: u64,
@@ -24,6 +27,12 @@ pub struct Session {
 
 /// Unsolicited lines that are no fault.
 const NOTICES: [&str; 3] = ["echo:busy: processing", " T:", "{\"r\":{\"fv\":"];
+
+/// Whether the firmware refuses a line by saying this. A print goes on after other lines that it passes over, but not
+/// after a move.
+fn refuses(heard: &str, line: &str) -> bool {
+    heard.starts_with("Error:") || heard.starts_with("echo:") && reading::moves(line)
+}
 
 impl Session {
     pub fn new() -> Self {
@@ -38,6 +47,11 @@ impl Session {
     /// Takes the lines that the firmware has refused.
     pub fn take_rejected(&mut self) -> Vec<Rejected> {
         std::mem::take(&mut self.rejected)
+    }
+
+    /// Takes what the firmware has said to lines that it has not refused, each with the number of the line.
+    pub fn take_told(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.told)
     }
 
     /// Lines from the firmware that belong to no request.
@@ -94,11 +108,16 @@ impl Session {
             machine.run_until_line(end)?;
             self.listen(machine);
             for heard in std::mem::take(&mut self.heard) {
-                if heard == "ok" {
+                if heard == "ok" || heard.starts_with("ok ") {
                     self.answered += 1;
                     return Ok(());
                 }
-                self.rejected.push(Rejected { line, text: format!("{text}: {heard}"), status: 1 });
+                if refuses(&heard, text) {
+                    let text = format!("{text}: {heard}");
+                    self.rejected.push(Rejected { line, text, status: 1 });
+                } else if line > 0 {
+                    self.told.push(format!("line {line}: {heard}"));
+                }
             }
             if machine.cycle() >= end {
                 bail!("no ok within {} s for line {line}, {text}", timeout_ms / 1_000);

@@ -14,7 +14,7 @@ use kerf_sim::emulated::{Emulated, Near, Talks, job};
 use kerf_sim::mechanics::{Axis, Build};
 use kerf_sim::{Runs, USB};
 
-use super::{MAX_LAG, SLICE_MS, TICK, around, wait};
+use super::{MAX_LAG, SLICE_MS, TICK, wait, with_plate};
 use crate::arrival::Arrival;
 use crate::cli::{ServeArgs, Speed};
 use crate::pty::{Peer, Pty};
@@ -74,7 +74,7 @@ fn switches(build: &Build, board: &Board) -> Vec<Near> {
 impl Server {
     fn new(args: &ServeArgs, board: &'static Board) -> Result<Self> {
         let mut emulated = Emulated::load(&args.target.elf, board)?;
-        emulated.wire(&switches(&around(board), board));
+        emulated.wire(&switches(&with_plate(Build::of(board)), board));
         emulated.session(Talks { open: false, reads: true });
         let mut pty = Pty::new()?;
         if let Some(link) = &args.link {
