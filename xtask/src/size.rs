@@ -42,9 +42,19 @@ pub fn run(args: &SizeArgs) -> Result<()> {
     }
 }
 
-/// As [`show`], for the image of a board.
+/// As [`show`], for the image of a board for the machine `careful`. Fails also if an image for another machine might be
+/// past the cap of flash.
 pub fn show_board(board: Board, elf: &Path) -> Result<()> {
-    if board.is_rp2040() { rp2040::show(elf) } else { show(elf) }
+    if board.is_rp2040() {
+        return rp2040::show(elf);
+    }
+    show(elf)?;
+    let most = Image::load(elf)?.sizes.flash + caps::PROFILE;
+    ensure!(
+        most <= caps::FLASH,
+        "{board} may not fit with each machine: up to {most} bytes of flash"
+    );
+    Ok(())
 }
 
 /// Prints what an image takes. Fails past a cap, or if the stack has no bound.

@@ -35,8 +35,11 @@ const BESIDE: f64 = 2.0;
 #[derive(Clone, Copy, Debug)]
 struct Asked {
     lead: f64,
-    /// How much further Z begins for each mm that X is further out.
+    /// How much further along Z a pass begins for each mm that X is beyond the peak of the thread, away from where the
+    /// line begins.
     slide: f64,
+    /// The distance along X from where the line begins to the peak.
+    peak: f64,
     /// Whether X stands still in a pass (G76).
     steady: bool,
     /// Where the line begins and ends.
@@ -75,7 +78,7 @@ impl Asked {
 
     /// Returns how far the leading axis is from the start of its pass, in the direction of the thread.
     fn gone(&self, at: Place) -> f64 {
-        let slid = self.slide * self.way() * (at[X] - self.from[X]);
+        let slid = self.slide * self.way() * (at[X] - self.from[X] - self.peak);
         let leader = self.leader();
         (at[leader] - self.from[leader] - slid) * self.way()
     }
@@ -208,9 +211,8 @@ fn passes(indexed: &[Index], asked: &[Asked], step: Place) -> Vec<Vec<Turn>> {
     for n in 0..last {
         // The nearest start counts: those of other passes may be shortly before it.
         let before = (n.saturating_sub(STARTING).max(behind)..=n).rev();
-        let begun = |at: usize| {
-            asked.iter().find(|of| is_turn(of, n) && of.begins(indexed[at].1, step))
-        };
+        let begun =
+            |at: usize| asked.iter().find(|of| is_turn(of, n) && of.begins(indexed[at].1, step));
         let turn = |of: &Asked| turn(of, &indexed[n], &indexed[n + 1]);
         let starts = before.into_iter().find_map(begun);
         match (passes.last_mut(), starts) {
@@ -262,13 +264,14 @@ fn errors(
 #[derive(Default)]
 struct Modes {
     inches: bool,
+    diameters: bool,
     /// Whether G33 or G32 is active.
     threads: bool,
 }
 
 impl Modes {
-    /// Returns the lead, the slide, and whether X stands still; `None` for a line without a thread.
-    fn read(&mut self, words: &[Word]) -> Option<(f64, f64, bool)> {
+    /// Returns the thread of a line that begins and ends there; `None` for a line without one.
+    fn read(&mut self, words: &[Word], from: Place, to: Place) -> Option<Asked> {
         let word = |letter: char| words.iter().find(|word| word.letter == letter).map(Word::number);
         let codes = words.iter().filter(|word| word.letter == 'G').map(|word| word.value.tenths());
         let mut compound = false;
@@ -276,6 +279,8 @@ impl Modes {
             match code {
                 200 => self.inches = true,
                 210 => self.inches = false,
+                70 => self.diameters = true,
+                80 => self.diameters = false,
                 320 | 330 => self.threads = true,
                 760 => (self.threads, compound) = (false, true),
                 0 | 10 | 20 | 30 | 331 | 800 | 380..=385 | 730 | 810..=890 => self.threads = false,
@@ -286,11 +291,14 @@ impl Modes {
         if compound {
             let slide = word('Q').unwrap_or(0.0).to_radians().tan();
             // X grows with the depth of an inner thread.
-            let slide = slide * word('I').unwrap_or(0.0).signum();
-            return Some((word('P')? * unit, slide, true));
+            let peak = word('I').unwrap_or(0.0) * unit * if self.diameters { 0.5 } else { 1.0 };
+            let (lead, slide) = (word('P')? * unit, slide * peak.signum());
+            return Some(Asked { lead, slide, peak, steady: true, from, to });
         }
         let moves = word('X').or(word('Z')).is_some();
-        (self.threads && moves).then_some((word('K')? * unit, 0.0, false))
+        let lead = word('K')? * unit;
+        let thread = Asked { lead, slide: 0.0, peak: 0.0, steady: false, from, to };
+        (self.threads && moves).then_some(thread)
     }
 }
 
@@ -306,9 +314,7 @@ fn all_asked(
     for ((_, line), (_, steps)) in lines.iter().zip(ends) {
         let to = [X, Z].map(|axis| steps[motors[axis]] as f64 * step[axis]);
         let words = oracle::split(line).unwrap_or_default();
-        if let Some((lead, slide, steady)) = modes.read(&words) {
-            all.push(Asked { lead, slide, steady, from, to });
-        }
+        all.extend(modes.read(&words, from, to));
         from = to;
     }
     all
@@ -329,25 +335,33 @@ fn step_of(motor: &MotorSetup) -> f64 {
 mod tests {
     use super::*;
 
-    fn lead(line: &str) -> Option<f64> {
+    fn read(line: &str) -> Option<Asked> {
         let words = oracle::split(line).unwrap();
-        Modes::default().read(&words).map(|(lead, ..)| lead)
+        Modes::default().read(&words, [9.0, 2.0], [9.0, -12.0])
     }
 
     #[test]
     fn leads_are_read_from_lines() {
+        let lead = |line| read(line).map(|of| of.lead);
         assert_eq!(lead("g33z-5 k1.25"), Some(1.25));
         assert_eq!(lead("G76 P1.5 Z-12 I-1 J.2 K.8"), Some(1.5));
         assert_eq!(lead("G1 X1 K2 (G33)"), None);
         assert_eq!(lead("G20 G33 X1 K0.05"), Some(0.05 * 25.4));
-        let slide = Modes::default().read(&oracle::split("G76 P1 Z-5 I-1 J.2 K.8 Q45").unwrap());
-        assert!((slide.unwrap().1 + 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_compound_slide_shifts_a_pass_by_its_depth() {
+        // The peak is at X 8; half a millimetre below it the pass begins half a millimetre further along Z.
+        for line in ["G76 P1 Z-12 I-1 J.2 K.8 Q45", "G7 G76 P1 Z-12 I-2 J.4 K1.6 Q45"] {
+            let of = read(line).unwrap();
+            assert!(of.begins([7.5, 1.5], STEP) && !of.begins([7.5, 1.4], STEP), "{of:?}");
+        }
     }
 
     const STEP: Place = [0.005, 0.005];
 
     fn asked(lead: f64, from: Place, to: Place) -> Asked {
-        Asked { lead, slide: 0.0, steady: false, from, to }
+        Asked { lead, slide: 0.0, peak: 0.0, steady: false, from, to }
     }
 
     /// Returns index pulses: a rest at the start, a turn of `late` less than the lead, then whole leads, and a jump

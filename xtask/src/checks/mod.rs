@@ -11,6 +11,7 @@ use anyhow::{Context, Result, ensure};
 use beside::Beside;
 
 use crate::boards::Board;
+use crate::caps;
 use crate::elf;
 use crate::firmware;
 use crate::machines::Machine;
@@ -40,6 +41,7 @@ const WITHOUT_IMAGES: &[Stage] = &[
 /// is built.
 const WITH_IMAGES: &[Stage] = &[
     Stage { name: "an image without capabilities", run: without_capabilities },
+    Stage { name: "what the profile of a machine adds", run: profile },
     Stage { name: "sizes and stack of every board", run: size_all },
     Stage { name: "the emulator of the RP2040", run: emulator::test },
     Stage { name: "simulated and emulated boards", run: simulator_tests },
@@ -138,6 +140,19 @@ fn without_capabilities() -> Result<()> {
     let least = flash(&firmware::build_bare(board)?)?;
     println!("capabilities of {board} take {} bytes of flash", all.saturating_sub(least));
     ensure!(least + CAPABILITIES < all, "{least} bytes without capabilities, {all} with them");
+    Ok(())
+}
+
+/// Checks what the profile of a machine adds to an image, measured on one board. With this bound, the sizes of the
+/// images for `careful` show that each board fits with each machine.
+fn profile() -> Result<()> {
+    let (board, machine) = (Board::default(), Machine::Printer);
+    let flash = |elf: &Path| anyhow::Ok(elf::Image::load(elf)?.sizes.flash);
+    let careful = flash(&firmware::image(board, Machine::default()))?;
+    let with = flash(&firmware::build(board, machine)?)?;
+    let adds = with.saturating_sub(careful);
+    println!("the profile {machine} adds {adds} bytes of flash to {board}");
+    ensure!(adds <= caps::PROFILE, "{adds} bytes, more than {}", caps::PROFILE);
     Ok(())
 }
 
