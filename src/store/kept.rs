@@ -70,19 +70,20 @@ const NO_KEY: u16 = u16::MAX;
 /// end was cut short by a power failure: it is made again at the start. Settings that have been stored since keep their
 /// values.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Change(i32);
+pub struct Change(
+    /// 0: none. Else the machine's number + 1; negative if all settings change.
+    i32,
+);
 
 #[small]
 impl Change {
     /// No change, or its end.
     pub const NONE: Self = Self(0);
-    /// Added to the value if all settings change.
-    const ALL: i32 = 256;
 
     /// Returns the change to the profile of these settings; with `all`, of all other settings to their defaults, too.
     pub fn to(settings: &Settings, all: bool) -> Self {
         let machine = settings.get(Setting::MACHINE) + 1;
-        Self(if all { machine + Self::ALL } else { machine })
+        Self(if all { -machine } else { machine })
     }
 
     /// Returns the value of the change's record.
@@ -92,7 +93,7 @@ impl Change {
 
     /// Whether all settings change, those in EEPROM alone, too.
     pub fn is_of_all(self) -> bool {
-        self.0 >= Self::ALL
+        self.0 < 0
     }
 
     /// Makes the change.
@@ -100,9 +101,9 @@ impl Change {
         if self.is_of_all() {
             settings.set_defaults();
         }
-        let machine = (self.0 % Self::ALL).wrapping_sub(1);
-        if Setting::MACHINE.accepts(machine) {
-            settings.take_over(machine as u8);
+        let machine = (self.0.unsigned_abs() as u8).wrapping_sub(1);
+        if Setting::MACHINE.accepts(machine.into()) {
+            settings.take_over(machine);
         }
     }
 }

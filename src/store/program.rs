@@ -134,10 +134,7 @@ pub fn is_whole<M: Memory>(memory: &M) -> bool {
 #[small]
 pub fn begin<M: Memory>(memory: &mut M) -> Stored {
     let new = Program { down: find(memory).is_some_and(|old| !old.down), len: 0 };
-    match put(memory, [(new.place(0), ERASED)].into_iter()) {
-        true => Stored::Part(new),
-        false => Stored::Again,
-    }
+    if put(memory, new.place(0), ERASED) { Stored::Part(new) } else { Stored::Again }
 }
 
 /// Appends a line to the new program. Makes the old program invalid if the line needs its room.
@@ -148,14 +145,12 @@ pub fn line<M: Memory>(memory: &mut M, new: Program, text: &[u8]) -> Stored {
     let Some(room) = usize::from(PROGRAM - 2 * HEAD).checked_sub(len) else { return Stored::Full };
     let old = find(memory).filter(|old| old.down != new.down);
     if old.is_some_and(|old| usize::from(old.len) > room) {
-        put(memory, [(new.other().place(0), ERASED)].into_iter());
+        put(memory, new.other().place(0), ERASED);
         return Stored::Again;
     }
-    let bytes = text.iter().chain(b"\n").copied();
-    match put(memory, (HEAD + new.len..).map(|at| new.place(at)).zip(bytes)) {
-        true => Stored::Part(Program { len: len as u16, ..new }),
-        false => Stored::Again,
-    }
+    let is_put = put_all(memory, new.place(HEAD + new.len), new.down, text)
+        && put(memory, new.place(HEAD + len as u16 - 1), b'\n');
+    if is_put { Stored::Part(Program { len: len as u16, ..new }) } else { Stored::Again }
 }
 
 /// Makes the new program valid, and then the old one invalid.
@@ -167,12 +162,9 @@ pub fn end<M: Memory>(memory: &mut M, new: Program) -> Stored {
     }
     let [len0, len1] = new.len.to_le_bytes();
     let [sum0, sum1] = new.sum(memory).to_le_bytes();
-    let head = [(1, len0), (2, len1), (3, sum0), (4, sum1), (0, VALID)];
-    let head = head.into_iter().map(|(at, byte)| (new.place(at), byte));
-    match put(memory, head.chain([(new.other().place(0), ERASED)])) {
-        true => Stored::Done,
-        false => Stored::Again,
-    }
+    let is_put = put_all(memory, new.place(0), new.down, &[VALID, len0, len1, sum0, sum1])
+        && put(memory, new.other().place(0), ERASED);
+    if is_put { Stored::Done } else { Stored::Again }
 }
 
 /// A start-up line in its slot.
@@ -189,12 +181,6 @@ fn slot_place(slot: u8) -> u16 {
     AREA - STARTUP * u16::from(from_end)
 }
 
-/// Returns the first byte of the slot of line `n`.
-#[small]
-fn startup_head(n: u8, len: u8) -> u8 {
-    (n + 1) << 6 | len
-}
-
 #[small]
 impl Startup {
     /// Returns what is in a slot, if it is line `n`. 2,000 cycles for 10 bytes.
@@ -208,9 +194,8 @@ impl Startup {
             return None;
         }
         let mut digest = CRC.digest();
-        (0..line.len).for_each(|at| digest.update(&[line.byte(memory, at)]));
-        if has_number {
-            digest.update(&[head]);
+        for at in u8::from(!has_number)..=line.len {
+            digest.update(&[if at == 0 { head } else { line.byte(memory, at - 1) }]);
         }
         let sum = u16::from_le_bytes([memory.read(at + 1), memory.read(at + 2)]);
         (sum == digest.finalize()).then_some(line)
@@ -231,63 +216,85 @@ impl Startup {
     pub fn byte<M: Memory>(self, memory: &M, at: u8) -> u8 {
         memory.read(base::<M>() + slot_place(self.slot) + 3 + u16::from(at))
     }
-
-    fn is<M: Memory>(self, memory: &M, bytes: impl Iterator<Item = u8>) -> bool {
-        bytes.eq((0..self.len).map(|at| self.byte(memory, at)))
-    }
 }
 
 /// Stores a start-up line, without blanks and in upper case. An empty text deletes the line.
 #[inline(never)]
 #[small]
 pub fn put_startup<M: Memory>(memory: &mut M, n: u8, text: &[u8]) -> Stored {
-    let bytes = || text.iter().filter(|byte| **byte > b' ').map(u8::to_ascii_uppercase);
-    let len = bytes().count();
-    if n >= STARTUPS || len > usize::from(STARTUP_MAX) {
+    // The slot as it is to be. For the checksum its first byte is before the text.
+    let mut image = [0; STARTUP as usize];
+    let mut len = 0u8;
+    for byte in text.iter().filter(|byte| **byte > b' ') {
+        let Some(place) = image.get_mut(3 + usize::from(len)) else { return Stored::Full };
+        *place = byte.to_ascii_uppercase();
+        len += 1;
+    }
+    if n >= STARTUPS {
         return Stored::Full;
     }
+    let head = (n + 1) << 6 | len;
+    let end = 3 + usize::from(len);
+    image[2] = head;
+    let [sum0, sum1] = CRC.checksum(image.get(2..end).unwrap_or_default()).to_le_bytes();
+    image[..3].copy_from_slice(&[head, sum0, sum1]);
+    let image = image.get(..end).unwrap_or_default();
     if memory.is_busy() {
         return Stored::Again;
     }
-    let mut lines = (0..SLOTS).filter_map(|slot| Startup::in_slot(memory, slot, n));
-    if let Some(new) = lines.clone().find(|line| line.is(memory, bytes())) {
-        let Some(old) = lines.find(|line| line.slot != new.slot) else { return Stored::Done };
-        put(memory, [(slot_place(old.slot), ERASED)].into_iter());
+    if let Some(new) = (0..SLOTS).find(|slot| holds(memory, *slot, image, 0)) {
+        let is_old = |slot: &u8| *slot != new && Startup::in_slot(memory, *slot, n).is_some();
+        let Some(old) = (0..SLOTS).find(is_old) else { return Stored::Done };
+        put(memory, slot_place(old), ERASED);
         return Stored::Again;
     }
-    let taken: [_; STARTUPS as usize] =
-        [0, 1].map(|n| Startup::find(memory, n).map(|line| line.slot));
-    let free = (0..SLOTS).find(|slot| !taken.contains(&Some(*slot))).unwrap_or(0);
-    let at = slot_place(free);
-    let head = startup_head(n, len as u8);
-    let mut digest = CRC.digest();
-    bytes().chain([head]).for_each(|byte| digest.update(&[byte]));
-    let [sum0, sum1] = digest.finalize().to_le_bytes();
-    let body = (at + 3..).zip(bytes()).chain([(at + 1, sum0), (at + 2, sum1)]);
-    let is_written = body.clone().all(|(at, byte)| memory.read(base::<M>() + at) == byte);
-    match is_written {
-        true => put(memory, [(at, head)].into_iter()),
-        // What was in the slot is invalid before the first byte of it changes.
-        false => put(memory, [(at, ERASED)].into_iter()) && put(memory, body),
+    let is_taken = |slot: u8| {
+        (0..STARTUPS).any(|n| Startup::find(memory, n).is_some_and(|line| line.slot == slot))
     };
+    let free = (0..SLOTS).find(|slot| !is_taken(*slot)).unwrap_or(0);
+    // What was in the slot is invalid before its first byte changes.
+    if holds(memory, free, image, 1) || put(memory, slot_place(free), ERASED) {
+        put_all(memory, slot_place(free), false, image);
+    }
     Stored::Again
 }
 
-/// Writes the first byte that differs from its wanted value. Returns true if all bytes are right and no write is in
-/// progress.
+/// Whether a slot holds these bytes, from this one on.
+#[inline(never)]
 #[small]
-fn put<M: Memory>(memory: &mut M, bytes: impl Iterator<Item = (u16, u8)>) -> bool {
-    if memory.is_busy() {
-        return false;
-    }
-    for (at, byte) in bytes {
-        let at = base::<M>() + at;
-        if memory.read(at) != byte {
-            memory.write(at, byte);
+fn holds<M: Memory>(memory: &M, slot: u8, image: &[u8], from: usize) -> bool {
+    let at = base::<M>() + slot_place(slot);
+    (at..).zip(image).skip(from).all(|(at, byte)| memory.read(at) == *byte)
+}
+
+/// Writes the first of these bytes that differs. They go up or down from `start`; the first byte is the last one to be
+/// written. Returns true if all are right and no write is in progress.
+#[inline(never)]
+#[small]
+fn put_all<M: Memory>(memory: &mut M, start: u16, down: bool, bytes: &[u8]) -> bool {
+    let (Some((first, rest)), mut at) = (bytes.split_first(), start) else { return true };
+    for byte in rest {
+        at = if down { at - 1 } else { at + 1 };
+        if !put(memory, at, *byte) {
             return false;
         }
     }
-    true
+    put(memory, start, *first)
+}
+
+/// Writes a byte if it differs. Returns true if it is right and no write is in progress.
+#[inline(never)]
+#[small]
+fn put<M: Memory>(memory: &mut M, at: u16, byte: u8) -> bool {
+    if memory.is_busy() {
+        return false;
+    }
+    let at = base::<M>() + at;
+    let is_right = memory.read(at) == byte;
+    if !is_right {
+        memory.write(at, byte);
+    }
+    is_right
 }
 
 #[cfg(test)]
