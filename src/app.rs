@@ -22,7 +22,7 @@ use crate::machine::{Notices, Probe, Signs};
 use crate::motion::queue::{self, BlockQueue, BlockSource};
 use crate::protocol::{Memory, Occasion, Remembers, Speech};
 use crate::status::Status;
-use crate::store::kept::{self, ITEMS};
+use crate::store::kept;
 use crate::store::{Log, Memory as _};
 use crate::tasks::common::Common;
 use crate::tasks::heat::Heaters;
@@ -206,7 +206,7 @@ fn recall(settings: &mut Settings, storage: &Storage) -> Occasion {
     storage.resume(kept::load(&log, &memory, settings));
     // Power may have failed between a setting and the velocities that it has lowered.
     if limit_velocity(settings, Setting::MACHINE) {
-        storage.note(0, ITEMS);
+        storage.note_at_start();
     }
     drivers::recall(settings, storage);
     match memory.is_lost() || log.is_rubbish(&memory) {

@@ -57,7 +57,7 @@ impl Job {
     /// Returns the job of the start-up lines; `None` if there are none.
     pub fn of_startup(memory: &impl Memory) -> Option<Self> {
         let mut lines = (0..STARTUPS).filter_map(|n| Startup::find(memory, n));
-        let any = lines.any(|line| line.len() != 0);
+        let any = lines.any(|line| !line.is_empty());
         any.then(|| Self { number: STARTUP, ..Self::default() })
     }
 

@@ -212,6 +212,11 @@ impl Startup {
         self.len
     }
 
+    /// Whether the line has been deleted.
+    pub fn is_empty(self) -> bool {
+        self.len == 0
+    }
+
     /// Returns a byte of the line.
     pub fn byte<M: Memory>(self, memory: &M, at: u8) -> u8 {
         memory.read(base::<M>() + slot_place(self.slot) + 3 + u16::from(at))

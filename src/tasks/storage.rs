@@ -102,9 +102,19 @@ impl Storage {
 
     /// Notes that these settings may have changed.
     pub fn note(&self, from: u8, count: u8) {
+        self.grow(from, count);
+        self.wake.signal();
+    }
+
+    /// Notes that these settings may have changed, without waking the task.
+    fn grow(&self, from: u8, count: u8) {
         self.from.set(self.from.get().min(from));
         self.to.set(self.to.get().max(from + count));
-        self.wake.signal();
+    }
+
+    /// Notes at start-up that any setting may have changed. The task looks before it waits.
+    pub fn note_at_start(&self) {
+        self.grow(0, ITEMS);
     }
 
     /// Notes that many settings change at once: those of the machine's profile, or all.
@@ -117,10 +127,11 @@ impl Storage {
         if change == Change::NONE {
             return;
         }
-        if change.is_of_all() {
-            self.forget_cold();
+        let all = change.is_of_all();
+        if all {
+            self.forgotten.set(Setting::WARM);
         }
-        self.note_change(change.is_of_all());
+        self.grow(0, if all { TO_ALL } else { TO_MACHINE });
     }
 
     /// Whether many settings change, and the record that says so is to be written next.
@@ -286,7 +297,6 @@ const BYTE_MS: u64 = 3;
 pub async fn run(links: &'static Links) -> ! {
     let mut memory = Eeprom::take();
     loop {
-        links.storage.wake.wait().await;
         while let Some(work) = links.storage.take() {
             let mut moved = 0;
             while let Some(put) = next(links, &memory, work, moved) {
@@ -316,6 +326,7 @@ pub async fn run(links: &'static Links) -> ! {
                 links.give_way(COURTESY, || true).await;
             }
         }
+        links.storage.wake.wait().await;
     }
 }
 
