@@ -68,6 +68,7 @@ mod arc_props;
 mod bed;
 mod builder;
 mod canon_props;
+mod card;
 mod chain;
 mod check;
 mod control;

@@ -12,9 +12,7 @@
 /// lines, and exec makes a normal segment where a long one does not fit (200). Another 100 are for two limits: that of
 /// a move which is too short for a ramp, and those of an arc whose path is measured in degrees.
 pub const FLASH: u64 = 253_800;
-/// Bytes of `.data`: constants that the compiler has put into RAM. Tables and text belong in program memory. In the
-/// image with an SD card the messages of `embedded-sdmmc`, which are never shown, take 240 of it; the other images have
-/// less than 400.
+/// Bytes of `.data`: constants that the compiler has put into RAM. Tables and text belong in program memory.
 pub const DATA: u64 = 500;
 /// Bytes of `.data` and `.bss` together, of the chip's 8192. The velocities beside the keys of the look-ahead take 130
 /// bytes. [`FREE_STACK`] remains beside the cap. The image for the board of the lathe reaches the cap: surface speed
