@@ -4,9 +4,10 @@
 //! in every line of a port that has received numbers and checksums. In other lines an asterisk is plain text. A port
 //! that has received numbers and checksums treats a line with only one of the two as damaged, because a transmission
 //! error may have changed the other. A line is also damaged if its number cannot be read, or if it has a byte 0,
-//! which does not change the checksum.
+//! which does not change the checksum. A second asterisk in a numbered line is a lost line end: the checksums of several
+//! lines may match together. Only texts and comments may have one. Then the second line is missing, and asked for.
 
-use super::command::split_digits;
+use super::command::{self, Bytes, split_digits};
 use crate::protocol::Span;
 
 /// What a port keeps about its sender.
@@ -81,7 +82,7 @@ impl Frame {
         let star = asterisk(line);
         let (text, stated) =
             line.split_at_checked(star.unwrap_or(line.len())).unwrap_or((line, &[]));
-        let sum = if star.is_some() { Sum::of(text, stated) } else { Sum::None };
+        let mut sum = if star.is_some() { Sum::of(text, stated) } else { Sum::None };
         let mut rest = text.trim_ascii();
         let mut number = None;
         let numbered = matches!(rest.first(), Some(b'N' | b'n'));
@@ -99,6 +100,9 @@ impl Frame {
             }
         }
         let rest = rest.trim_ascii();
+        if numbered && !command::is_text(rest) && Bytes::of(rest).any(|byte| byte == b'*') {
+            sum = Sum::Wrong;
+        }
         let start = rest.as_ptr().addr().wrapping_sub(line.as_ptr().addr());
         let end = start.wrapping_add(rest.len());
         Self { number, numbered, sum, block: Span { start: start as u8, end: end as u8 } }
@@ -271,6 +275,10 @@ mod tests {
         assert_eq!(parts("N M105"), (None, Sum::None, "N M105"));
         assert_eq!(parts("N1.5 M105"), (None, Sum::None, "N1.5 M105"));
         assert_eq!(parts("N2 G28\0*17").1, Sum::Wrong);
+        // Three lines without their ends have the checksum of one.
+        assert_eq!(parts("N2 G28*17N2 G28*17N2 G28*17").1, Sum::Wrong);
+        assert_eq!(parts("N2 G28 (2*3) ;2*3*43"), (Some(2), Sum::Right, "G28 (2*3) ;2*3"));
+        assert_eq!(parts("N2 M117 2*3*45"), (Some(2), Sum::Right, "M117 2*3"));
     }
 
     #[test]
