@@ -277,11 +277,17 @@ impl Host {
             ended = next == lines.len();
             let mut heard = self.quiet();
             let answered = heard.lines().filter(|line| line.starts_with("ok")).count();
-            if ended || answered < sent {
+            let polls = usize::from(ended || answered < sent);
+            if polls > 0 {
                 // What a host does that waits for an answer.
                 let poll: &[u8] = if self.random(2) == 0 { b"\n" } else { b"M105\n" };
                 self.machine.send(poll);
                 heard += &self.quiet();
+            }
+            let answered = heard.lines().filter(|line| line.starts_with("ok")).count();
+            if answered < sent + polls {
+                // Lines without an answer are sent again.
+                (next, ended) = (next - sent, false);
             }
             if let Some(again) =
                 heard.rsplit("Resend: ").next().filter(|_| heard.contains("Resend"))

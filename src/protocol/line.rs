@@ -18,14 +18,17 @@ impl Span {
     }
 }
 
-/// Whether a text has a checksum with a line number behind it. Then it is more than one line: an end has been lost.
+/// Whether a text has a checksum with a line number behind it, or with one byte between them. Then it is more than one
+/// line: an end has been lost or changed.
 #[small]
 pub fn is_joined(text: &[u8]) -> bool {
     let mut rest = text;
     while let Some(at) = rest.iter().position(|byte| *byte == b'*') {
         rest = rest.get(at + 1..).unwrap_or(&[]);
         let digits = rest.iter().take_while(|byte| byte.is_ascii_digit()).count();
-        if digits > 0 && rest.get(digits) == Some(&b'N') {
+        let behind = rest.get(digits..).unwrap_or(&[]);
+        let joins = matches!(behind, [b'N', b'0'..=b'9', ..] | [_, b'N', b'0'..=b'9', ..]);
+        if digits > 0 && joins {
             return true;
         }
     }

@@ -5,10 +5,10 @@
 //! that has received numbers and checksums treats a line with only one of the two as damaged, because a transmission
 //! error may have changed the other. A line is also damaged if its number cannot be read, or if it has a byte 0,
 //! which does not change the checksum. A second asterisk in a numbered line is a lost line end: the checksums of several
-//! lines may match together. Only texts and comments may have one. Then the second line is missing, and asked for.
+//! lines may match together. Only texts and comments may have one, if no line number is behind it.
 
 use super::command::{self, Bytes, split_digits};
-use crate::protocol::Span;
+use crate::protocol::{Span, is_joined};
 
 /// What a port keeps about its sender.
 #[derive(Clone, Copy, Default)]
@@ -100,7 +100,8 @@ impl Frame {
             }
         }
         let rest = rest.trim_ascii();
-        if numbered && !command::is_text(rest) && Bytes::of(rest).any(|byte| byte == b'*') {
+        let mut words = Bytes::of(if command::is_text(rest) { &[] } else { rest });
+        if numbered && (words.any(|byte| byte == b'*') || is_joined(text)) {
             sum = Sum::Wrong;
         }
         let start = rest.as_ptr().addr().wrapping_sub(line.as_ptr().addr());
@@ -278,6 +279,10 @@ mod tests {
         // Three lines without their ends have the checksum of one.
         assert_eq!(parts("N2 G28*17N2 G28*17N2 G28*17").1, Sum::Wrong);
         assert_eq!(parts("N2 G28 (2*3) ;2*3*43"), (Some(2), Sum::Right, "G28 (2*3) ;2*3"));
+        // By chance the second line with its checksum does not change that of the first.
+        for joined in ["N2 G28 ;*43N3 G1*12", "N2 M117 *43?N3 G1*63"] {
+            assert_eq!(parts(joined).1, Sum::Wrong);
+        }
         assert_eq!(parts("N2 M117 2*3*45"), (Some(2), Sum::Right, "M117 2*3"));
     }
 
