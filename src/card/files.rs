@@ -107,11 +107,6 @@ impl Card {
         status(Volume::delete(&found, &mut self.blocks))
     }
 
-    /// Whether a file is selected.
-    pub fn has_file(&self) -> bool {
-        self.file.is_some()
-    }
-
     /// Sets whether lines are taken from the file: M24, M25.
     pub fn print(&mut self, prints: bool) -> Status {
         if prints && self.file.is_none() {

@@ -53,10 +53,10 @@ impl Lent {
     /// velocities.
     #[inline(never)]
     pub fn notes(&self, from: u8, count: u8) -> bool {
-        if LENDS == 0 {
+        let lends = self.is_on();
+        if LENDS == 0 || (!lends && count != 1) {
             return false;
         }
-        let lends = self.is_on();
         for number in from..from.saturating_add(count) {
             if count == 1 || lends && Setting::from_number(number).is_some_and(Setting::is_velocity)
             {
