@@ -264,8 +264,8 @@ impl Host {
         let (mut next, mut ended) = (0, false);
         while !ended {
             let sent = (1 + self.random(4) as usize).min(lines.len() - next);
-            for n in next..next + sent {
-                let line = format!("N{n} {}", lines[n]);
+            for (n, block) in lines.iter().enumerate().skip(next).take(sent) {
+                let line = format!("N{n} {block}");
                 let sum = line.bytes().fold(0, |sum, byte| sum ^ byte);
                 let mut bytes = format!("{line}*{sum}\n").into_bytes();
                 if self.random(spoils) == 0 {
