@@ -147,7 +147,7 @@ impl Storage {
     }
 
     /// Returns the values that a row has in RAM: because it is lent, or because it is being saved.
-    #[inline(never)]
+    #[inline(always)]
     fn newer(&self, row: TableRow) -> Option<PerAxis<Length>> {
         if let Some(values) = self.lent.row().filter(|_| row == LENT) {
             return Some(values);
