@@ -508,7 +508,7 @@ impl Machine for View<'_> {
 
     #[cfg(feature = "dialect-reprap")]
     fn recall(&mut self) -> Status {
-        settings::recall(self)
+        extruder::recall(self)
     }
 
     #[cfg(feature = "dialect-reprap")]

@@ -6,14 +6,12 @@ use super::{View, set_hardware};
 use crate::baud;
 use crate::capability::Capability;
 use crate::config::Setting;
-use crate::hal::eeprom::Eeprom;
 use crate::motion::dynamics;
 use crate::protocol::{Remembers, Warning};
 use crate::status::Status;
-use crate::store::kept::{self, ITEMS};
+use crate::store::kept::ITEMS;
 use crate::tasks::drivers;
 use crate::tasks::heat;
-use crate::tasks::lent::LENT;
 use crate::tasks::links::Changes;
 use crate::tasks::spindle;
 use crate::tasks::turning;
@@ -75,29 +73,6 @@ pub(super) fn set(view: &mut View<'_>, setting: Setting, value: i32) -> Result<W
         false if view.settings.has_fast_search(setting) => Warning::Search,
         false => Warning::None,
     })
-}
-
-/// Gives back one setting that has been lent; when there is none left the row, and tells all parts.
-#[cfg(feature = "dialect-reprap")]
-#[small]
-#[inline(always)]
-pub(super) fn recall(view: &mut View<'_>) -> Status {
-    if view.is_busy() {
-        return Status::Again;
-    }
-    let storage = view.links.storage;
-    view.links.changes.note(Changes::STEPS | Changes::SETTINGS);
-    if let Some(setting) = storage.take_lent() {
-        view.settings.store(setting, kept::value(&storage.log(), &Eeprom::take(), setting));
-        return Status::Again;
-    }
-    set_hardware(view.links.thread, &view.settings);
-    storage.drop_row();
-    // The interpreter has the row's values, if they are those of the selected coordinate system.
-    match view.links.model.borrow_mut().set(LENT, 0, storage.value(LENT, 0)) {
-        Ok(()) => Status::Ok,
-        Err(status) => status,
-    }
 }
 
 /// Sets all settings to their defaults.
