@@ -69,6 +69,7 @@ mod bed;
 mod builder;
 mod cam_files;
 mod canon_props;
+mod card;
 mod chain;
 mod check;
 mod control;

@@ -2,7 +2,10 @@
 
 use std::thread;
 
-use kerf::hal::imp::Machine;
+use kerf::hal::imp::{Machine, eeprom};
+use kerf::heat::sensor::{Kind, reading};
+
+use crate::seeds::seeds;
 
 /// A host that has one line in flight, like printcore.
 struct Host {
@@ -194,10 +197,10 @@ fn a_stop_of_the_program_waits_for_m108() {
     host.machine.send(b"M0 Change the filament\nG1 X2\n");
     host.machine.run_ms(5_000);
     let heard = String::from_utf8(host.machine.received()).unwrap();
-    assert!(heard.contains("echo:busy: paused for user\n"), "{heard}");
+    assert!(heard.contains("//action:paused\necho:busy: paused for user\n"), "{heard}");
     assert!(heard.contains("echo:busy: processing\n") && !heard.contains("ok"), "{heard}");
     // The answer to M108 itself comes first, then those of the stop and the move.
-    assert_eq!(host.ask("M108"), "ok\n");
+    assert_eq!(host.ask("M108"), "//action:resumed\nok\n");
     assert_eq!(host.hear(), "ok\n");
     assert_eq!(host.hear(), "ok\n");
     assert_eq!(host.steps()[0], 2 * 1_280);
@@ -225,4 +228,235 @@ fn polls_overtake_a_full_queue() {
     let at = host.machine.emitted().position[0];
     host.machine.run_ms(1_000);
     assert_eq!(host.machine.emitted().position[0], at);
+}
+
+/// What happens to a line on its way: one byte of it, the line end too, is lost, doubled or changed.
+fn spoil(host: &mut Host, bytes: &mut Vec<u8>) {
+    let at = host.random(bytes.len() as u32) as usize;
+    match host.random(5) {
+        0 => drop(bytes.remove(at)),
+        1 => bytes.insert(at, bytes[at]),
+        2 => bytes[at] ^= 1 << host.random(8),
+        3 => bytes[at] = host.random(256) as u8,
+        // The line end of the last line: nothing comes behind it for a while.
+        _ => drop(bytes.pop()),
+    }
+}
+
+impl Host {
+    /// Returns what is heard until nothing comes for 20 ms.
+    fn quiet(&mut self) -> String {
+        let mut silent = 0;
+        let mut heard = std::mem::take(&mut self.heard);
+        while silent < 20 {
+            self.machine.run_ms(2);
+            let more = String::from_utf8_lossy(&self.machine.received()).into_owned();
+            silent = if more.is_empty() { silent + 2 } else { 0 };
+            heard += &more;
+        }
+        heard
+    }
+
+    /// Sends lines in bursts of up to four, and begins again where the machine asks for it. One line in `spoils` is
+    /// spoilt.
+    fn burst(&mut self, lines: &[String], spoils: u32) {
+        assert!(self.send(-1, "M110 N-1").ends_with("ok\n"));
+        let (mut next, mut ended) = (0, false);
+        while !ended {
+            let sent = (1 + self.random(4) as usize).min(lines.len() - next);
+            for (n, block) in lines.iter().enumerate().skip(next).take(sent) {
+                let line = format!("N{n} {block}");
+                let sum = line.bytes().fold(0, |sum, byte| sum ^ byte);
+                let mut bytes = format!("{line}*{sum}\n").into_bytes();
+                if self.random(spoils) == 0 {
+                    spoil(self, &mut bytes);
+                }
+                self.machine.send(&bytes);
+            }
+            next += sent;
+            ended = next == lines.len();
+            let mut heard = self.quiet();
+            let answered = heard.lines().filter(|line| line.starts_with("ok")).count();
+            let polls = usize::from(ended || answered < sent);
+            if polls > 0 {
+                // What a host does that waits for an answer.
+                let poll: &[u8] = if self.random(2) == 0 { b"\n" } else { b"M105\n" };
+                self.machine.send(poll);
+                heard += &self.quiet();
+            }
+            let answered = heard.lines().filter(|line| line.starts_with("ok")).count();
+            if answered < sent + polls {
+                // Lines without an answer are sent again.
+                (next, ended) = (next - sent, false);
+            }
+            if let Some(again) =
+                heard.rsplit("Resend: ").next().filter(|_| heard.contains("Resend"))
+            {
+                next = again.lines().next().unwrap().parse().unwrap();
+                ended = false;
+                self.resent += 1;
+            }
+        }
+    }
+}
+
+/// Each line runs once, whatever byte of it is lost, doubled or changed, its end too, and whatever has happened to the
+/// lines beside it. The moves of a session differ so much that no other set of them ends at the same place.
+#[test]
+fn each_line_runs_once_whatever_byte_is_lost() {
+    let mut host = Host::boot(0);
+    host.ask("G91");
+    let seeds = seeds(200);
+    let count = seeds.end - seeds.start;
+    for seed in seeds {
+        host.seed = (seed as u32).wrapping_mul(2_654_435_761);
+        host.ask("M400");
+        host.ask("G92 X0 Y0 Z0");
+        let mut lines = Vec::new();
+        let mut end = [0; 3];
+        for n in 0..12 {
+            let by = 3i32.pow(n / 3);
+            end[n as usize % 3] += by;
+            let axis = ["X", "Y", "Z"][n as usize % 3];
+            lines.push(match host.random(4) {
+                0 => format!("G1 {axis}{:.2} F6000 ; {n}*", f64::from(by) / 100.0),
+                1 => format!("G1 {axis}{:.2}", f64::from(by) / 100.0),
+                _ => format!("G1 {axis}{:.2} F6000", f64::from(by) / 100.0),
+            });
+            if host.random(8) == 0 {
+                lines.push("M117 2*3".to_string());
+            }
+        }
+        host.burst(&lines, 3);
+        host.ask("M400");
+        let place = host.ask("M114");
+        let [x, y, z] = end.map(|end| f64::from(end) / 100.0);
+        let expected = format!("X:{x:.3} Y:{y:.3} Z:{z:.3} ");
+        assert!(place.starts_with(&expected), "seed {seed}: {place} instead of {expected}");
+    }
+    println!("{count} sessions, {} lines asked for again", host.resent);
+    assert!(host.resent as u64 > count);
+}
+
+/// Lines whose ends are lost match a checksum by chance or by repetition.
+#[test]
+fn lines_without_ends_are_asked_for_again() {
+    let mut host = Host::boot(0);
+    let (mut matches, line) = (0, |n: u32, block: &str| {
+        let line = format!("N{n} {block}");
+        let sum = line.bytes().fold(0, |sum, byte| sum ^ byte);
+        format!("{line}*{sum}")
+    });
+    host.ask("G91");
+    assert_eq!(host.ask(&line(0, "M110 N0")), "ok\n");
+    let again = "Error:checksum mismatch, Last Line: 0\nResend: 1\nok\n";
+    for x in 0..600 {
+        let one = line(1, &format!("G1 X{x}"));
+        assert_eq!(host.ask(&format!("{one}{one}{one}")), again);
+        let [two, other] = [2, 3].map(|n| line(n, &format!("G1 X{}", x * n)));
+        for joined in [format!("{one}{two}"), format!("{one}{two}{other}")] {
+            let (text, stated) = joined.rsplit_once('*').unwrap();
+            matches +=
+                u32::from(text.bytes().fold(0, |sum, byte| sum ^ byte).to_string() == stated);
+            assert_eq!(host.ask(&joined), again, "{joined}");
+        }
+        let long = line(1, &format!("G1 X{x} {}", "Y1".repeat(20))).repeat(6);
+        assert_eq!(host.ask(&long), again, "{long}");
+    }
+    assert!(matches > 0, "no line has matched by chance");
+    assert_eq!(host.steps(), [0; 4]);
+}
+
+/// Plays lines on a machine that finds `kept` in its EEPROM, and returns the last answer and what is left.
+fn play(kept: Vec<u8>, lines: &'static [&'static str]) -> (String, Vec<u8>) {
+    let play = move || {
+        if !kept.is_empty() {
+            eeprom::put(&kept);
+        }
+        let mut host = Host::boot(0);
+        let mut last = String::new();
+        for line in lines {
+            match line.strip_prefix("2 ") {
+                Some(line) => host.machine.send_aux(format!("{line}\n").as_bytes()),
+                None => last = host.ask(line),
+            }
+            host.machine.run_ms(1_500);
+        }
+        (last, eeprom::contents())
+    };
+    thread::spawn(play).join().unwrap()
+}
+
+/// M92, M201, M203, M205 and M206 of a file last until the restart, unless M500 follows. What another sender sets
+/// meanwhile is kept.
+#[test]
+fn what_a_file_sets_is_kept_by_m500_alone() {
+    let (defaults, _) = play(Vec::new(), &["M503"]);
+    let (set, kept) = play(
+        Vec::new(),
+        &[
+            "M92 X123 E95",
+            "M201 X900",
+            "M203 Y2",
+            "M205 J0.07",
+            "M206 X1.5 Z2",
+            "2 {zjm:77}",
+            "M503",
+        ],
+    );
+    for part in ["M92 X123.000 ", " E95.000", "M201 X900.0", "J0.070", "M206 X1.500 Y0.000 Z2.000"]
+    {
+        assert!(set.contains(part), "{part}: {set}");
+    }
+    assert_eq!(play(kept.clone(), &["M503"]).0, defaults);
+    // Not even what is set besides stores it, and M501 brings the stored values back.
+    let (back, kept) = play(
+        kept,
+        &["M203 Y2", "M92 X123", "M206 X3", "2 {ych:n}", "2 {yam:1}", "2 {1mi:4}", "M501", "M503"],
+    );
+    assert!(back.contains("M206 X0.000") && !back.contains("X123.000"), "{back}");
+    let (aux, kept) = play(
+        kept,
+        &["M206 X1.5", "G92 X0", "M92 X123", "M201 X900", "M203 Y2", "M500", "M114", "M503"],
+    );
+    let (again, _) = play(kept, &["M503"]);
+    assert_eq!(aux, again);
+    assert!(again.contains("M92 X123.000") && again.contains("M206 X1.500"), "{again}");
+}
+
+/// M501 sets the origin back at once.
+#[test]
+fn m501_brings_the_origin_back() {
+    let mut host = Host::boot(0);
+    host.ask("M206 X1.5");
+    assert!(host.ask("M114").starts_with("X:-1.500 "));
+    assert_eq!(host.ask("M501"), "ok\n");
+    assert!(host.ask("M114").starts_with("X:0.000 "));
+}
+
+/// G10 with P is a temperature in the dialect of Duet's firmware.
+#[test]
+fn g10_with_p_is_a_temperature() {
+    let mut host = Host::boot(0);
+    host.machine.set_sensor(0, reading(Kind::Semitec, 25.0) as u16);
+    host.machine.run_ms(1_000);
+    assert_eq!(host.ask("M207 S5"), "ok\n");
+    for (line, target) in
+        [("G10 P0 S205", 205), ("G10 P0 R100", 205), ("G10 P0 S120 R100", 120), ("g10 p0 s0", 0)]
+    {
+        assert_eq!(host.ask(line), "ok\n", "{line}");
+        host.machine.run_ms(100);
+        let heat = host.ask("M105");
+        assert!(heat.contains(&format!(" /{target}.00 B:")), "{line}: {heat}");
+    }
+    for (line, answer) in [
+        ("G10 P1 S205", "echo:no such extruder\nok\n"),
+        ("G10 L2 P1 X5", "Error:a word belongs to no code\nok\n"),
+        ("G10 L20 X5", "Error:a word belongs to no code\nok\n"),
+    ] {
+        assert_eq!(host.ask(line), answer, "{line}");
+    }
+    assert_eq!(host.steps(), [0; 4]);
+    host.ask("G10");
+    assert_ne!(host.steps()[3], 0);
 }

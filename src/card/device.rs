@@ -1,15 +1,9 @@
 //! The card as a device with blocks of 512 bytes, accessed by SPI (SD Physical Layer, simplified, chapter 7).
 //!
 //! The answer to a command comes within some bytes. A block is requested (CMD17) and comes at most 100 ms later.
-//! [`Device::read`] waits for the block if it [is patient](set_patient). Otherwise it returns [`Fault::Later`], and has
-//! to be called again for this block. The card stays selected meanwhile.
+//! [`Blocks::read`] waits for the block if it is [patient](Blocks::patient). Otherwise it returns [`Fault::Later`], and
+//! has to be called again for this block. The card stays selected meanwhile.
 
-use core::cell::Cell;
-use core::fmt;
-
-use embedded_sdmmc::{Block, BlockCount, BlockDevice, BlockIdx};
-
-use crate::hal::byte::SharedByte;
 use crate::hal::{card, time::millis};
 
 /// Why a block is not available.
@@ -21,13 +15,8 @@ pub enum Fault {
     Failed,
 }
 
-impl fmt::Display for Fault {
-    fn fmt(&self, _: &mut fmt::Formatter<'_>) -> fmt::Result {
-        Ok(())
-    }
-}
-
-impl core::error::Error for Fault {}
+/// Bytes of a block.
+pub const BLOCK: usize = 512;
 
 /// The longest time until a requested block comes, and until the card is ready after power-up, ms.
 const BLOCK_MS: u32 = 100;
@@ -45,15 +34,6 @@ const ILLEGAL: u8 = 4;
 /// The number of attempts with CMD0.
 const TRIES: u8 = 10;
 
-/// Whether reads do not wait for a block. Not part of the device, because `embedded-sdmmc` forgets its cached block
-/// when it lends the device.
-static HASTE: SharedByte = SharedByte::new(0);
-
-/// Sets whether reads wait for blocks from now on. Thread mode.
-pub fn set_patient(patient: bool) {
-    HASTE.set((!patient).into());
-}
-
 /// The state of the card.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Stage {
@@ -65,24 +45,75 @@ enum Stage {
     Ready,
 }
 
-/// The card.
-#[derive(Debug)]
-pub struct Device {
-    stage: Stage,
-    /// Whether addresses count blocks, not bytes.
-    is_high: bool,
-    /// The block that has been requested, and the time of the request, ms.
-    awaited: Cell<Option<(u32, u32)>>,
+/// The card, and the block that was read last.
+pub struct Blocks {
+    device: Device,
+    /// Whether reads wait for blocks.
+    pub patient: bool,
+    number: Option<u32>,
+    bytes: [u8; BLOCK],
 }
 
 #[small]
-impl Device {
+impl Blocks {
+    /// Returns a card to which no command has been sent.
     pub const fn new() -> Self {
-        Self { stage: Stage::Fresh, is_high: false, awaited: Cell::new(None) }
+        Self { device: Device::new(), patient: true, number: None, bytes: [0; BLOCK] }
     }
 
     /// Makes one attempt to initialize the card. Returns whether it is ready.
     pub fn begin(&mut self) -> Result<bool, Fault> {
+        self.number = None;
+        self.device.begin()
+    }
+
+    /// Returns a block. Cost, unless it was read last: 25,000 cycles, and the time until the card has it.
+    #[inline(never)]
+    pub fn read(&mut self, block: u32) -> Result<&[u8; BLOCK], Fault> {
+        if self.number != Some(block) {
+            self.number = None;
+            self.device.read(block, &mut self.bytes, self.patient)?;
+            self.number = Some(block);
+        }
+        Ok(&self.bytes)
+    }
+
+    /// Takes the block that has been requested, if there is one: the card is not selected any more.
+    #[inline(never)]
+    pub fn settle(&mut self) {
+        if let Some((block, _)) = self.device.awaited {
+            let _ = self.read(block);
+        }
+    }
+
+    /// Changes a byte of a block on the card.
+    #[inline(never)]
+    pub fn change(&mut self, block: u32, at: u16, to: u8) -> Result<(), Fault> {
+        self.read(block)?;
+        if let Some(place) = self.bytes.get_mut(usize::from(at)) {
+            *place = to;
+        }
+        self.device.write(block, &self.bytes)
+    }
+}
+
+/// The card.
+struct Device {
+    stage: Stage,
+    /// Whether addresses count blocks, not bytes.
+    is_high: bool,
+    /// The block that has been requested, and the time of the request, ms.
+    awaited: Option<(u32, u32)>,
+}
+
+#[small]
+impl Device {
+    const fn new() -> Self {
+        Self { stage: Stage::Fresh, is_high: false, awaited: None }
+    }
+
+    /// Makes one attempt to initialize the card. Returns whether it is ready.
+    fn begin(&mut self) -> Result<bool, Fault> {
         let done = match self.stage {
             Stage::Fresh | Stage::Ready => self.reset(),
             Stage::Wakes(since, version_2) => self.wake(since, version_2),
@@ -97,7 +128,7 @@ impl Device {
     }
 
     fn reset(&mut self) -> Result<bool, Fault> {
-        self.awaited.set(None);
+        self.awaited = None;
         card::release();
         card::set_fast(false);
         // 80 clock cycles while no device is selected; the card needs 74.
@@ -121,7 +152,7 @@ impl Device {
             _ => return Err(Fault::Failed),
         }
         self.is_high = version_2 && command(58, 0) == 0 && word() & 1 << 30 != 0;
-        if !self.is_high && command(16, Block::LEN_U32) != 0 {
+        if !self.is_high && command(16, BLOCK as u32) != 0 {
             return Err(Fault::Failed);
         }
         card::release();
@@ -135,14 +166,11 @@ impl Device {
     }
 
     /// Requests a block, unless it has been requested already. Returns the time of the request, ms.
-    fn ask(&self, block: u32) -> Result<u32, Fault> {
-        match self.awaited.get() {
-            Some((awaited, since)) if awaited == block => return Ok(since),
-            // Another block was requested before and is not wanted any more. The card has to be initialized again.
-            Some(_) => return Err(Fault::Failed),
-            None => {}
+    fn ask(&mut self, block: u32, patient: bool) -> Result<u32, Fault> {
+        if let Some((_, since)) = self.awaited {
+            return Ok(since);
         }
-        if HASTE.get() != 0 && card::is_wanted() {
+        if !patient && card::is_wanted() {
             // A sensor on the SPI has priority.
             return Err(Fault::Later);
         }
@@ -150,35 +178,35 @@ impl Device {
             return Err(Fault::Failed);
         }
         let now = millis();
-        self.awaited.set(Some((block, now)));
+        self.awaited = Some((block, now));
         Ok(now)
     }
 
-    fn fetch(&self, block: u32, place: &mut Block) -> Result<(), Fault> {
-        let since = self.ask(block)?;
+    fn fetch(&mut self, block: u32, place: &mut [u8; BLOCK], patient: bool) -> Result<(), Fault> {
+        let since = self.ask(block, patient)?;
         loop {
             match (0..LOOKS).map(|_| card::exchange(0xFF)).find(|byte| *byte != 0xFF) {
                 Some(START) => break,
                 Some(_) => return Err(Fault::Failed),
                 None if millis().wrapping_sub(since) > BLOCK_MS => return Err(Fault::Failed),
-                None if HASTE.get() != 0 => return Err(Fault::Later),
+                None if !patient => return Err(Fault::Later),
                 None => {}
             }
         }
-        card::read(&mut place.contents);
+        card::read(place);
         // The checksum, which is not checked.
         card::exchange(0xFF);
         card::exchange(0xFF);
         Ok(())
     }
 
-    fn put(&self, block: u32, from: &Block) -> Result<(), Fault> {
+    fn put(&self, block: u32, from: &[u8; BLOCK]) -> Result<(), Fault> {
         if self.stage != Stage::Ready || command(24, self.address(block)) != 0 {
             return Err(Fault::Failed);
         }
         card::exchange(0xFF);
         card::exchange(START);
-        from.contents.iter().for_each(|byte| _ = card::exchange(*byte));
+        from.iter().for_each(|byte| _ = card::exchange(*byte));
         card::exchange(0xFF);
         card::exchange(0xFF);
         if card::exchange(0xFF) & 0x1F != 5 {
@@ -194,33 +222,29 @@ impl Device {
     }
 
     /// Ends a command: deselects the card, unless a block is still to come.
-    fn end(&self, done: Result<(), Fault>) -> Result<(), Fault> {
+    fn end(&mut self, done: Result<(), Fault>) -> Result<(), Fault> {
         if done != Err(Fault::Later) {
-            self.awaited.set(None);
+            self.awaited = None;
             card::release();
         }
         done
     }
-}
-
-impl BlockDevice for Device {
-    type Error = Fault;
 
     #[inline(never)]
-    fn read(&self, blocks: &mut [Block], first: BlockIdx) -> Result<(), Fault> {
-        // The cache of `embedded-sdmmc` has one block.
-        let Some(place) = blocks.first_mut() else { return Ok(()) };
-        self.end(self.fetch(first.0, place))
+    fn read(&mut self, block: u32, place: &mut [u8; BLOCK], patient: bool) -> Result<(), Fault> {
+        if let Some((other, _)) = self.awaited.filter(|(awaited, _)| *awaited != block) {
+            // Another block was requested before and is not wanted any more. The card sends it first.
+            let done = self.fetch(other, place, true);
+            self.end(done)?;
+        }
+        let done = self.fetch(block, place, patient);
+        self.end(done)
     }
 
     #[inline(never)]
-    fn write(&self, blocks: &[Block], first: BlockIdx) -> Result<(), Fault> {
-        let Some(from) = blocks.first() else { return Ok(()) };
-        self.end(self.put(first.0, from))
-    }
-
-    fn num_blocks(&self) -> Result<BlockCount, Fault> {
-        Ok(BlockCount(u32::MAX))
+    fn write(&mut self, block: u32, from: &[u8; BLOCK]) -> Result<(), Fault> {
+        let done = self.put(block, from);
+        self.end(done)
     }
 }
 

@@ -1,36 +1,18 @@
 //! The files of a card, and the lines of the file that is printed.
 
-use embedded_sdmmc::{
-    Mode, RawDirectory, RawFile, RawVolume, TimeSource, Timestamp, VolumeIdx, VolumeManager,
-};
-use heapless::{String, Vec};
+use heapless::Vec;
 
-use super::device::{Device, Fault, set_patient};
+use super::device::{BLOCK, Blocks, Fault};
+use super::fat::{File, Found, HIDDEN, Volume};
 use super::{Entry, NAME_MAX};
 use crate::status::Status;
 
 /// The longest line, without its comment.
 pub const LINE_MAX: usize = 80;
-
-type Manager = VolumeManager<Device, NoClock, 1, 1, 1>;
-type Error = embedded_sdmmc::Error<Fault>;
-
-/// The board has no clock, so files keep their times.
-#[derive(Debug)]
-struct NoClock;
-
-impl TimeSource for NoClock {
-    fn get_timestamp(&self) -> Timestamp {
-        Timestamp {
-            year_since_1970: 0,
-            zero_indexed_month: 0,
-            zero_indexed_day: 0,
-            hours: 0,
-            minutes: 0,
-            seconds: 0,
-        }
-    }
-}
+/// The most bytes that are read at once.
+const PIECE: usize = 40;
+/// The most clusters over which the chain of a file is followed at once.
+const LINKS: u8 = 32;
 
 /// The result of reading a part of a line.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -51,9 +33,9 @@ pub enum Line {
 
 /// The card and its open file: see the [parent module](super).
 pub struct Card {
-    manager: Manager,
-    root: Option<(RawVolume, RawDirectory)>,
-    file: Option<RawFile>,
+    blocks: Blocks,
+    volume: Option<Volume>,
+    file: Option<File>,
     /// Whether lines are taken from the file.
     prints: bool,
     /// Whether the rest of the line is skipped, because it is a comment or too long.
@@ -69,8 +51,8 @@ impl Card {
     /// Returns a card that has not been initialized.
     pub fn new() -> Self {
         Self {
-            manager: Manager::new_with_limits(Device::new(), NoClock, 1),
-            root: None,
+            blocks: Blocks::new(),
+            volume: None,
             file: None,
             prints: false,
             skips: false,
@@ -83,60 +65,46 @@ impl Card {
     #[inline(never)]
     pub fn begin(&mut self) -> Status {
         self.release();
-        match self.manager.device(|device| device.begin()) {
-            Ok(true) => {}
-            Ok(false) => return Status::Again,
-            Err(_) => return Status::CardError,
+        let begun = self.blocks.begin();
+        if begun == Ok(false) {
+            return Status::Again;
         }
-        let opened = self.manager.open_raw_volume(VolumeIdx(0)).and_then(|volume| {
-            let root = self.manager.open_root_dir(volume)?;
-            self.root = Some((volume, root));
-            Ok(())
-        });
+        let opened = begun.and_then(|_| Volume::open(&mut self.blocks));
+        self.volume = opened.ok();
         status(opened)
     }
 
     /// Releases the card, M22.
-    #[inline(never)]
     pub fn release(&mut self) {
         self.close();
-        if let Some((volume, root)) = self.root.take() {
-            let _ = self.manager.close_dir(root);
-            let _ = self.manager.close_volume(volume);
-        }
+        self.volume = None;
     }
 
     /// Closes the selected file, if there is one: the print has ended.
     pub fn close(&mut self) {
         (self.prints, self.jumps) = (false, true);
-        if let Some(file) = self.file.take() {
-            let _ = self.manager.close_file(file);
-        }
+        self.file = None;
+        self.blocks.settle();
     }
 
     /// Selects a file, M23.
     #[inline(never)]
     pub fn open(&mut self, name: &[u8]) -> Status {
         self.close();
-        let Some((_, root)) = self.root else { return Status::CardError };
-        let Some(name) = text(name) else { return Status::CardError };
-        match self.manager.open_file_in_dir(root, name.as_str(), Mode::ReadOnly) {
-            Ok(file) => {
-                self.file = Some(file);
-                (self.skips, self.is_long) = (false, false);
-                Status::Ok
-            }
-            Err(_) => Status::CardError,
-        }
+        let Ok(found) = self.find(name) else { return Status::CardError };
+        self.file = Some(File::new(found));
+        (self.skips, self.is_long) = (false, false);
+        Status::Ok
     }
 
     /// Deletes a file, M30, unless it is selected.
     #[inline(never)]
     pub fn delete(&mut self, name: &[u8]) -> Status {
-        let Some((_, root)) = self.root else { return Status::CardError };
-        let Some(name) = text(name) else { return Status::CardError };
-        let done = self.manager.delete_entry_in_dir(root, name.as_str());
-        status(done)
+        let Ok(found) = self.find(name) else { return Status::CardError };
+        if self.file.is_some_and(|file| file.found.place == found.place) {
+            return Status::CardError;
+        }
+        status(Volume::delete(&found, &mut self.blocks))
     }
 
     /// Sets whether lines are taken from the file: M24, M25.
@@ -145,6 +113,10 @@ impl Card {
             return Status::CardError;
         }
         self.prints = prints;
+        if !prints {
+            // While the card is selected the sensor on the same lines cannot be read.
+            self.blocks.settle();
+        }
         Status::Ok
     }
 
@@ -155,59 +127,73 @@ impl Card {
 
     /// Moves to a byte of the file, M26.
     pub fn seek(&mut self, at: u32) -> Status {
-        let Some(file) = self.file else { return Status::CardError };
+        let Some(file) = self.file.as_mut().filter(|file| at <= file.found.entry.size) else {
+            return Status::CardError;
+        };
+        file.at = at;
         (self.skips, self.is_long, self.jumps) = (false, false, true);
-        let done = self.manager.file_seek_from_start(file, at);
-        status(done)
+        Status::Ok
     }
 
     /// Returns the position of the next byte of the file, and the length of the file. `None` without a file.
     pub fn progress(&self) -> Option<(u32, u32)> {
-        let file = self.file?;
-        Some((self.manager.file_offset(file).ok()?, self.manager.file_length(file).ok()?))
+        self.file.map(|file| (file.at, file.found.entry.size))
     }
 
     /// Returns the file with this number in the root directory. `Err`: the card cannot be read.
     #[inline(never)]
     pub fn entry(&mut self, number: u8) -> Result<Option<Entry>, Status> {
-        let Some((_, root)) = self.root else { return Err(Status::CardError) };
-        let (mut left, mut found) = (number, None);
-        let done = self.manager.iterate_dir(root, |entry| {
-            let flags = entry.attributes;
-            let hides = flags.is_volume() || flags.is_directory() || flags.is_hidden();
-            if hides || found.is_some() {
-                return core::ops::ControlFlow::Continue(());
-            }
-            if left == 0 {
-                found = Some(named(&entry.name, entry.size));
-            }
-            left = left.wrapping_sub(1);
-            core::ops::ControlFlow::Continue(())
+        let mut left = number;
+        let found = self.search(|found| {
+            let is_listed = !found.is_folder() && found.attributes & HIDDEN == 0;
+            let is_it = is_listed && left == 0;
+            left = left.wrapping_sub(is_listed.into());
+            is_it
         });
-        done.map(|()| found).map_err(|_| Status::CardError)
+        found.map(|found| found.map(|found| found.entry)).map_err(|_| Status::CardError)
+    }
+
+    /// Returns the file with this name.
+    #[inline(never)]
+    fn find(&mut self, name: &[u8]) -> Result<Found, Fault> {
+        let found = self.search(|found| {
+            let kept = found.entry.name.iter().position(|letter| *letter == 0).unwrap_or(NAME_MAX);
+            found.entry.name.get(..kept).is_some_and(|kept| kept.eq_ignore_ascii_case(name))
+        })?;
+        found.filter(|found| !found.is_folder()).ok_or(Fault::Failed)
+    }
+
+    /// Returns the first entry of the root directory for which `is_it` returns true.
+    fn search(&mut self, mut is_it: impl FnMut(&Found) -> bool) -> Result<Option<Found>, Fault> {
+        let volume = self.volume.ok_or(Fault::Failed)?;
+        let mut at = volume.root()?;
+        loop {
+            let found = volume.entry(&mut at, &mut self.blocks)?;
+            if found.is_none_or(|found| is_it(&found)) {
+                return Ok(found);
+            }
+        }
     }
 
     /// Reads the next part of the line that is being printed. Cost: 3,000 cycles, with a new block 25,000 more.
     #[inline(never)]
     pub fn line(&mut self, line: &mut Vec<u8, LINE_MAX>) -> Line {
-        let Some(file) = self.file else { return Line::Failed };
         if core::mem::take(&mut self.jumps) {
             line.clear();
         }
-        let mut piece = [0; PIECE];
         let Some((at, size)) = self.progress() else { return Line::Failed };
         if at >= size {
             return if line.is_empty() { Line::End } else { Line::Whole };
         }
-        let in_block = BLOCK - at % BLOCK;
-        let wanted = piece.len().min(in_block as usize);
-        set_patient(false);
-        let read = self.manager.read(file, piece.get_mut(..wanted).unwrap_or(&mut []));
-        set_patient(true);
+        let mut piece = [0; PIECE];
+        self.blocks.patient = false;
+        let read = self.piece(&mut piece);
+        self.blocks.patient = true;
         let read = match read {
+            Ok(0) => return Line::More,
             Ok(read) => read,
-            Err(Error::DeviceError(Fault::Later)) => return Line::Later,
-            Err(_) => return Line::Failed,
+            Err(Fault::Later) => return Line::Later,
+            Err(Fault::Failed) => return Line::Failed,
         };
         let piece = piece.get(..read).unwrap_or(&[]);
         let end = piece.iter().position(|byte| *byte == b'\n');
@@ -215,8 +201,8 @@ impl Card {
         for byte in piece.iter().take(taken) {
             self.take(*byte, line);
         }
-        if taken < read {
-            let _ = self.manager.file_seek_from_start(file, at + taken as u32);
+        if let Some(file) = &mut self.file {
+            file.at = at + taken as u32;
         }
         match end {
             None => Line::More,
@@ -228,6 +214,23 @@ impl Card {
                 if core::mem::take(&mut self.is_long) { Line::Long } else { Line::Whole }
             }
         }
+    }
+
+    /// Copies the next bytes of the file, up to the end of a block at most. Returns their number. 0: the chain of
+    /// clusters has not been followed far enough yet.
+    #[inline(never)]
+    fn piece(&mut self, to: &mut [u8; PIECE]) -> Result<usize, Fault> {
+        let volume = self.volume.ok_or(Fault::Failed)?;
+        let file = self.file.as_mut().ok_or(Fault::Failed)?;
+        let Some(block) = file.block(&volume, LINKS, &mut self.blocks)? else { return Ok(0) };
+        let bytes = self.blocks.read(block)?.get((file.at % BLOCK as u32) as usize..);
+        let bytes = bytes.unwrap_or(&[]);
+        let left = file.found.entry.size.saturating_sub(file.at).min(PIECE as u32) as usize;
+        let read = bytes.len().min(left);
+        for (place, byte) in to.iter_mut().zip(bytes).take(read) {
+            *place = *byte;
+        }
+        Ok(read)
     }
 
     fn take(&mut self, byte: u8, line: &mut Vec<u8, LINE_MAX>) {
@@ -246,35 +249,7 @@ impl Default for Card {
     }
 }
 
-/// The most bytes that are read at once.
-const PIECE: usize = 40;
-const BLOCK: u32 = 512;
-
 #[small]
-fn status<T>(done: Result<T, Error>) -> Status {
+fn status<T>(done: Result<T, Fault>) -> Status {
     if done.is_ok() { Status::Ok } else { Status::CardError }
-}
-
-#[small]
-fn named(name: &embedded_sdmmc::ShortFileName, size: u32) -> Entry {
-    let mut entry = Entry { name: [0; NAME_MAX], size };
-    let (base, extension) = (name.base_name(), name.extension());
-    let point: &[u8] = if extension.is_empty() { b"" } else { b"." };
-    let letters = base.iter().chain(point).chain(extension);
-    for (place, letter) in entry.name.iter_mut().zip(letters) {
-        *place = *letter;
-    }
-    entry
-}
-
-/// Returns a short name as text. The function of the standard library is not used, because its table of UTF-8 would be
-/// in RAM.
-#[small]
-fn text(name: &[u8]) -> Option<String<NAME_MAX>> {
-    let mut text = String::new();
-    for letter in name {
-        let is_known = letter.is_ascii_graphic();
-        text.push(char::from(*letter)).ok().filter(|()| is_known)?;
-    }
-    Some(text)
 }

@@ -1,7 +1,8 @@
 //! An SD card: its files, and the file that is being printed.
 //!
-//! Owned by thread mode; only the parser task calls it. `embedded-sdmmc` reads FAT16 and FAT32 and keeps one block of
-//! 512 bytes; `device` reads the blocks. Only files in the root directory are visible, by their short names.
+//! Owned by thread mode; only the parser task calls it. `fat` finds files on FAT16 and FAT32, `device` reads blocks and
+//! keeps one of 512 bytes. Only files in the root directory are visible, by their short names. A card may hold
+//! anything: a volume with impossible sizes, and chains of clusters without an end, are refused within bounded work.
 //!
 //! A line of the printed file is read in place, up to its end or to the end of a block. If another block is needed
 //! first, it is requested from the card, and `Line::Later` says so. So no task waits for the card, except for the 1.5
@@ -10,6 +11,8 @@
 
 #[cfg(feature = "sd")]
 mod device;
+#[cfg(feature = "sd")]
+mod fat;
 #[cfg(feature = "sd")]
 mod files;
 

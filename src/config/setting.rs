@@ -428,6 +428,13 @@ impl Setting {
         self == Self::MACHINE
     }
 
+    /// Whether this is a velocity limit of an axis, `vm` or `fr`, which a change of another setting may lower.
+    pub fn is_velocity(self) -> bool {
+        let row = self.row();
+        let is_limit = row.kind == Kind::Large && matches!(row.slot, axis::VM | axis::FR);
+        is_limit && matches!(self.owner(), Owner::Axis(_))
+    }
+
     /// Whether this is `spw`, the width of step pulses.
     pub fn is_pulse_width(self) -> bool {
         self.0 == const { row_of(&system::LIST, "spw") }

@@ -18,6 +18,23 @@ impl Span {
     }
 }
 
+/// Whether a text has a checksum with a line number behind it, or with one byte between them. Then it is more than one
+/// line: an end has been lost or changed.
+#[small]
+pub fn is_joined(text: &[u8]) -> bool {
+    let mut rest = text;
+    while let Some(at) = rest.iter().position(|byte| *byte == b'*') {
+        rest = rest.get(at + 1..).unwrap_or(&[]);
+        let digits = rest.iter().take_while(|byte| byte.is_ascii_digit()).count();
+        let behind = rest.get(digits..).unwrap_or(&[]);
+        let joins = matches!(behind, [b'N', b'0'..=b'9', ..] | [_, b'N', b'0'..=b'9', ..]);
+        if digits > 0 && joins {
+            return true;
+        }
+    }
+    false
+}
+
 /// What the caller of [`Answers::step`](super::Answers::step) does next.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Next {

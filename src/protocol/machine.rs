@@ -115,6 +115,20 @@ pub trait Machine {
     /// Sets a value of the interpreter's tables. [`Status::Again`]: nothing is changed; try again when the tables are
     /// ready.
     fn set_row(&mut self, row: TableRow, axis: u8, value: Length) -> Result<(), Status>;
+    /// Whether settings and rows that are set from now on last until the next start only, unless [`Self::keep`] stores
+    /// them. What is set otherwise is stored at once.
+    fn lend(&mut self, on: bool) {
+        let _ = on;
+    }
+    /// Orders to be stored what has been lent. [`Status::Again`]: nothing is ordered; try again later.
+    fn keep(&mut self) -> Status {
+        Status::Ok
+    }
+    /// Takes back one setting that has been lent, so that it has its stored value again. [`Status::Again`]: there are
+    /// more, or the machine does not rest.
+    fn recall(&mut self) -> Status {
+        Status::Ok
+    }
     /// Sets the tool length on one axis, as G43.1 does.
     fn set_tool_length(&mut self, axis: u8, length: Length) -> Result<(), Status>;
     /// Returns the current value, in the unit that [`Value`] states.

@@ -45,7 +45,7 @@ pub use dialect::{
     Answers, Dialect, Memory, Remembers, Request, Speech, Telling, Tells, asks_alarm, is_control,
     jog, may_be_control,
 };
-pub use line::{Ending, Next, Span};
+pub use line::{Ending, Next, Span, is_joined};
 pub use machine::{Cold, Extruder, Hold, Level, Machine, STARTUP_MAX, Store, Warning};
 pub use notice::{Notice, Occasion};
 pub use out::Out;

@@ -25,7 +25,7 @@ use crate::hal::serial::TAKEN_RETURN;
 use crate::hal::text::copy_printing;
 use crate::machine::Alarm;
 use crate::machine::alarm::is_program_end;
-use crate::protocol::{asks_alarm, is_control, may_be_control};
+use crate::protocol::{asks_alarm, is_control, is_joined, may_be_control};
 use crate::realtime::ASCII;
 use crate::status::Status;
 
@@ -376,7 +376,7 @@ impl LinePool {
                 self.partial += 1;
             }
             _ => {
-                self.spoil(Status::InputTooLong);
+                self.spoil(self.why_too_long());
                 self.pass(1);
             }
         }
@@ -465,6 +465,14 @@ impl LinePool {
         self.bytes.copy_within(usize::from(self.start)..at, 0);
         self.end -= self.start;
         at - usize::from(core::mem::take(&mut self.start))
+    }
+
+    /// Returns why the line that is coming in is too long: because of lost line ends, or because it is.
+    #[cold]
+    #[inline(never)]
+    fn why_too_long(&self) -> Status {
+        let joined = self.is_plain() && is_joined(self.slice(self.end.into(), self.partial));
+        if joined { Status::BufferFull } else { Status::InputTooLong }
     }
 
     /// Gives up the line that is coming in: it will be answered with `status`.

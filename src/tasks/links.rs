@@ -8,7 +8,7 @@
 //! | block ring | blocks | 61 | 2,079 B with the speed constraints | planner | exec | the planner waits; `commands` stays taken |
 //! | segment ring | segments | 7 | 131 B | exec | step interrupt | exec waits for its next run |
 //! | `uart` transmit ring | bytes | 127 each port | 131 B each | parser, reporter | TX interrupt | parser: the port waits, response half sent; reporter: waits |
-//! | [`Links::storage`] | which settings to look at, a row of the tables | a range, 1 | 46 B | parser | storage | the range grows; a line that changes another row waits |
+//! | [`Links::storage`] | which settings to look at, a row of the tables; what printing hosts have set until the next start | a range, 1; all, 1 | 46 B, 50 B | parser | storage | the range grows; a line that changes another row waits |
 //! | [`Links::rate`] | a new rate of the line | 1 | 6 B | parser | parser | overwritten: the newest counts |
 //! | [`Port::seen`] | the state of the machine when the report under way first read motion | 1 | 33 B each port | the task that reports on the port | that task | overwritten |
 //! | [`Links::restart`] | a reset that is due | 1 | 1 B | parser | parser | overwritten |

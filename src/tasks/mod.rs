@@ -17,6 +17,7 @@ pub mod heat;
 pub mod hold;
 mod homing;
 mod jog;
+mod lent;
 pub mod lines;
 pub mod links;
 pub mod overrides;

@@ -13,6 +13,7 @@
 
 use core::cell::Cell;
 
+use super::lent::{LENT, Lent};
 use super::links::Links;
 use super::ports::COURTESY;
 use super::wake::Wake;
@@ -55,6 +56,8 @@ pub struct Storage {
     forgotten: Cell<u8>,
     /// The program that is being stored, as far as it has come.
     program: Cell<Option<Program>>,
+    /// What is not to be saved.
+    lent: Lent,
     /// A line waits until a row or a setting has been saved.
     awaited: Cell<bool>,
     wake: Wake,
@@ -90,6 +93,7 @@ impl Storage {
             cold: Cell::new(None),
             forgotten: Cell::new(Setting::COLD),
             program: Cell::new(None),
+            lent: Lent::new(),
             awaited: Cell::new(false),
             wake: Wake::default(),
         }
@@ -100,8 +104,11 @@ impl Storage {
         self.log.get()
     }
 
-    /// Notes that these settings may have changed.
+    /// Notes that these settings may have changed. While the machine lends they are not to be saved.
     pub fn note(&self, from: u8, count: u8) {
+        if self.lent.notes(from, count) {
+            return;
+        }
         self.grow(from, count);
         self.wake.signal();
     }
@@ -147,6 +154,55 @@ impl Storage {
         }
     }
 
+    /// Whether settings and rows that change from now on are lent.
+    #[cfg(feature = "dialect-reprap")]
+    pub fn lend(&self, on: bool) {
+        self.lent.lend(on);
+    }
+
+    /// Makes all settings in RAM those to be saved.
+    pub fn own(&self) {
+        self.lent.clear();
+    }
+
+    /// Orders all that is lent to be saved, or returns [`Status::Again`] while there is no room for the row.
+    #[cfg(feature = "dialect-reprap")]
+    pub fn keep(&self) -> Status {
+        if let Some(values) = self.lent.row() {
+            if self.edit.get().is_some() {
+                return Status::Again;
+            }
+            self.edit.set(Some(Edit { row: LENT, values }));
+            self.lent.put_row(None);
+            self.wake.signal();
+        }
+        if self.lent.clear() {
+            self.note(0, ITEMS);
+        }
+        Status::Ok
+    }
+
+    /// Returns a setting that is lent, which is not from now on.
+    #[cfg(feature = "dialect-reprap")]
+    pub fn take_lent(&self) -> Option<Setting> {
+        self.lent.take()
+    }
+
+    /// Forgets the values of the row that is lent.
+    #[cfg(feature = "dialect-reprap")]
+    pub fn drop_row(&self) {
+        self.lent.put_row(None);
+    }
+
+    /// Returns the values that a row has in RAM: because it is lent, or because it is being saved.
+    #[inline(always)]
+    fn newer(&self, row: TableRow) -> Option<PerAxis<Length>> {
+        if let Some(values) = self.lent.row().filter(|_| row == LENT) {
+            return Some(values);
+        }
+        self.edit.get().filter(|edit| edit.row == row).map(|edit| edit.values)
+    }
+
     /// Whether a line waits for a row to be saved. The parser is woken then.
     pub fn is_awaited(&self) -> bool {
         self.awaited.get()
@@ -162,11 +218,9 @@ impl Storage {
     /// Returns a value of a row. Cost: that of [`Tables::row`].
     #[inline(never)]
     pub fn value(&self, row: TableRow, axis: u8) -> Length {
-        match self.edit.get() {
-            Some(edit) if edit.row == row => {
-                edit.values.get(usize::from(axis)).copied().unwrap_or_default()
-            }
-            _ => tables::value(&self.log.get(), &Eeprom::take(), row, axis),
+        match self.newer(row) {
+            Some(values) => values.get(usize::from(axis)).copied().unwrap_or_default(),
+            None => tables::value(&self.log.get(), &Eeprom::take(), row, axis),
         }
     }
 
@@ -261,9 +315,9 @@ impl Storage {
 impl Tables for &Storage {
     #[inline(never)]
     fn row(&self, row: TableRow) -> PerAxis<Length> {
-        match self.edit.get() {
-            Some(edit) if edit.row == row => edit.values,
-            _ => tables::row(&self.log.get(), &Eeprom::take(), row),
+        match self.newer(row) {
+            Some(values) => values,
+            None => tables::row(&self.log.get(), &Eeprom::take(), row),
         }
     }
 
@@ -283,6 +337,9 @@ impl Tables for &Storage {
     fn apply(&mut self, edit: &Edit) {
         // A line that is only checked changes no table.
         if machine::is_checking() {
+            return;
+        }
+        if edit.row == LENT && self.lent.put(edit.values) {
             return;
         }
         self.edit.set(Some(*edit));
@@ -344,6 +401,7 @@ fn next(links: &Links, memory: &Eeprom, work: Work, moved: u16) -> Option<Put> {
         }
         // Many settings have changed anew: the record of that change is first.
         Work::Item(_) if links.storage.begins() => return None,
+        Work::Item(number) if links.storage.lent.has(number) => return None,
         Work::Item(number) => item(links, &log, memory, number)?,
     };
     let put = log.put(memory, key, value, moved);

@@ -264,11 +264,12 @@ impl<'a> View<'a> {
         Status::Ok
     }
 
-    /// Orders a setting to be saved; or all of them, if the setting has changed `others`.
+    /// Orders a setting to be saved, and if it has changed `others` also those that may have changed.
     fn note(&self, setting: Setting, others: bool) {
-        match others {
-            true => self.links.storage.note(0, ITEMS),
-            false => self.links.storage.note(setting.number(), 1),
+        let storage = self.links.storage;
+        storage.note(setting.number(), 1);
+        if others {
+            storage.note(0, ITEMS);
         }
     }
 
@@ -490,6 +491,21 @@ impl Machine for View<'_> {
     #[cfg(feature = "dialect-reprap")]
     fn clear_shift(&mut self, axes: u8) {
         self.links.model.borrow_mut().clear_shift(axes);
+    }
+
+    #[cfg(feature = "dialect-reprap")]
+    fn lend(&mut self, on: bool) {
+        self.links.storage.lend(on);
+    }
+
+    #[cfg(feature = "dialect-reprap")]
+    fn keep(&mut self) -> Status {
+        self.links.storage.keep()
+    }
+
+    #[cfg(feature = "dialect-reprap")]
+    fn recall(&mut self) -> Status {
+        extruder::recall(self)
     }
 
     #[cfg(feature = "dialect-reprap")]

@@ -16,9 +16,7 @@ pub const FLASH: u64 = 253_800;
 /// entries that lead from its own defaults back to those of `careful` (`config::machines::ADDS`). `cargo xtask test`
 /// measures them on one board. Each other board must leave so much room that it fits with every profile.
 pub const PROFILE: u64 = 100;
-/// Bytes of `.data`: constants that the compiler has put into RAM. Tables and text belong in program memory. In the
-/// image with an SD card the messages of `embedded-sdmmc`, which are never shown, take 240 of it; the other images have
-/// less than 400.
+/// Bytes of `.data`: constants that the compiler has put into RAM. Tables and text belong in program memory.
 pub const DATA: u64 = 500;
 /// Bytes of `.data` and `.bss` together, of the chip's 8192. The velocities beside the keys of the look-ahead take 130
 /// bytes. [`FREE_STACK`] remains beside the cap. The image for the board of the lathe reaches the cap: surface speed

@@ -6,7 +6,7 @@ use avr_embassy::Thread;
 use avr_embassy::host::Runtime;
 use embassy_executor::Spawner;
 
-use super::{clock, encoder, heaters, inputs, now, stepper, time, uart};
+use super::{card, clock, encoder, heaters, inputs, now, stepper, time, uart};
 use crate::hal::event::{self, Event};
 use crate::hal::serial::{AUX, USB};
 
@@ -113,6 +113,16 @@ impl Machine {
     /// Returns which heaters are on: bits 0 hot end, 1 bed, 2 fan.
     pub fn heaters_on(&self) -> u8 {
         heaters::on()
+    }
+
+    /// Puts an SD card with these blocks into the slot, or takes it out.
+    pub fn insert_card(&self, blocks: Option<card::Blocks>) {
+        card::insert(blocks);
+    }
+
+    /// Returns how many blocks of cards have been read so far.
+    pub fn card_reads(&self) -> u32 {
+        card::reads()
     }
 
     /// Runs for `ms` milliseconds.

@@ -27,7 +27,6 @@
 
 #[path = "../host/arithmetic.rs"]
 pub mod arithmetic;
-#[path = "../host/card.rs"]
 pub mod card;
 pub mod drivers;
 pub mod eeprom;

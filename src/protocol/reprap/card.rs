@@ -1,7 +1,7 @@
 //! Files on an SD card: M20 to M27, M30 with a name, M32. While a file is printed only M24 to M27 are carried out.
 
 use super::command::{value, words};
-use super::host::Step;
+use super::host::{self, Step};
 use super::write::{int, line_end, text};
 use crate::capability::Capability;
 use crate::card::{Entry, NAME_MAX, Op};
@@ -19,6 +19,14 @@ pub fn part(
     machine: &mut impl Machine,
     out: &mut impl Out,
 ) -> Step {
+    let has_file = machine.card_progress().is_some();
+    // Without a file there is nothing to pause but the program: behind the lines before, as M0.
+    if number == 25 && !has_file {
+        return Step::Gcode;
+    }
+    if number == 24 && host::go_on(machine, out) && !has_file {
+        return Step::Done;
+    }
     if let Err(status) = Capability::Sd.check() {
         return Step::Refused(status);
     }
@@ -31,6 +39,10 @@ pub fn part(
         },
         22 => return done(machine.card(Op::Release)),
         23 | 32 => return open(number, at, block, machine, out),
+        25 if machine.card_prints() => {
+            text(out, text!("//action:paused\n"));
+            return done(machine.card(Op::Print(false)));
+        }
         24 | 25 => return done(machine.card(Op::Print(number == 24))),
         26 => {
             let at = value(block, b'S', 0).unwrap_or(0).max(0);

@@ -3,6 +3,7 @@
 use super::frame::{Frame, Sum, integer};
 use crate::config::Number;
 use crate::gcode::comment::Aside;
+use crate::machine::{self, Cycle};
 
 /// Returns the code of a block, with its letter in upper case: the first word, if that is G, M or T with a whole
 /// number; `$` with 0 for a line about a setting by its name. `None` otherwise.
@@ -39,12 +40,13 @@ pub fn is_stop(frame: &Frame, line: &[u8]) -> bool {
     whole(frame, line) == Some(112)
 }
 
-/// Whether a line overtakes the lines that wait.
+/// Whether a line overtakes the lines that wait: now, because M24 does so at a program stop only.
 #[inline(never)]
 #[small]
 pub fn overtakes(frame: &Frame, line: &[u8]) -> bool {
     match whole(frame, line) {
         Some(108 | 112) => true,
+        Some(24) => machine::cycle() == Cycle::Stopped,
         Some(105 | 114) => frame.number.is_none(),
         _ => false,
     }
@@ -54,7 +56,37 @@ pub fn overtakes(frame: &Frame, line: &[u8]) -> bool {
 #[inline(never)]
 #[small]
 pub fn waits(code: Option<(u8, u16)>) -> bool {
-    matches!(code, Some((b'M', 0 | 1 | 109 | 116 | 190)))
+    matches!(code, Some((b'M', 0 | 1 | 109 | 116 | 190 | 226 | 600 | 601)))
+}
+
+/// Whether the words of a block are a text for people.
+pub fn is_text(block: &[u8]) -> bool {
+    matches!(code(block), Some((b'M', 117 | 118)))
+}
+
+/// Whether a block may move the machine: it has G0 to G3, or begins with the word of an axis.
+#[inline(never)]
+#[small]
+pub fn may_move(block: &[u8]) -> bool {
+    let mut bytes = Bytes::of(block);
+    let (mut before, mut is_first) = (b' ', true);
+    while let Some(byte) = bytes.next() {
+        let letter = byte.to_ascii_uppercase();
+        let code = integer(split_digits(bytes.rest).0);
+        let moves = match letter {
+            b'G' => !before.is_ascii_alphabetic() && matches!(code, Some(0..=3)),
+            b'X'..=b'Z' => is_first,
+            // Words of other languages begin with E, too.
+            b'E' => is_first && !bytes.rest.first().is_some_and(u8::is_ascii_alphabetic),
+            _ => false,
+        };
+        if moves {
+            return true;
+        }
+        is_first &= !letter.is_ascii_alphabetic();
+        before = letter;
+    }
+    false
 }
 
 /// Returns the text behind the code of a block.
@@ -99,6 +131,29 @@ impl<'a> Bytes<'a> {
     pub fn of(text: &'a [u8]) -> Self {
         Self { rest: text, aside: Aside::NONE }
     }
+
+    /// Takes the number that comes next; `None` if there is none.
+    #[inline(never)]
+    #[small]
+    pub fn take_number(&mut self) -> Option<Number> {
+        let text = self.rest.trim_ascii_start();
+        let is_digit = |byte: &u8| matches!(byte, b'0'..=b'9' | b'.' | b'-');
+        let end = text.iter().position(|byte| !is_digit(byte)).unwrap_or(text.len());
+        let (number, rest) = text.split_at_checked(end)?;
+        self.rest = rest;
+        Number::parse(number)
+    }
+
+    /// Takes the number that comes next, if it is 0. Returns whether it is.
+    #[small]
+    pub fn take_zero(&mut self) -> bool {
+        let mut behind = Self { rest: self.rest, aside: self.aside };
+        let is_zero = behind.take_number().is_some_and(|number| number.fixed(4, false) == Some(0));
+        if is_zero {
+            *self = behind;
+        }
+        is_zero
+    }
 }
 
 impl Iterator for Bytes<'_> {
@@ -126,10 +181,7 @@ impl Iterator for Bytes<'_> {
 #[inline(never)]
 #[small]
 pub fn number(block: &[u8], letter: u8) -> Option<Number> {
-    let text = behind(block, letter)?.trim_ascii();
-    let is_digit = |byte: &u8| matches!(byte, b'0'..=b'9' | b'.' | b'-');
-    let end = text.iter().position(|byte| !is_digit(byte)).unwrap_or(text.len());
-    Number::parse(text.get(..end)?)
+    Bytes::of(behind(block, letter)?).take_number()
 }
 
 /// Returns the number behind a letter, scaled to `decimals` decimals.
@@ -164,6 +216,27 @@ mod tests {
         assert_eq!(value(b"M207 S-1.5", b'S', 4), Some(-15_000));
         assert_eq!(value(b"M207 S", b'S', 4), None);
         assert_eq!(words(b"M117 Hello  world "), b"Hello  world");
+    }
+
+    #[test]
+    fn what_may_move() {
+        for line in
+            ["G1 X1", "g0", "G 2 I1", "G90 G1 X1", "(a) G01 X", "X1", "y", "E-1", "E 1", "N G1 X"]
+        {
+            assert!(may_move(line.as_bytes()), "{line}");
+        }
+        let others = [
+            "G28 X",
+            "G38.2 Z-1",
+            "G10 S1",
+            "M104 S200",
+            "EXCLUDE_OBJECT NAME=PLUG1",
+            "START G4",
+            "F100",
+        ];
+        for line in others.into_iter().chain(["", "; G1 X1", "M117 (G1 X1)", "T1"]) {
+            assert!(!may_move(line.as_bytes()), "{line}");
+        }
     }
 
     #[test]

@@ -4,11 +4,12 @@
 //! in every line of a port that has received numbers and checksums. In other lines an asterisk is plain text. A port
 //! that has received numbers and checksums treats a line with only one of the two as damaged, because a transmission
 //! error may have changed the other. A line is also damaged if its number cannot be read, or if it has a byte 0,
-//! which does not change the checksum.
+//! which does not change the checksum. A second asterisk in a numbered line is a lost line end: the checksums of several
+//! lines may match together. Only texts and comments may have one, if no line number is behind it.
 
-use super::command::split_digits;
+use super::command::{self, Bytes, split_digits};
 use crate::gcode::comment::skip_mark;
-use crate::protocol::Span;
+use crate::protocol::{Span, is_joined};
 
 /// What a port keeps about its sender.
 #[derive(Clone, Copy, Default)]
@@ -82,7 +83,7 @@ impl Frame {
         let star = asterisk(line);
         let (text, stated) =
             line.split_at_checked(star.unwrap_or(line.len())).unwrap_or((line, &[]));
-        let sum = if star.is_some() { Sum::of(text, stated) } else { Sum::None };
+        let mut sum = if star.is_some() { Sum::of(text, stated) } else { Sum::None };
         let mut rest = text.trim_ascii();
         let mut number = None;
         let numbered = matches!(rest.first(), Some(b'N' | b'n'));
@@ -101,6 +102,10 @@ impl Frame {
         }
         // A mark at the beginning of the file: some hosts number its first line like any other.
         let rest = skip_mark(rest.trim_ascii()).trim_ascii();
+        let mut words = Bytes::of(if command::is_text(rest) { &[] } else { rest });
+        if numbered && (words.any(|byte| byte == b'*') || is_joined(text)) {
+            sum = Sum::Wrong;
+        }
         let start = rest.as_ptr().addr().wrapping_sub(line.as_ptr().addr());
         let end = start.wrapping_add(rest.len());
         Self { number, numbered, sum, block: Span { start: start as u8, end: end as u8 } }
@@ -275,6 +280,14 @@ mod tests {
         assert_eq!(parts("N M105"), (None, Sum::None, "N M105"));
         assert_eq!(parts("N1.5 M105"), (None, Sum::None, "N1.5 M105"));
         assert_eq!(parts("N2 G28\0*17").1, Sum::Wrong);
+        // Three lines without their ends have the checksum of one.
+        assert_eq!(parts("N2 G28*17N2 G28*17N2 G28*17").1, Sum::Wrong);
+        assert_eq!(parts("N2 G28 (2*3) ;2*3*43"), (Some(2), Sum::Right, "G28 (2*3) ;2*3"));
+        // By chance the second line with its checksum does not change that of the first.
+        for joined in ["N2 G28 ;*43N3 G1*12", "N2 M117 *43?N3 G1*63"] {
+            assert_eq!(parts(joined).1, Sum::Wrong);
+        }
+        assert_eq!(parts("N2 M117 2*3*45"), (Some(2), Sum::Right, "M117 2*3"));
     }
 
     #[test]

@@ -27,6 +27,8 @@ pub enum Step {
     Done,
     /// The code has written its own `ok`.
     Answered,
+    /// The interpreter runs the block. The line is answered when the planner has taken that.
+    Gcode,
     /// The code is refused.
     Refused(Status),
 }
@@ -48,7 +50,9 @@ pub fn of(code: Option<Code>, block: &[u8]) -> Option<Code> {
         (b'M', 20..=27 | 32) => true,
         // M30 without a file name ends the program, so the interpreter runs it.
         (b'M', 30) => !words(block).is_empty(),
-        (b'G', 10 | 11 | 28 | 161 | 162) => true,
+        // With P it is the temperature of an extruder, and with L an offset: those of Duet's firmware.
+        (b'G', 10) => !has(block, b'P') && !has(block, b'L'),
+        (b'G', 11 | 28 | 161 | 162) => true,
         (b'G', 29) | (b'M', 420) => Capability::BedPlane.is_built_in(),
         (b'M', number) => matches!(
             number,
@@ -90,7 +94,9 @@ pub fn part(
         105 => report::answer(at, machine, out),
         108 => {
             machine.skip_wait();
-            machine.go_on();
+            if !go_on(machine, out) {
+                machine.go_on();
+            }
             Step::Done
         }
         110 if has(block, b'N') && value(block, b'N', 0).is_none() => {
@@ -123,7 +129,11 @@ pub fn part(
         302 => extrude_cold(block, machine, out),
         303 => tuning::begin(block, machine, out),
         400 => finished(machine),
-        134 | 500 if machine.value(Value::Kept) == 0 => Step::Later(0),
+        134 | 500 => keep(at, machine),
+        501 => match machine.recall() {
+            Status::Again => Step::Later(0),
+            status => done(status),
+        },
         502 => restore(at, machine),
         503 => settings::list(at, machine, out).map_or(Step::Done, Step::At),
         92 | 201..=206 => settings::set(number, at, block, machine, out),
@@ -146,7 +156,7 @@ pub fn part(
 #[small]
 pub fn needs_rest(code: Code, block: &[u8]) -> bool {
     match code {
-        (b'M', 18 | 84 | 400 | 420 | 502) | (b'G', 28 | 29 | 161 | 162) => true,
+        (b'M', 18 | 84 | 400 | 420 | 501 | 502) | (b'G', 28 | 29 | 161 | 162) => true,
         (b'M', 92 | 201 | 203 | 206) => !words(block).is_empty(),
         (b'M', 205) => has(block, b'J'),
         (b'$', _) => block.contains(&b'='),
@@ -391,6 +401,27 @@ fn percent(what: Text, thousandths: i32, out: &mut impl Out) -> Step {
     out.put(b'%');
     line_end(out);
     Step::Done
+}
+
+/// Ends a program stop, if the machine waits at one. Returns whether it does.
+#[inline(never)]
+#[small]
+pub fn go_on(machine: &mut impl Machine, out: &mut impl Out) -> bool {
+    let stands = machine.cycle() == Cycle::Stopped;
+    if stands {
+        text(out, text!("//action:resumed\n"));
+        machine.go_on();
+    }
+    stands
+}
+
+/// M500: stores the settings that have changed, and waits until all are stored.
+#[small]
+fn keep(at: u8, machine: &mut impl Machine) -> Step {
+    if at == 0 && machine.keep() == Status::Again {
+        return Step::Later(0);
+    }
+    if machine.value(Value::Kept) == 0 { Step::Later(1) } else { Step::Done }
 }
 
 /// M502: restores the defaults.

@@ -21,7 +21,7 @@
 //! | [`write`](mod@write) | numbers and texts |
 //!
 //! A line is answered in order, when the planner has taken its motion. M105 and M114 overtake if they have no line
-//! number; M108 and M112 always overtake. A damaged line is never carried out: the sender is asked to send it again.
+//! number; M108 and M112 always overtake, and M24 at a program stop. A damaged line is never carried out: the sender is asked to send it again.
 //! A step costs at most 15,000 cycles, or 3 ms with a setting that is in EEPROM. No buffer here can overflow. A plain
 //! move takes none of these steps: [`frame::fast_path`] checks its number and checksum, and the interpreter reads it
 //! untranslated.

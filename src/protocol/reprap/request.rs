@@ -147,6 +147,7 @@ impl Answers for Request {
                     return Next::Wait;
                 }
                 Step::Done => self.what = What::Nothing,
+                Step::Gcode => (self.what, self.at) = (What::Gcode, 0),
                 Step::Answered => return Next::Done(Status::Ok),
                 Step::Refused(status) => (self.what, self.at) = (What::Refused(status), 0),
             },
@@ -154,7 +155,7 @@ impl Answers for Request {
                 self.begun = true;
                 self.resend(fault, last, out);
             }
-            What::Refused(status) if is_unknown(status) => {
+            What::Refused(status) if is_unknown(status, block) => {
                 self.begun = true;
                 self.unknown(block, out);
             }

@@ -1,6 +1,7 @@
 //! M92, M201 to M206, M503: Kerf's settings under the codes of this dialect, in its units.
 //!
-//! Nothing is kept here. A setting is written to memory without being asked for, so M500 only waits for that.
+//! Nothing is kept here. Of these codes a setting has its value until the next start, or until M501 brings back the
+//! stored one; M500 stores it. The machine is asked to lend what is set ([`Machine::lend`]).
 
 use super::command::number;
 use super::host::Step;
@@ -11,7 +12,7 @@ use crate::config::{Fixed, Number, Owner};
 use crate::gcode::tables::TableRow;
 use crate::progmem::Text;
 use crate::protocol::steps::{named, set_steps, steps};
-use crate::protocol::{Machine, Out};
+use crate::protocol::{Machine, Out, Value};
 use crate::status::Status;
 use crate::text;
 use crate::units::Length;
@@ -60,7 +61,7 @@ fn value(code: u16, axis: u8, machine: &mut impl Machine) -> Fixed {
         }
         (None, 92) => Fixed { value: steps(axis, machine), decimals: 3 },
         (None, 206) => {
-            let at = machine.value(crate::protocol::Value::TableRow(TableRow::system(0), axis));
+            let at = machine.value(Value::TableRow(TableRow::system(0), axis));
             Fixed { value: at, decimals: 4 }.rounded(3)
         }
         _ => Fixed::int(0),
@@ -156,9 +157,12 @@ pub fn set(
     }
     let axis = at % SETS;
     let Some(to) = word(axis) else { return Step::Later(at + 1) };
-    match set_axis(code, axis, to, at >= SETS, machine) {
+    machine.lend(true);
+    let done = set_axis(code, axis, to, at >= SETS, machine);
+    machine.lend(false);
+    match done {
         Ok(()) => Step::Later(at + 1),
-        // Settings of motors can only change at rest.
+        // Settings of motors can only change at rest. Those to be saved are to be saved before.
         Err(Status::Again) => Step::Later(at),
         Err(status) => Step::Refused(status),
     }
@@ -174,7 +178,8 @@ fn set_axis(
     puts: bool,
     machine: &mut impl Machine,
 ) -> Result<(), Status> {
-    if machine.value(crate::protocol::Value::Working) != 0 {
+    let waits = machine.value(Value::Working) != 0 || machine.value(Value::Kept) == 0;
+    if waits {
         return Err(Status::Again);
     }
     match code {
@@ -192,6 +197,8 @@ fn set_axis(
             put_number(machine, Owner::Axis(axis), token("vm"), to, puts)?;
             put_number(machine, Owner::Axis(axis), token("fr"), to, puts)
         }
+        // 0, no limit, is not for files: slicers write it for want of a number.
+        201 if to.fixed(1, false).is_none_or(|to| to <= 0) => Err(Status::OutOfRange),
         201 => put_number(machine, Owner::Axis(axis), token("ac"), to, puts),
         205 => put_number(machine, Owner::Axis(axis), token("jd"), to, puts),
         _ => {

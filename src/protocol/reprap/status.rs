@@ -1,13 +1,14 @@
 //! Texts for people: why a line was refused.
 
+use super::command;
 use crate::progmem::Text;
 use crate::status::Status;
 use crate::text;
 
-/// Whether the status means that the code is unknown.
+/// Whether the status means that a block is unknown. A move that cannot be read is not: it is an error.
 #[small]
-pub fn is_unknown(status: Status) -> bool {
-    matches!(
+pub fn is_unknown(status: Status, block: &[u8]) -> bool {
+    let unknown = matches!(
         status,
         Status::GcodeUnsupported
             | Status::McodeUnsupported
@@ -15,7 +16,8 @@ pub fn is_unknown(status: Status) -> bool {
             | Status::BadNumber
             | Status::NotBuiltIn
             | Status::UnrecognizedName
-    )
+    );
+    unknown && !command::may_move(block)
 }
 
 /// Whether a print continues after the refusal of this line: the line is no move, no heater stays cold because of it,
@@ -23,9 +25,12 @@ pub fn is_unknown(status: Status) -> bool {
 #[inline(never)]
 #[small]
 pub fn is_passed_over(status: Status, block: &[u8]) -> bool {
-    // A move may stand behind a comment.
-    let may_move = |letter: &u8| matches!(letter & !0x20, b'G' | b'X'..=b'Z') || *letter == b'(';
-    let moves = block.first().is_none_or(may_move);
+    let moves = match command::code(block) {
+        // The temperature of an extruder that is not there.
+        Some((b'G', 10)) => status != Status::ToolInvalid,
+        Some((b'G', _)) => true,
+        _ => block.is_empty() || command::may_move(block),
+    };
     let of_words = Status::CardError as u8..=Status::WordConflict as u8;
     !moves && of_words.contains(&(status as u8)) && status != Status::AboveMaximum
 }
@@ -43,6 +48,7 @@ pub fn reason(status: Status) -> Text {
         Status::OutOfRange | Status::BelowMinimum | Status::AboveMaximum => {
             text!("number out of range, not carried out")
         }
+        Status::MalformedCommand | Status::BadNumber => text!("malformed, not carried out"),
         Status::HomingSwitches => text!("no homing switch"),
         Status::HomingFailed | Status::HomingClosed => text!("homing failed"),
         Status::NotAccepted => text!("not possible now"),

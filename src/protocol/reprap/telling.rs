@@ -74,7 +74,9 @@ impl Tells for Telling {
 #[small]
 fn exception(status: Status, out: &mut impl Out) {
     match status {
-        Status::ProgramStopped => text(out, text!("echo:busy: paused for user\n")),
+        Status::ProgramStopped => {
+            text(out, text!("//action:paused\necho:busy: paused for user\n"));
+        }
         Status::EndOfFile if Capability::Sd.is_built_in() => {
             text(out, text!("Done printing file\n"));
         }

@@ -7,9 +7,13 @@
 //! | G4 P in ms, S in s | G4 P in s |
 //! | G92 without words | G92 of X, Y, Z and E |
 //! | M0, M1, with a text or without | M0; with P or S G4 |
+//! | M25, M226, M600, M601 | M0 |
+//! | G10 P0 S | M104 S |
+//! | F0 | no F: the old feed stays |
+//! | G2, G3 with I, J and K of 0 | G1: a slicer has rounded the radius to nothing |
 //! | M2, M30 | M2: heaters and outputs off, default modes |
 //!
-//! G28 and G10 are not translated: [`host`](super::host) performs them.
+//! G28 and other G10 are not translated: [`host`](super::host) performs them.
 
 use super::command;
 use crate::protocol::Rewritten;
@@ -23,17 +27,46 @@ pub fn block<'a>(block: &[u8], out: &'a mut Rewritten) -> Result<&'a [u8], Statu
     match command::code(block) {
         Some((b'G', 4)) => dwell(block, out)?,
         Some((b'M', 0 | 1)) if has_time(block) => dwell(block, out)?,
-        Some((b'M', 0 | 1)) => put(out, b"M0")?,
+        Some((b'M', 0 | 1 | 25 | 226 | 600 | 601)) => put(out, b"M0")?,
         // M30 with a file name never comes here: `host` handles it.
         Some((b'M', 2 | 30)) => put(out, b"M2")?,
         Some((b'G', 92)) if !has_words(block) => put(out, b"G92X0Y0Z0A0")?,
-        Some((b'G', 0)) => {
-            put(out, b"G1 ")?;
-            copy(command::words(block), out)?;
-        }
-        _ => copy(block, out)?,
+        Some((b'G', 0)) => words(b"G1 ", block, b"", out)?,
+        Some((b'G', 2 | 3)) if is_point(block) => words(b"G1 ", block, b"IJKP", out)?,
+        Some((b'G', 10)) => temperature(block, out)?,
+        _ => copy(block, b"", out)?,
     }
     Ok(out)
+}
+
+/// Writes a code with the words of another block, but for those `without` which it goes.
+#[inline(never)]
+#[small]
+fn words(code: &[u8], block: &[u8], without: &[u8], out: &mut Rewritten) -> Result<(), Status> {
+    put(out, code)?;
+    copy(command::words(block), without, out)
+}
+
+/// Whether the centre of an arc is its start.
+#[small]
+fn is_point(block: &[u8]) -> bool {
+    let mut words = b"IJK".iter().filter(|letter| command::has(block, **letter)).peekable();
+    let has_words = words.peek().is_some() && !command::has(block, b'R');
+    has_words && words.all(|letter| command::value(block, *letter, 4) == Some(0))
+}
+
+/// Writes M104 for the G10 of Duet's firmware. R, a temperature for an extruder that is not in use, is left out.
+#[inline(never)]
+#[small]
+fn temperature(block: &[u8], out: &mut Rewritten) -> Result<(), Status> {
+    if b"LXYZ".iter().any(|letter| command::has(block, *letter)) {
+        return Err(Status::WordUnused);
+    }
+    match command::value(block, b'P', 0) {
+        Some(0) if command::has(block, b'S') => words(b"M104 ", block, b"PR", out),
+        Some(0) => Ok(()),
+        _ => Err(Status::ToolInvalid),
+    }
 }
 
 fn has_time(block: &[u8]) -> bool {
@@ -77,9 +110,20 @@ fn put(out: &mut Rewritten, text: &[u8]) -> Result<(), Status> {
     out.extend_from_slice(text).map_err(|_| Status::InputTooLong)
 }
 
-/// Copies words, without the text of comments. Cost on AVR: 50 cycles a byte.
-fn copy(text: &[u8], out: &mut Rewritten) -> Result<(), Status> {
-    for byte in command::Bytes::of(text) {
+/// Copies words, but for the text of comments, F0, and the words `without` which it goes. Cost on AVR: 70 cycles a byte.
+#[inline(never)]
+#[small]
+fn copy(text: &[u8], without: &[u8], out: &mut Rewritten) -> Result<(), Status> {
+    let mut bytes = command::Bytes::of(text);
+    while let Some(byte) = bytes.next() {
+        let letter = byte.to_ascii_uppercase();
+        if without.contains(&letter) {
+            bytes.take_number();
+            continue;
+        }
+        if letter == b'F' && bytes.take_zero() {
+            continue;
+        }
         let byte = if matches!(byte, b'E' | b'e') { b'A' } else { byte };
         out.push(byte).map_err(|_| Status::InputTooLong)?;
     }
@@ -108,9 +152,33 @@ mod tests {
             ("M1 S3", "G4P0000003.000"),
             ("G90", "G90"),
             ("X1 E1", "X1 A1"),
+            ("G1 F0", "G1 "),
+            ("G0 F0 X5 Y5", "G1  X5 Y5"),
+            ("G1 X7 f-0.0E-1", "G1 X7 A-1"),
+            ("G1 X7 F0.5 E-1", "G1 X7 F0.5 A-1"),
+            ("G1 X7 F (0) 0", "G1 X7 F () 0"),
+            ("G2 X1 Y2 I-0 J-0 E1", "G1 X1 Y2   A1"),
+            ("G3 Z1 I0J0P1 F600", "G1 Z1  F600"),
+            ("G3 X1 I0 J0.5", "G3 X1 I0 J0.5"),
+            ("G2 X1 I0 R5", "G2 X1 I0 R5"),
+            ("G2 X1 Y1", "G2 X1 Y1"),
+            ("G2 X1 I", "G2 X1 I"),
+            ("G10 P0 S205", "M104  S205"),
+            ("G10 P0 R180 S205.5", "M104   S205.5"),
+            ("G10 P0 R180", ""),
+            ("M600 X5", "M0"),
+            ("M226", "M0"),
         ] {
             let mut out = Rewritten::new();
             assert_eq!(block(from.as_bytes(), &mut out), Ok(to.as_bytes()), "{from}");
+        }
+        for (refused, status) in [
+            ("G10 P1 S205", Status::ToolInvalid),
+            ("G10 P S205", Status::ToolInvalid),
+            ("G10 L2 P1 X0", Status::WordUnused),
+            ("G10 P0 Z0.2", Status::WordUnused),
+        ] {
+            assert_eq!(block(refused.as_bytes(), &mut Rewritten::new()), Err(status), "{refused}");
         }
         assert_eq!(block(&[b'X'; 120], &mut Rewritten::new()), Err(Status::InputTooLong));
     }

@@ -1,15 +1,18 @@
-//! What printing hosts do beside G-code: the extruder's modes and moves, autotune of heaters.
+//! What printing hosts do beside G-code: the extruder's modes and moves, autotune of heaters, settings that are lent.
 
 use kerf_macros::small;
 
-use super::View;
+use super::{View, set_hardware};
 use crate::gcode::command::Motion;
 use crate::gcode::heating::{Heat, Part, Wait};
 use crate::gcode::setup::Setup;
+use crate::hal::eeprom::Eeprom;
 use crate::machine::{self, Alarm};
 use crate::protocol::Extruder;
 use crate::status::Status;
+use crate::store::kept;
 use crate::tasks::heat;
+use crate::tasks::lent::LENT;
 use crate::tasks::links::Changes;
 
 /// How much hotter than its target a heater may get in an autotune, eighths of a degree.
@@ -86,4 +89,26 @@ pub(super) fn tune(view: &mut View<'_>, heater: u8, to: u16, cycles: u8, uses: b
     links.commands_taken.set(true);
     links.planner_wake.signal();
     Status::Ok
+}
+
+/// Gives back one setting that has been lent; when there is none left the row, and tells all parts.
+#[small]
+#[inline(always)]
+pub(super) fn recall(view: &mut View<'_>) -> Status {
+    if view.is_busy() {
+        return Status::Again;
+    }
+    let storage = view.links.storage;
+    view.links.changes.note(Changes::STEPS | Changes::SETTINGS);
+    if let Some(setting) = storage.take_lent() {
+        view.settings.store(setting, kept::value(&storage.log(), &Eeprom::take(), setting));
+        return Status::Again;
+    }
+    set_hardware(view.links.thread, &view.settings);
+    storage.drop_row();
+    // The interpreter has the row's values, if they are those of the selected coordinate system.
+    match view.links.model.borrow_mut().set(LENT, 0, storage.value(LENT, 0)) {
+        Ok(()) => Status::Ok,
+        Err(status) => status,
+    }
 }

@@ -62,7 +62,10 @@ pub(super) fn set(view: &mut View<'_>, setting: Setting, value: i32) -> Result<W
     let lowered = limit_velocity(&mut view.settings, setting);
     view.links.changes.note(Changes::SETTINGS);
     match is_machine {
-        true => view.links.storage.note_change(false),
+        true => {
+            view.links.storage.own();
+            view.links.storage.note_change(false);
+        }
         false => view.note(setting, lowered),
     }
     set_hardware(view.links.thread, &view.settings);
@@ -93,6 +96,7 @@ pub(super) fn restore(view: &mut View<'_>) -> Status {
     drivers::recall(&mut view.settings, view.links.storage);
     spindle::set_all(view.links.thread, view.links.storage);
     heat::set_all(&view.links.heat, &mut view.settings, view.links.storage);
+    view.links.storage.own();
     view.links.storage.note_change(true);
     set_hardware(view.links.thread, &view.settings);
     view.links.set_flow(&view.settings);

@@ -359,3 +359,34 @@ fn a_pause_within_a_line_loses_none_of_it() {
     let place = printer.ask("M114");
     assert!(place.contains("X:12.000 Y:12.000"), "{pauses} pauses: {place}");
 }
+
+/// A boot sector that says 0 blocks per cluster, a file name, and a directory that has no end: each is answered, and
+/// so are the host's questions and its stop.
+#[test]
+fn a_damaged_card_is_refused_and_the_machine_goes_on() {
+    let mut image = image(FatType::Fat16, &[("A.G", zigzag(3))]);
+    image[FIRST * BLOCK + 13] = 0;
+    let mut machine = firmware(&RAMPS14);
+    machine.insert_card(image, true);
+    let mut printer = Printer::started(machine);
+    for line in ["M21", "M20", "M23 A.G", "M24", "M21"] {
+        let said = printer.ask(line);
+        assert!(said.contains("echo:SD card cannot be read"), "{line}: {said}");
+    }
+    printer.ask("M105");
+    let said = printer.ask("M112");
+    assert!(said.contains("Error:stopped"), "{said}");
+}
+
+/// A file longer than 64 KiB is printed to its end.
+#[test]
+fn a_file_of_more_than_64_kib_is_printed_to_its_end() {
+    let comments = format!(";{}\n", "-".repeat(198)).repeat(2 * 65_536 / 200);
+    let text = format!("G91\nG1 X1 F3000\n{comments}G1 X1\n{}G1 X1\n", ";\n".repeat(50));
+    let mut printer = Printer::new(FatType::Fat32, true, &[("A.G", text)]);
+    printer.begin("A.G");
+    printer.ask("M24");
+    printer.until("Done printing file\n", 60_000);
+    let place = printer.ask("M114");
+    assert!(place.contains("X:3.000"), "{place}");
+}
