@@ -207,10 +207,11 @@ impl<'a> View<'a> {
         (axes != 0 && homed).into()
     }
 
-    /// Whether the machine is idle, so that an action other than a line may begin. If not, the error is the reason.
-    fn may_begin(&self) -> Result<(), Status> {
+    /// Whether the machine is idle, so that an action other than a line may begin. If not, the error is the reason. An
+    /// alarm does not count if the action `ends_alarm`.
+    fn may_begin(&self, ends_alarm: bool) -> Result<(), Status> {
         let alarm = machine::alarm();
-        if alarm != Alarm::None {
+        if alarm != Alarm::None && !ends_alarm {
             return Err(alarm.status());
         }
         let busy = self.is_busy() || self.has_others();
@@ -400,8 +401,8 @@ impl Machine for View<'_> {
         cycles::start_job(self, number)
     }
 
-    fn home(&mut self, axes: u8) -> Status {
-        cycles::home(self, axes)
+    fn home(&mut self, axes: u8, ends_alarm: bool) -> Status {
+        cycles::home(self, axes, ends_alarm)
     }
 
     fn check(&mut self, on: bool) -> Status {
@@ -535,7 +536,7 @@ impl Machine for View<'_> {
 
     fn energize(&mut self, motor: Option<u8>, on: bool) -> Status {
         // Without power a motor that moves would lose its position.
-        if self.is_busy() && !on {
+        if !on && (self.has_work() || machine::is_checking()) {
             return Status::NotAccepted;
         }
         let motors = motor.map_or(u8::MAX, |motor| 1 << motor);
