@@ -299,7 +299,7 @@ fn a_reset_cuts_between_lines_when_check_mode_begins_or_ends() {
     };
     let machine = booted();
     let mut failed = Vec::new();
-    for n in 0..6_000 {
+    for n in 0..1_000 {
         let kind = |n: u32| KINDS[n as usize % KINDS.len()];
         let leaves = random(2) == 1;
         if leaves {

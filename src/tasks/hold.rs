@@ -172,7 +172,8 @@ pub fn serve(links: &Links) {
         if characters != 0 {
             act(links, port, characters);
         }
-        if Speech::HAS_QUESTION && port.take_asked(ports::RESET) {
+        // Not if a `^x` has come meanwhile: what is behind that runs.
+        if Speech::HAS_QUESTION && port.take_asked(ports::RESET) && !port.is_resetting() {
             start_over(links, port, uart::newest(port.number), false);
         }
     }

@@ -355,6 +355,7 @@ impl Machine for View<'_> {
     fn hold(&mut self) -> Hold {
         match self.is_held() {
             false => Hold::None,
+            true if machine::is_locked() => Hold::Rests,
             true if self.motion().held && !machine::is_resuming() => Hold::Rests,
             true => Hold::Slows,
         }
@@ -433,8 +434,11 @@ impl Machine for View<'_> {
     }
 
     fn start_over(&mut self) {
-        self.port.ask(RESET);
-        flags::set(Event::Realtime);
+        // A `^x` that has come while the line is answered is enough.
+        if !self.port.is_resetting() {
+            self.port.ask(RESET);
+            flags::set(Event::Realtime);
+        }
     }
 
     #[cfg(feature = "dialect-reprap")]

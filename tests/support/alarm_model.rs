@@ -9,6 +9,7 @@
 //!   refused line, no byte and no reset ends it.
 //! - Nothing moves in an alarm, except for a homing that is accepted.
 //! - The machine shows its state at each `?`, and no block is left in the queue.
+#![allow(dead_code, reason = "each test uses a part")]
 
 use kerf::boards::inputs::{A_MIN, DOOR, STOP, X_MIN, Y_MIN, Z_MAX};
 use kerf::machine::Alarm;
