@@ -359,7 +359,7 @@ impl<S: Side> Model<S> {
     fn hear(&mut self, port: usize, ms: u64, is: impl Fn(&str) -> bool) -> Outcome<String> {
         for _ in 0..=ms {
             if let Some(at) = self.heard[port].iter().position(|line| is(line)) {
-                return Ok(self.heard[port].drain(..=at).last().unwrap_or_default());
+                return Ok(self.heard[port].drain(..=at).next_back().unwrap_or_default());
             }
             self.run(1);
         }
