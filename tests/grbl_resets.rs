@@ -273,3 +273,57 @@ fn start_up_lines_wait_for_a_jog_of_the_other_port() {
         assert_eq!(answers_after(machine, b"$G\n", 200), ["ok"]);
     });
 }
+
+/// Lines of every kind: answered at once, at rest, by a list, or refused.
+const KINDS: &[&str] = &[
+    "",
+    "g0 x1",
+    "g91 g1 x0.1 f600",
+    "m3 s100",
+    "$G",
+    "$$",
+    "$#",
+    "$I",
+    "$X",
+    "$110=1200",
+    "$C",
+    "q",
+];
+
+#[test]
+fn a_reset_cuts_between_lines_when_check_mode_begins_or_ends() {
+    let mut seed = 11u32;
+    let mut random = move |below: u32| {
+        seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (seed >> 16) % below
+    };
+    let machine = booted();
+    let mut failed = Vec::new();
+    for n in 0..1_000 {
+        let kind = |n: u32| KINDS[n as usize % KINDS.len()];
+        let leaves = random(2) == 1;
+        if leaves {
+            heard_after(&machine, b"$C\n", 60);
+        }
+        let (before, behind) = (kind(random(99)), kind(random(99)));
+        // Bytes that do nothing take 87 us each.
+        let pause = |n| vec![0x80; n as usize];
+        let bytes = [
+            b"$C\n".to_vec(),
+            pause(random(40)),
+            format!("{before}\n").into_bytes(),
+            pause(random(40)),
+            b"\x18".to_vec(),
+            pause(if random(2) == 0 { 0 } else { random(30) }),
+            format!("{behind}\n").into_bytes(),
+        ];
+        let heard = heard_after(&machine, &bytes.concat(), 500);
+        let answered = heard.rsplit("Grbl 1.1h").next().unwrap();
+        if answers(answered.as_bytes()).len() != 1 {
+            let pauses = [bytes[1].len(), bytes[3].len(), bytes[5].len()];
+            failed.push(format!("{n} {leaves} {before:?} {behind:?} {pauses:?}: {heard}"));
+        }
+        heard_after(&machine, b"\x18", 300);
+    }
+    assert!(failed.is_empty(), "{}\n{}", failed.len(), failed[..failed.len().min(12)].join("\n"));
+}

@@ -6,6 +6,8 @@
 //!
 //! A name before `::` is a file here: `cargo test --test host hold::` runs the tests of `hold.rs`.
 
+#[path = "support/alarm_model.rs"]
+mod alarm_model;
 #[path = "support/apart.rs"]
 mod apart;
 #[path = "support/cases.rs"]
@@ -80,6 +82,7 @@ mod fine_steps;
 mod gcode_props;
 mod governor;
 mod grbl;
+mod grbl_alarms;
 mod grbl_random;
 mod grbl_resets;
 mod heat;

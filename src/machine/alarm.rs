@@ -13,7 +13,8 @@
 //! suddenly. But a motor that stops suddenly may slip by some steps that are not counted, so axes have to be homed
 //! again.
 //!
-//! M2 and M30 end no alarm on a port of grbl's dialect, whose senders end alarms by `$X`, `$H` and a reset.
+//! On a port of grbl's dialect M2 and M30 end no alarm, and a reset ends none but a panic. `$X` ends those that `clear`
+//! ends, and so does `$H` if the homing begins. A line that is refused ends no alarm, whatever the dialect.
 //!
 //! An alarm is reported by one exception report when it begins. A later cause counts only if it is worse.
 

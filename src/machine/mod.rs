@@ -50,7 +50,7 @@
 //! | `Probe`, `Homing`, `Jog`, `Check` | the planner; requests for homing, jogs and checks | thread | |
 //! | `Done` | the planner: the cycle is over, the stop has been left; the request that ends a check | thread | |
 //! | `Alarm`, `Limit`, `Shutdown`, `Panic` | switches, requests, a failed probing | thread | outputs off, the planner is woken |
-//! | `Cleared` | `{clear:n}`, M2, M30, if the alarm permits it | thread | steps may be made again |
+//! | `Cleared` | `{clear:n}`, `$X`, `$H`, M2, M30, if the alarm permits it | thread | steps may be made again |
 //!
 //! Exec reads the byte of the [`Hold`] for each stretch of motion ([`is_held`]). It writes the byte in one case only,
 //! from `Resuming` to `Off`. Thread mode can nevertheless write without a lock, because each of its events either leads
@@ -152,6 +152,13 @@ pub fn is_alarmed() -> bool {
     alarm_byte().get() != Alarm::None as u8
 }
 
+/// Whether an alarm is on and everything from before it has been dropped. What has been queued since then moves
+/// nothing: it is the end of a program, by a reset or a kill. Any level.
+#[inline(always)]
+pub fn is_locked() -> bool {
+    is_alarmed() && !is_dropping()
+}
+
 /// Whether motion is held: [`Hold::holds`]. Any level.
 #[inline(always)]
 pub fn is_held() -> bool {
@@ -164,7 +171,7 @@ pub fn is_flushing() -> bool {
     hold_byte().get() >= Hold::Flush as u8
 }
 
-/// Whether the queue is being dropped: [`Hold::drops`]. Thread mode.
+/// Whether the queue is being dropped: [`Hold::drops`]. Any level.
 #[inline(always)]
 pub fn is_dropping() -> bool {
     hold_byte().get() >= Hold::Drop as u8
@@ -257,8 +264,9 @@ pub fn raise(alarm: Alarm, first: impl FnOnce()) -> bool {
     let counts = self::alarm().is_exceeded_by(alarm);
     if counts {
         first();
-        alarm_byte().set(alarm as u8);
+        // In this order, so that exec never takes what is to be dropped for what is queued in the alarm.
         take(Event::Cut);
+        alarm_byte().set(alarm as u8);
     }
     counts
 }

@@ -172,6 +172,7 @@ fn questions_are_those_of_the_state() {
         assert_eq!(is_stopped(), state.cycle == Cycle::Stopped);
         assert_eq!(is_checking(), state.cycle == Cycle::Check);
         assert_eq!(is_alarmed(), state.alarm != Alarm::None);
+        assert_eq!(is_locked(), state.alarm.is_on() && !hold.drops());
         assert_eq!((alarm(), cycle()), (state.alarm, state.cycle));
     }
 }
@@ -214,6 +215,16 @@ fn in_an_alarm_nothing_is_carried_out_that_was_not_before_it() {
                 "{event:?} in {state:?}"
             );
             assert!(after.alarm.is_on() || event == Event::Cleared, "{event:?} in {state:?}");
+        }
+    }
+}
+
+#[test]
+fn exec_carries_nothing_out_in_an_alarm_before_the_queue_has_been_dropped() {
+    let is_locked = |state: State| state.alarm.is_on() && !state.hold.drops();
+    for state in reachable().into_iter().filter(|state| !is_locked(*state)) {
+        for event in Event::ALL.into_iter().filter(|event| *event != Event::Dropped) {
+            assert!(!is_locked(state.after(event)), "{event:?} in {state:?}");
         }
     }
 }

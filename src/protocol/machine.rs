@@ -156,8 +156,9 @@ pub trait Machine {
     fn flush(&mut self) -> Status;
     /// Starts a built-in job. Number 0 ends the running one.
     fn start_job(&mut self, number: u8) -> Status;
-    /// Homes the given axes (as bits) that have a homing switch, or refuses to.
-    fn home(&mut self, axes: u8) -> Status;
+    /// Homes the given axes (as bits) that have a homing switch, or refuses to. With `ends_alarm` it is not refused in
+    /// an alarm, which ends if the homing begins. [`Status::Again`]: the machine still slows down.
+    fn home(&mut self, axes: u8, ends_alarm: bool) -> Status;
     /// Turns check mode on or off, or refuses to. In check mode lines of G-code are checked but not run.
     fn check(&mut self, on: bool) -> Status;
     /// Holds motion as a feedhold does, also at rest, until a sender resumes it.

@@ -248,7 +248,8 @@ impl Runner<'_> {
 
     #[inline(always)]
     fn next_step(&mut self, standstill: bool, out: &mut Snapshot, motors: &mut Motors) -> Step {
-        if stepper::is_stopped() {
+        // In an alarm that has stopped the steps, the end of a program is still carried out.
+        if stepper::is_stopped() && !machine::is_locked() {
             return Step::Held;
         }
         // There is room: this task alone fills the ring.

@@ -56,10 +56,11 @@ use crate::realtime::{ENQUIRY, FLUSH, HOLD, KILL, LET_GO, RESET, RESUME, UNPLACE
 use crate::status::Status;
 
 /// Whether a machine that is `running` must stop. The character alone begins the hold, because thread mode may be busy
-/// with a report. Exec only.
+/// with a report. An open door holds nothing in an alarm, where nothing moves: the end of a program need not wait for
+/// the door. Exec only.
 #[inline(always)]
 pub fn is_wanted(running: bool) -> bool {
-    machine::is_held() || (running && uart::asks_hold())
+    (machine::is_held() && !machine::is_locked()) || (running && uart::asks_hold())
 }
 
 /// Drops everything when an alarm begins: the queue, once the machine has stopped, and the lines of G-code received so
@@ -171,7 +172,8 @@ pub fn serve(links: &Links) {
         if characters != 0 {
             act(links, port, characters);
         }
-        if Speech::HAS_QUESTION && port.take_asked(ports::RESET) {
+        // Not if a `^x` has come meanwhile: what is behind that runs.
+        if Speech::HAS_QUESTION && port.take_asked(ports::RESET) && !port.is_resetting() {
             start_over(links, port, uart::newest(port.number), false);
         }
     }

@@ -34,7 +34,7 @@ use super::row::{self, Row};
 use super::tx::Tx;
 use crate::hal::event::{Event, is_wanted, set_asked, wake_after, wake_after_transmitted};
 use crate::hal::serial::{PORTS, USB};
-use crate::machine::{self, Cycle};
+use crate::machine::{self, Alarm, Cycle};
 use crate::protocol::{Answers, Notice, Request, Speech, asks_alarm};
 use crate::status::Status;
 use answer::{Answer, finish, go_on, has_room, leave};
@@ -525,6 +525,8 @@ fn begin(
     drop(settings);
     port.speech.set(speech);
     port.has_stopped.set(class == Class::Control && asks_alarm(line, port.is_plain()).is_some());
+    // A line that a reset has dropped may have waited for the end of an alarm.
+    port.clears.set(Alarm::None);
     let gcode = request.gcode();
     if let Some(block) = gcode {
         let (status, commented) = match *deferred {

@@ -207,10 +207,11 @@ impl<'a> View<'a> {
         (axes != 0 && homed).into()
     }
 
-    /// Whether the machine is idle, so that an action other than a line may begin. If not, the error is the reason.
-    fn may_begin(&self) -> Result<(), Status> {
+    /// Whether the machine is idle, so that an action other than a line may begin. If not, the error is the reason. An
+    /// alarm does not count if the action `ends_alarm`.
+    fn may_begin(&self, ends_alarm: bool) -> Result<(), Status> {
         let alarm = machine::alarm();
-        if alarm != Alarm::None {
+        if alarm != Alarm::None && !ends_alarm {
             return Err(alarm.status());
         }
         let busy = self.is_busy() || self.has_others();
@@ -355,6 +356,7 @@ impl Machine for View<'_> {
     fn hold(&mut self) -> Hold {
         match self.is_held() {
             false => Hold::None,
+            true if machine::is_locked() => Hold::Rests,
             true if self.motion().held && !machine::is_resuming() => Hold::Rests,
             true => Hold::Slows,
         }
@@ -401,8 +403,8 @@ impl Machine for View<'_> {
         cycles::start_job(self, number)
     }
 
-    fn home(&mut self, axes: u8) -> Status {
-        cycles::home(self, axes)
+    fn home(&mut self, axes: u8, ends_alarm: bool) -> Status {
+        cycles::home(self, axes, ends_alarm)
     }
 
     fn check(&mut self, on: bool) -> Status {
@@ -433,8 +435,11 @@ impl Machine for View<'_> {
     }
 
     fn start_over(&mut self) {
-        self.port.ask(RESET);
-        flags::set(Event::Realtime);
+        // A `^x` that has come while the line is answered is enough.
+        if !self.port.is_resetting() {
+            self.port.ask(RESET);
+            flags::set(Event::Realtime);
+        }
     }
 
     #[cfg(feature = "dialect-reprap")]
@@ -552,7 +557,7 @@ impl Machine for View<'_> {
 
     fn energize(&mut self, motor: Option<u8>, on: bool) -> Status {
         // Without power a motor that moves would lose its position.
-        if self.is_busy() && !on {
+        if !on && (self.has_work() || machine::is_checking()) {
             return Status::NotAccepted;
         }
         let motors = motor.map_or(u8::MAX, |motor| 1 << motor);

@@ -197,10 +197,14 @@ impl Request {
             }
             // The commands from here on need the machine at rest or in an alarm.
             _ if at == 0 && self.command != Command::Unlock && !may_change(machine) => {
-                let ends = machine.doing() == Doing::Runs && machine.value(Value::MovesLast) == 0;
-                // Senders assume that the machine is at rest after the answer to a line without motion, because grbl
-                // answers it then. The command therefore waits for rest.
-                if ends { Step::Later(0) } else { Step::Error(BUSY) }
+                let waits = match machine.doing() {
+                    // The machine still slows down, or a reset has queued the end of the program.
+                    Doing::Alarm(_) => true,
+                    // Senders assume that the machine is at rest after the answer to a line without motion, because
+                    // grbl answers it then. The command therefore waits for rest.
+                    doing => doing == Doing::Runs && machine.value(Value::MovesLast) == 0,
+                };
+                if waits { Step::Later(0) } else { Step::Error(BUSY) }
             }
             Command::Settings => list_setting(at, machine, out),
             Command::Offsets => match at {
@@ -352,11 +356,16 @@ fn begins(machine: &mut impl Machine) -> Step {
     if waits { Step::Later(0) } else { Step::Done }
 }
 
-/// Whether settings may be read and changed: at rest (also in check mode), and in an alarm.
+/// Whether settings may be read and changed: at rest (also in check mode), also in an alarm.
 #[small]
 fn may_change(machine: &mut impl Machine) -> bool {
     let stopped = machine.cycle() == Cycle::Stopped;
-    matches!(machine.doing(), Doing::Rests | Doing::Alarm(_)) && !stopped
+    !stopped
+        && match machine.doing() {
+            Doing::Rests => true,
+            Doing::Alarm(_) => machine.value(Value::Working) == 0,
+            _ => false,
+        }
 }
 
 /// Writes a row of `$$`.
@@ -417,7 +426,7 @@ fn set<M: Machine>(
     }
 }
 
-/// `$H`: ends the alarm, homes, and waits until homing is over.
+/// `$H`: homes, which ends an alarm, and waits until homing is over. If it is refused the alarm stays.
 #[inline(never)]
 #[small]
 fn home(at: u8, axis: u8, machine: &mut impl Machine) -> Step {
@@ -446,15 +455,12 @@ fn home(at: u8, axis: u8, machine: &mut impl Machine) -> Step {
         machine.alarm(Alarm::Alarm);
         return Step::Error(LOCKED);
     }
-    match machine.clear() {
-        Status::Ok => {}
-        Status::Again => return Step::Later(0),
-        status => return Step::Error(error_number(status)),
-    }
-    machine.memory().grbl.note(SLEEPS, false);
     let axes = if axis == ALL { ALL } else { 1 << axis };
-    match machine.home(axes) {
-        Status::Ok => Step::Later(HOMES),
+    match machine.home(axes, true) {
+        Status::Ok => {
+            machine.memory().grbl.note(SLEEPS, false);
+            Step::Later(HOMES)
+        }
         Status::Again => Step::Later(0),
         status => Step::Error(error_number(status)),
     }
@@ -516,7 +522,8 @@ fn sleep(machine: &mut impl Machine, out: &mut impl Out) -> Step {
     Step::Done
 }
 
-/// `$RST=`: restores settings, offsets, or both. Answered when they are in memory.
+/// `$RST=`: restores settings, offsets, or both. Answered when they are in memory. Settings come first, because they
+/// alone can be refused: then nothing has changed.
 #[inline(never)]
 #[small]
 fn restore(at: u8, letter: u8, machine: &mut impl Machine, out: &mut impl Out) -> Step {
@@ -525,22 +532,21 @@ fn restore(at: u8, letter: u8, machine: &mut impl Machine, out: &mut impl Out) -
     /// The first value of the coordinate systems to be cleared. Each value is a part.
     const ROWS: u8 = 8;
     match at {
-        0 if letter == b'$' => Step::Later(SETTINGS),
-        0 => Step::Later(ROWS),
+        0 => Step::Later(if letter == b'#' { ROWS } else { SETTINGS }),
         STORES if machine.value(Value::Kept) == 0 => Step::Later(STORES),
         STORES => {
             message(out, text!("Restoring defaults"));
             Step::At(TOLD)
         }
         SETTINGS => match machine.restore() {
-            Status::Ok => Step::Later(STORES),
+            Status::Ok => Step::Later(if letter == b'*' { ROWS } else { STORES }),
             status => Step::Error(error_number(status)),
         },
         TOLD => Step::Done,
         at => {
             let (row, axis) = ((at - ROWS) / AXES as u8, (at - ROWS) % AXES as u8);
             if row >= SYSTEMS {
-                return Step::Later(if letter == b'*' { SETTINGS } else { STORES });
+                return Step::Later(STORES);
             }
             match machine.set_row(TableRow::system(row), axis, Length::ZERO) {
                 Ok(()) => Step::Later(at + 1),

@@ -255,7 +255,7 @@ fn home(at: u8, number: u16, block: &[u8], machine: &mut impl Machine) -> Step {
         if wrong {
             return Step::Refused(Status::HomingSwitches);
         }
-        return match machine.home(axes) {
+        return match machine.home(axes, false) {
             Status::Ok => Step::Later(HOMES),
             status => Step::Refused(status),
         };

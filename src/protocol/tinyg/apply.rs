@@ -167,7 +167,7 @@ fn set_value<M: Machine, O>(
     let change = match source {
         Source::Of(Value::Home) => {
             let sure = is_sure(pair, c)?;
-            return if sure { done(c.machine.home(u8::MAX)) } else { Ok(()) };
+            return if sure { done(c.machine.home(u8::MAX, false)) } else { Ok(()) };
         }
         Source::Of(Value::Check) => {
             let on = is_sure(pair, c)?;

@@ -230,7 +230,7 @@ impl Machine for Fake {
         if number < 20 { Status::Ok } else { Status::Error }
     }
 
-    fn home(&mut self, _axes: u8) -> Status {
+    fn home(&mut self, _axes: u8, _ends_alarm: bool) -> Status {
         Status::HomingSwitches
     }
 

@@ -12,7 +12,7 @@ use crate::hal::eeprom::Eeprom;
 use crate::jobs::{Job, STORED};
 use crate::machine::jog::Bar;
 use crate::machine::{self, Alarm};
-use crate::protocol::Value;
+use crate::protocol::{Machine, Value};
 use crate::status::Status;
 use crate::store::program;
 use crate::tasks::homing;
@@ -36,21 +36,32 @@ pub(super) fn start_job(view: &mut View<'_>, number: u8) -> Status {
     Status::Ok
 }
 
-/// Begins homing these axes, as bits.
+/// Begins homing these axes, as bits. `ends_alarm`: an alarm that is on ends if the homing begins, and only then.
 #[small]
 #[inline(always)]
-pub(super) fn home(view: &mut View<'_>, axes: u8) -> Status {
+pub(super) fn home(view: &mut View<'_>, axes: u8, ends_alarm: bool) -> Status {
     let axes = homing::axes(&view.settings) & axes;
     if axes == 0 {
         return Status::HomingSwitches;
     }
-    if let Err(status) = view.may_begin() {
+    if ends_alarm && machine::is_alarmed() && machine::is_flushing() {
+        // Not yet: the machine may still slow down.
+        return view.clear();
+    }
+    if let Err(status) = view.may_begin(ends_alarm) {
         return status;
     }
     for axis in (0..homing::AXES).filter(|axis| axes & 1 << axis != 0) {
         if let Err(status) = homing::of(&view.settings, axis) {
             view.links.model.borrow_mut().blame(axis);
             view.links.except(status);
+            return status;
+        }
+    }
+    // Last, because a request that is refused ends no alarm.
+    if ends_alarm && machine::is_alarmed() {
+        let status = view.clear();
+        if status != Status::Ok {
             return status;
         }
     }
@@ -98,7 +109,7 @@ pub(super) fn jog(view: &mut View<'_>, axis: u8, place: Length) -> Status {
     {
         return status;
     }
-    if let Err(status) = view.may_begin() {
+    if let Err(status) = view.may_begin(false) {
         return status;
     }
     let model = view.links.model.borrow();

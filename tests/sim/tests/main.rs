@@ -6,6 +6,8 @@
 #[macro_use]
 mod common;
 
+#[path = "../../support/alarm_model.rs"]
+mod alarm_model;
 #[path = "../../support/crowd.rs"]
 mod crowd;
 #[path = "../../support/grbl_ops.rs"]
