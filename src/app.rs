@@ -25,7 +25,7 @@ use crate::store::Log;
 use crate::store::kept;
 use crate::tasks::common::Common;
 use crate::tasks::heat::Heaters;
-use crate::tasks::links::{Changes, Links, QueueCount};
+use crate::tasks::links::{Changes, Last, Links, QueueCount};
 use crate::tasks::planner::Planner;
 use crate::tasks::ports::{AUX_RESERVE, Choice, Port};
 use crate::tasks::storage::Storage;
@@ -54,7 +54,7 @@ impl Links {
             commands_taken: Cell::new(false),
             planner_wake: Wake::default(),
             chain_waits: Cell::new(false),
-            moves_last: Cell::new(false),
+            last: Cell::new(Last::Other),
             cycle_start: Wake::default(),
             notices: Notices::default(),
             reporter_wake: ReporterWake::default(),

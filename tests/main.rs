@@ -73,6 +73,7 @@ mod check;
 mod control;
 mod corexy;
 mod docs;
+mod dwells;
 mod fine_steps;
 mod gcode_props;
 mod governor;

@@ -20,8 +20,10 @@ pub enum Value {
     Flow,
     /// 1 if anything is queued or runs.
     Working,
-    /// 1 if the last line that was queued moves the machine.
+    /// 1 if the last line that was queued moves the machine, and does not pause.
     MovesLast,
+    /// 1 if the last line that was queued pauses (G4).
+    PausesLast,
     /// 1 if a block is being carried out.
     Running,
     /// Units: 0 inch, 1 mm.

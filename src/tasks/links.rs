@@ -56,8 +56,8 @@ pub struct Links {
     pub feeder: Cell<u8>,
     /// The planner works on `commands`.
     pub commands_taken: Cell<bool>,
-    /// The last line that the planner has been given moves the machine.
-    pub moves_last: Cell<bool>,
+    /// What the last line does that the planner has been given.
+    pub last: Cell<Last>,
     /// A line has come, or the planner is ready: wakes the parser.
     pub parser_wake: Wake,
     /// `commands` has been filled.
@@ -106,6 +106,28 @@ pub struct Links {
     pub model: RefCell<Interpreter<&'static Storage>>,
     /// Settings in force.
     pub settings: RefCell<Settings>,
+}
+
+/// What a line does, as far as the answers to later lines depend on it.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Last {
+    /// The line neither moves the machine nor pauses.
+    Other,
+    /// The line moves the machine.
+    Moves,
+    /// The line pauses (G4).
+    Pauses,
+}
+
+impl Last {
+    /// Returns what a line with these commands does.
+    pub fn of(commands: &Commands) -> Self {
+        match commands.dwell_ms {
+            Some(_) => Self::Pauses,
+            None if commands.moves() => Self::Moves,
+            None => Self::Other,
+        }
+    }
 }
 
 /// Changes other than by lines. The code that changes something sets its bit; the planner takes the bits before the

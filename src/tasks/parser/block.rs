@@ -14,7 +14,7 @@ use crate::tasks::alarm;
 #[cfg(feature = "dialect-reprap")]
 use crate::tasks::heat;
 use crate::tasks::hold;
-use crate::tasks::links::Links;
+use crate::tasks::links::{Last, Links};
 use crate::tasks::ports::Port;
 use crate::tasks::reporter::tell_startup;
 use crate::tasks::view::View;
@@ -194,7 +194,7 @@ fn carry_out(links: &Links, block: &[u8], declined: bool) -> (Status, bool) {
         Ok(info) if info.deleted => (Status::Noop, true),
         Ok(info) => {
             if !commands.is_empty() && !machine::is_checking() {
-                links.moves_last.set(commands.moves());
+                links.last.set(Last::of(&commands));
                 if words.is_some() != jogs {
                     enter(words.is_some());
                 }

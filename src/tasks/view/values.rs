@@ -11,6 +11,7 @@ use crate::machine;
 use crate::motion::queue;
 use crate::protocol::{Speech, Value, thousandths};
 use crate::tasks::health;
+use crate::tasks::links::Last;
 use crate::tasks::overrides;
 use crate::tasks::turning;
 
@@ -20,7 +21,8 @@ use crate::tasks::turning;
 pub(super) fn value(view: &mut View<'_>, value: Value) -> i32 {
     match value {
         Value::Working => view.has_work().into(),
-        Value::MovesLast => view.links.moves_last.get().into(),
+        Value::MovesLast => (view.links.last.get() == Last::Moves).into(),
+        Value::PausesLast => (view.links.last.get() == Last::Pauses).into(),
         Value::Running => view.motion().running.into(),
         // Lines that move nothing are finished when all lines before them are.
         Value::FinishedLine if view.stands() => modal(view, Value::BlockLine),
