@@ -59,7 +59,7 @@ impl Links {
             notices: Notices::default(),
             reporter_wake: ReporterWake::default(),
             queue_count: QueueCount::default(),
-            changes: Changes::new(Changes::SETTINGS),
+            changes: Changes::new(Changes::SETTINGS | Changes::ORIGIN),
             rate: Cell::new(None),
             restart: Cell::new(None),
             cleared_by: Cell::new(USB),

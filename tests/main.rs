@@ -58,6 +58,8 @@ mod side;
 mod stream;
 #[path = "support/tables.rs"]
 mod tables;
+#[path = "support/told.rs"]
+mod told_session;
 #[path = "support/transcript.rs"]
 mod transcript;
 #[path = "support/wiring.rs"]
@@ -102,6 +104,7 @@ mod reprap;
 mod settings;
 mod squaring;
 mod streams;
+mod told;
 mod transcripts;
 mod usb_opens;
 mod wrap;

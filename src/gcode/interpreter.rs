@@ -248,6 +248,7 @@ impl<T: Tables> Interpreter<T> {
             &mut edit,
         );
         self.state.carry_flow(done.is_ok());
+        self.state.moves_origin |= done.is_ok() && before.has_other_origin(&self.state);
         match (&done, &edit) {
             (Ok(()), Some(edit)) => self.tables.apply(edit),
             (Ok(()), None) => {}
@@ -322,6 +323,12 @@ impl RareBefore {
         let State { homed, shift, shifted, tool_length, speed, limit, selected, tool, .. } = *state;
         let (usual, origin) = (Before::of(state), state.origin);
         Self { usual, origin, homed, shift, shifted, tool_length, speed, limit, selected, tool }
+    }
+
+    /// Whether a state differs in the origin, the coordinate system or the tool.
+    fn has_other_origin(&self, state: &State) -> bool {
+        let system = self.usual.modal.system != state.modal.system;
+        system || self.tool != state.tool || self.origin != state.origin
     }
 
     #[inline(never)]
@@ -449,6 +456,11 @@ impl<T> Interpreter<T> {
     /// Whether a line has asked for the length of a tool without a length, so that 0 is in force. Resets the answer.
     pub fn take_lack(&mut self) -> bool {
         core::mem::take(&mut self.state.lacks_length)
+    }
+
+    /// Whether lines have changed the origin, the coordinate system or the tool. Resets the answer.
+    pub fn take_moved_origin(&mut self) -> bool {
+        core::mem::take(&mut self.state.moves_origin)
     }
 
     /// Returns the tool in the spindle, 0 for none.

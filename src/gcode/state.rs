@@ -49,6 +49,8 @@ pub struct State {
     pub tool_length: PerAxis<Length>,
     /// A line has asked for the length of a tool that has none. The parser takes and reports this.
     pub lacks_length: bool,
+    /// A line has changed the origin, the coordinate system or the tool. The parser takes this.
+    pub moves_origin: bool,
     /// S: turns a minute, or m/min with G96.
     pub speed: f32,
     /// D of G96: the most turns a minute; 0 for no limit.
@@ -80,6 +82,7 @@ impl State {
             shifted: false,
             tool_length: [Length::ZERO; AXES],
             lacks_length: false,
+            moves_origin: false,
             speed: 0.0,
             limit: 0,
             selected: 0,

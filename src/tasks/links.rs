@@ -10,7 +10,7 @@
 //! | `uart` transmit ring | bytes | 127 each port | 131 B each | parser, reporter | TX interrupt | parser: the port waits, response half sent; reporter: waits |
 //! | [`Links::storage`] | which settings to look at, a row of the tables | a range, 1 | 46 B | parser | storage | the range grows; a line that changes another row waits |
 //! | [`Links::rate`] | a new rate of the line | 1 | 6 B | parser | parser | overwritten: the newest counts |
-//! | [`Port::seen`] | the state of the machine when the report under way first read motion | 1 | 33 B each port | the task that reports on the port | that task | overwritten |
+//! | [`Port::seen`] | the state of the machine when the report under way first read motion | 1 | 53 B each port | the task that reports on the port | that task | overwritten |
 //! | [`Links::restart`] | a reset that is due | 1 | 1 B | parser | parser | overwritten |
 //! | [`Links::changes`] | changes that the planner handles before the next line | a bit each | 1 B | parser, planner | planner | bits merge |
 //! | [`Links::notices`], [`Links::probe`] | what is to be told: an exception, the end of a jog or of a flush, a probing | 1 each | 4 B, 26 B | all | reporter | overwritten: the newest counts, but in an alarm its reason |
@@ -140,9 +140,13 @@ impl Changes {
     /// A setting has changed.
     pub const SETTINGS: u8 = 2;
 
+    /// The origin, the coordinate system or the tool may have changed.
+    pub const ORIGIN: u8 = 16;
+
     /// Coolant outputs that have been toggled other than by a line, as bits of [`outputs`]. Toggling one twice is no
     /// change.
     pub const COOLANT: u8 = outputs::MIST | outputs::FLOOD;
+    const _APART: () = assert!(Self::COOLANT & (Self::STEPS | Self::SETTINGS | Self::ORIGIN) == 0);
 
     /// A set in which these bits are noted.
     pub const fn new(bits: u8) -> Self {

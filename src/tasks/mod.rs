@@ -19,6 +19,7 @@ mod homing;
 mod jog;
 pub mod lines;
 pub mod links;
+mod origin;
 pub mod overrides;
 mod overtake;
 pub mod parser;

@@ -25,12 +25,14 @@ use super::heat;
 use super::hold;
 use super::homing;
 use super::links::{Changes, Links};
+use super::origin;
 use super::overrides;
 use super::ports::{Port, RESET};
 use super::power;
 use super::setup::counted;
+use super::spindle;
 use super::switches;
-use crate::boards::{MOTORS, inputs};
+use crate::boards::{MOTORS, inputs, outputs};
 #[cfg(feature = "sd")]
 use crate::card::{Entry, Op};
 #[cfg(feature = "bed-plane")]
@@ -91,15 +93,21 @@ pub struct Seen {
     motion: Moment,
     /// A line was being carried out.
     carries_out: bool,
+    /// The outputs that were on.
+    outputs: u8,
 }
 
 impl Seen {
     /// Returns the present state of the machine. Thread mode.
-    fn now(links: &Links) -> Self {
+    fn now(links: &Links, settings: &Settings) -> Self {
         // In this order, because exec may begin a queued block in between.
-        let queued = is_queued(links);
-        let motion = snapshot(links.thread).moment();
-        Self { motion, carries_out: queued || motion.running }
+        let (taken, queued) = (links.commands_taken.get(), queue::used() > 0);
+        let mut motion = snapshot(links.thread).moment();
+        let runs = queued || motion.running;
+        if !runs {
+            motion.origin = origin::read(settings, &links.model.borrow());
+        }
+        Self { motion, carries_out: taken || runs, outputs: spindle::on() }
     }
 }
 
@@ -128,7 +136,7 @@ impl<'a> View<'a> {
         self.seen.get_or_init(|| {
             let shared = if self.shares { self.port.seen.get() } else { None };
             shared.unwrap_or_else(|| {
-                let seen = Seen::now(self.links);
+                let seen = Seen::now(self.links, &self.settings);
                 if self.shares {
                     self.port.seen.set(Some(seen));
                 }
@@ -273,7 +281,18 @@ impl<'a> View<'a> {
     }
 
     fn offset(&self, axis: usize) -> Length {
-        self.links.model.borrow().work_offset().get(axis).copied().unwrap_or(Length::ZERO)
+        let model = self.links.model.borrow();
+        origin::offset(axis, &self.motion().origin, &self.settings, &model)
+    }
+
+    /// Whether this output is on, or was at the moment of the report.
+    fn is_on(&self, output: u8) -> i32 {
+        (self.seen().outputs & output != 0).into()
+    }
+
+    /// Has the planner tell exec of the origin before the next line.
+    fn note_origin(&self) {
+        self.links.changes.note(Changes::ORIGIN);
     }
 
     /// Returns 1 if a switch is worked, 0 if not, -1 if there is no switch or it is off.
@@ -289,9 +308,14 @@ impl<'a> View<'a> {
         heat::standing(self.links, heater).unwrap_or_default()
     }
 
-    /// Returns S, in thousandths of a turn a minute.
+    /// Returns S, in thousandths of a turn a minute: that of the spindle while it turns, else that of the last S word.
     fn programmed_speed(&self) -> i32 {
-        values::modal(self, Value::SpindleSpeed).min(2_000_000) * 1_000
+        let speed = self.motion().speed as i32;
+        let turns = match speed {
+            0 if self.is_on(outputs::SPINDLE) == 0 => values::modal(self, Value::SpindleSpeed),
+            _ => speed,
+        };
+        turns.min(2_000_000) * 1_000
     }
 }
 
@@ -311,11 +335,13 @@ impl Machine for View<'_> {
 
     fn set_row(&mut self, row: TableRow, axis: u8, value: Length) -> Result<(), Status> {
         self.may_set()?;
+        self.note_origin();
         self.links.model.borrow_mut().set(row, axis, value)
     }
 
     fn set_tool_length(&mut self, axis: u8, length: Length) -> Result<(), Status> {
         self.may_set()?;
+        self.note_origin();
         self.links.model.borrow_mut().set_tool_length(axis, length)
     }
 
@@ -325,6 +351,10 @@ impl Machine for View<'_> {
 
     fn value(&mut self, value: Value) -> i32 {
         values::value(self, value)
+    }
+
+    fn programmed(&mut self, value: Value) -> i32 {
+        values::modal(self, value)
     }
 
     fn moment(&mut self, first: bool) {
@@ -490,6 +520,7 @@ impl Machine for View<'_> {
     #[cfg(feature = "dialect-reprap")]
     fn clear_shift(&mut self, axes: u8) {
         self.links.model.borrow_mut().clear_shift(axes);
+        self.note_origin();
     }
 
     #[cfg(feature = "dialect-reprap")]

@@ -14,7 +14,7 @@ use crate::tasks::alarm;
 #[cfg(feature = "dialect-reprap")]
 use crate::tasks::heat;
 use crate::tasks::hold;
-use crate::tasks::links::{Last, Links};
+use crate::tasks::links::{Changes, Last, Links};
 use crate::tasks::ports::Port;
 use crate::tasks::reporter::tell_startup;
 use crate::tasks::view::View;
@@ -130,6 +130,7 @@ pub fn end_program(links: &Links, resets: bool) {
     let _ = carry_out(links, b"M2", false);
     if resets {
         links.model.borrow_mut().reset();
+        links.changes.note(Changes::ORIGIN);
     }
 }
 
@@ -200,6 +201,10 @@ fn carry_out(links: &Links, block: &[u8], declined: bool) -> (Status, bool) {
                 }
                 links.commands_taken.set(true);
                 links.planner_wake.signal();
+            }
+            if model.take_moved_origin() {
+                // The planner tells exec before the next line that does something.
+                links.changes.note(Changes::ORIGIN);
             }
             if model.take_lack() {
                 links.except(Status::NoToolLength);
