@@ -326,9 +326,13 @@ impl RareBefore {
     }
 
     /// Whether a state differs in the origin, the coordinate system or the tool.
+    #[inline(never)]
     fn has_other_origin(&self, state: &State) -> bool {
-        let system = self.usual.modal.system != state.modal.system;
-        system || self.tool != state.tool || self.origin != state.origin
+        let mut differs = self.usual.modal.system != state.modal.system || self.tool != state.tool;
+        for (before, now) in self.origin.iter().zip(&state.origin) {
+            differs |= before != now;
+        }
+        differs
     }
 
     #[inline(never)]

@@ -34,6 +34,7 @@ pub struct Block {
 
 impl Block {
     /// Whether the block is an action that does not stop the machine.
+    #[inline(never)]
     #[small]
     pub fn is_aside(&self) -> bool {
         matches!(

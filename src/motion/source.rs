@@ -76,11 +76,14 @@ impl BlockSource {
     #[inline(never)]
     #[small]
     pub fn goes_on(&self) -> bool {
-        let mut ahead = 1;
-        while ahead <= ASIDE && self.ring.peek(ahead, Block::is_aside) == Some(true) {
-            ahead += 1;
+        for ahead in 1..=ASIDE + 1 {
+            let kind = |block: &Block| (matches!(block.body, Body::Line(_)), block.is_aside());
+            match self.ring.peek(ahead, kind) {
+                Some((false, true)) => {}
+                next => return next.is_some_and(|(is_line, _)| is_line),
+            }
         }
-        self.ring.peek(ahead, |block| matches!(block.body, Body::Line(_))) == Some(true)
+        false
     }
 
     /// Returns what `look` makes of the oldest block; `None` if there is no block.

@@ -56,7 +56,7 @@ use crate::motion::snapshot::{Moment, Program};
 use crate::protocol::Level;
 #[cfg(feature = "dialect-reprap")]
 use crate::protocol::{Cold, Extruder};
-use crate::protocol::{Hold, Machine, Memory, Remembers, Store, Value, Warning};
+use crate::protocol::{Hold, Machine, Memory, Remembers, Store, Value, Warning, thousandths};
 use crate::status::Status;
 use crate::store::kept::ITEMS;
 use crate::store::program;
@@ -280,12 +280,14 @@ impl<'a> View<'a> {
         }
     }
 
+    #[inline(never)]
     fn offset(&self, axis: usize) -> Length {
         let model = self.links.model.borrow();
         origin::offset(axis, &self.motion().origin, &self.settings, &model)
     }
 
     /// Whether this output is on, or was at the moment of the report.
+    #[inline(never)]
     fn is_on(&self, output: u8) -> i32 {
         (self.seen().outputs & output != 0).into()
     }
@@ -309,13 +311,11 @@ impl<'a> View<'a> {
     }
 
     /// Returns S, in thousandths of a turn a minute: that of the spindle while it turns, else that of the last S word.
+    #[inline(never)]
     fn programmed_speed(&self) -> i32 {
-        let speed = self.motion().speed as i32;
-        let turns = match speed {
-            0 if self.is_on(outputs::SPINDLE) == 0 => values::modal(self, Value::SpindleSpeed),
-            _ => speed,
-        };
-        turns.min(2_000_000) * 1_000
+        let now = self.motion().speed;
+        let is_off = now.to_bits() == 0 && self.is_on(outputs::SPINDLE) == 0;
+        thousandths(if is_off { self.links.model.borrow().spindle_speed() } else { now })
     }
 }
 

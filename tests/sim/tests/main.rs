@@ -30,6 +30,8 @@ mod session;
 mod side;
 #[path = "../../support/stream/mod.rs"]
 mod stream;
+#[path = "../../support/told.rs"]
+mod told_session;
 #[path = "../../support/transcript.rs"]
 mod transcript;
 
@@ -82,6 +84,7 @@ mod streams;
 mod switches;
 mod taps_and_feeds;
 mod threads;
+mod told;
 mod transcripts;
 mod turning_alarms;
 mod turning_faults;
