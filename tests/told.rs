@@ -52,6 +52,7 @@ fn path_of(behind: [&str; 2]) -> Vec<i64> {
         lines.push(behind[n as usize % 2].to_string());
     }
     let (mut sent, mut answered, mut rests) = (0, 0, 0);
+    let mut heard = String::new();
     let mut path = vec![0];
     while rests < 100 {
         while sent < lines.len() && sent < answered + 4 {
@@ -59,8 +60,8 @@ fn path_of(behind: [&str; 2]) -> Vec<i64> {
             sent += 1;
         }
         machine.run_ms(1);
-        let heard = String::from_utf8(machine.received()).unwrap();
-        answered += heard.matches("\"f\":[1,0,").count();
+        heard += &String::from_utf8(machine.received()).unwrap();
+        answered = heard.matches("\"f\":[1,0,").count();
         let at = machine.emitted().position[0];
         rests = if path.last() == Some(&at) && at > 0 { rests + 1 } else { 0 };
         path.push(at);

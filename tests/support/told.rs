@@ -137,7 +137,9 @@ impl<S: Side> Told<S> {
             story: String::new(),
             compared: 0,
         };
-        told.run_ms(100);
+        // Before its start a chip has no outputs.
+        told.side.run_ms(300);
+        told.side.heard();
         match tongue {
             Tongue::TinyG => {
                 let list = "stat:t,posx:t,posy:t,posz:t,mpox:t,mpoy:t,mpoz:t,ofsx:t,ofsy:t,ofsz:t,spe:t,spd:t,sps:t,\
@@ -179,6 +181,9 @@ impl<S: Side> Told<S> {
             self.side.run_ms(1);
             self.now += 1;
             let (on, duty) = self.side.outputs();
+            // The direction has no meaning while the spindle is off.
+            let turns = on & outputs::SPINDLE != 0;
+            let on = if turns { on } else { on & !outputs::COUNTERCLOCKWISE };
             self.seen.push(Pins { steps: self.side.steps(), on, duty });
             self.heard += &String::from_utf8_lossy(&self.side.heard()).replace('\r', "");
         }
