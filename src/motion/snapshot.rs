@@ -16,7 +16,7 @@ use crate::units::Length;
 const LATHES: usize = Capability::Lathe.is_built_in() as usize;
 
 /// What the coordinates of a move count from, as reports show it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Origin {
     /// The work offset of the axis that each motor moves.
     pub offset: [Length; MOTORS],
@@ -32,7 +32,7 @@ impl Origin {
 }
 
 /// What reports show of the motion that is being prepared.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Snapshot {
     /// Motor positions at the end of the block being run, in steps.
     pub target: [i32; MOTORS],
