@@ -26,7 +26,7 @@ use crate::store::kept;
 use crate::store::{Log, Memory as _};
 use crate::tasks::common::Common;
 use crate::tasks::heat::Heaters;
-use crate::tasks::links::{Changes, Links, QueueCount};
+use crate::tasks::links::{Changes, Last, Links, QueueCount};
 use crate::tasks::planner::Planner;
 use crate::tasks::ports::{AUX_RESERVE, Choice, Port};
 use crate::tasks::setup::limit_velocity;
@@ -56,12 +56,12 @@ impl Links {
             commands_taken: Cell::new(false),
             planner_wake: Wake::default(),
             chain_waits: Cell::new(false),
-            moves_last: Cell::new(false),
+            last: Cell::new(Last::Other),
             cycle_start: Wake::default(),
             notices: Notices::default(),
             reporter_wake: ReporterWake::default(),
             queue_count: QueueCount::default(),
-            changes: Changes::new(Changes::SETTINGS),
+            changes: Changes::new(Changes::SETTINGS | Changes::ORIGIN),
             rate: Cell::new(None),
             restart: Cell::new(None),
             cleared_by: Cell::new(USB),

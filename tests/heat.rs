@@ -344,14 +344,14 @@ fn filament_moves_where_it_is_hot_enough() {
 #[test]
 fn filament_that_gets_cold_in_the_queue_is_not_moved() {
     let Some(mut printer) = prints(180.0) else { return };
-    printer.send("G4 S300");
-    printer.send("G1 X1 F3000");
+    printer.send("G1 X50 F10");
+    printer.send("G1 X51 F3000");
     printer.send("G1 E300 F600");
     printer.run(310_000, |_| {});
     let said = printer.said.clone();
     assert!(said.contains("Error:too cold to extrude"), "{said}");
     let steps = printer.machine.emitted().position;
-    assert_eq!(steps[0], 1_280);
+    assert_eq!(steps[0], 51 * 1_280);
     assert!(steps[3] < 400, "{steps:?}");
     printer.ask("M999");
     assert!(printer.ask("G1 X2").contains("ok"));

@@ -60,6 +60,8 @@ mod side;
 mod stream;
 #[path = "support/tables.rs"]
 mod tables;
+#[path = "support/told.rs"]
+mod told_session;
 #[path = "support/transcript.rs"]
 mod transcript;
 #[path = "support/wiring.rs"]
@@ -78,6 +80,7 @@ mod control;
 mod corexy;
 mod cuts;
 mod docs;
+mod dwells;
 mod fine_steps;
 mod gcode_props;
 mod governor;
@@ -109,6 +112,7 @@ mod reprap;
 mod settings;
 mod squaring;
 mod streams;
+mod told;
 mod transcripts;
 mod usb_opens;
 mod wrap;

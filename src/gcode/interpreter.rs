@@ -266,6 +266,7 @@ impl<T: Tables> Interpreter<T> {
             &mut edit,
         );
         self.state.carry_flow(done.is_ok());
+        self.state.moves_origin |= done.is_ok() && before.has_other_origin(&self.state);
         match (&done, &edit) {
             (Ok(()), Some(edit)) => self.tables.apply(edit),
             (Ok(()), None) => {}
@@ -339,6 +340,16 @@ impl RareBefore {
         let State { homed, shift, shifted, tool_length, speed, limit, selected, tool, .. } = *state;
         let (usual, origin) = (Before::of(state), state.origin);
         Self { usual, origin, homed, shift, shifted, tool_length, speed, limit, selected, tool }
+    }
+
+    /// Whether a state differs in the origin, the coordinate system or the tool.
+    #[inline(never)]
+    fn has_other_origin(&self, state: &State) -> bool {
+        let mut differs = self.usual.modal.system != state.modal.system || self.tool != state.tool;
+        for (before, now) in self.origin.iter().zip(&state.origin) {
+            differs |= before != now;
+        }
+        differs
     }
 
     #[inline(never)]
@@ -461,6 +472,11 @@ impl<T> Interpreter<T> {
     /// Returns the coordinate system in force: 1 for G54, to 9 for G59.3.
     pub fn coordinate_system(&self) -> u8 {
         self.state.modal.system + 1
+    }
+
+    /// Whether lines have changed the origin, the coordinate system or the tool. Resets the answer.
+    pub fn take_moved_origin(&mut self) -> bool {
+        core::mem::take(&mut self.state.moves_origin)
     }
 
     /// Returns the tool in the spindle, 0 for none.

@@ -47,6 +47,8 @@ pub struct Printing {
     dry: bool,
     /// The difference between extruded and programmed filament. The origin moves by it when the line is carried out.
     more: i32,
+    /// How far the origin has moved by all such differences, modulo 2^32.
+    flowed: i32,
 }
 
 /// How the extruder interprets its words: like any axis in this image.
@@ -57,7 +59,7 @@ pub struct Printing;
 #[cfg(feature = "dialect-reprap")]
 impl Printing {
     /// The state at power-up: E moves like any other axis.
-    pub const NONE: Self = Self { own: None, flow: FULL, dry: false, more: 0 };
+    pub const NONE: Self = Self { own: None, flow: FULL, dry: false, more: 0, flowed: 0 };
 
     /// Returns the distance mode of the extruder if it differs from that of the other axes, else `None`.
     #[inline(always)]
@@ -107,6 +109,12 @@ impl Printing {
     pub fn flows_as_programmed(self) -> bool {
         self.flows() == FULL
     }
+
+    /// Returns how far the flow has moved the origin of the extruder.
+    #[inline(always)]
+    fn flowed(self) -> i32 {
+        self.flowed
+    }
 }
 
 #[cfg(not(feature = "dialect-reprap"))]
@@ -152,6 +160,12 @@ impl Printing {
     #[inline(always)]
     pub fn flows_as_programmed(self) -> bool {
         true
+    }
+
+    /// Returns 0 in an image that cannot print.
+    #[inline(always)]
+    fn flowed(self) -> i32 {
+        0
     }
 }
 
@@ -218,8 +232,8 @@ impl State {
     pub(super) fn carry_flow(&mut self, done: bool) {
         if self.printing.more != 0 {
             let more = core::mem::take(&mut self.printing.more);
-            if done {
-                let _ = self.shift_extruder(more);
+            if done && self.shift_extruder(more).is_some() {
+                self.printing.flowed = self.printing.flowed.wrapping_add(more);
             }
         }
     }
@@ -312,6 +326,7 @@ impl<T> Interpreter<T> {
         let near = state.origin.get(EXTRUDER).is_some_and(|at| at.0.unsigned_abs() <= FAR as u32);
         if near {
             let _ = state.shift_extruder(by);
+            state.moves_origin = true;
         }
         out.clear();
         out.line = state.line;
@@ -355,5 +370,11 @@ impl<T> Interpreter<T> {
     /// Returns the flow: the distance of the extruder in thousandths of what its words say.
     pub fn flow(&self) -> u16 {
         self.state.printing.flow()
+    }
+
+    /// Returns how far lines at another flow than 100 % have moved the origin of the extruder, in units of a
+    /// [`Length`].
+    pub fn flowed(&self) -> i32 {
+        self.state.printing.flowed()
     }
 }

@@ -47,6 +47,8 @@ pub struct State {
     pub shifted: bool,
     /// The tool length in force (G43, G43.1, G43.2).
     pub tool_length: PerAxis<Length>,
+    /// A line has changed the origin, the coordinate system or the tool. The parser takes this.
+    pub moves_origin: bool,
     /// S: turns a minute, or m/min with G96.
     pub speed: f32,
     /// D of G96: the most turns a minute; 0 for no limit.
@@ -77,6 +79,7 @@ impl State {
             shift: [Length::ZERO; AXES],
             shifted: false,
             tool_length: [Length::ZERO; AXES],
+            moves_origin: false,
             speed: 0.0,
             limit: 0,
             selected: 0,

@@ -11,6 +11,7 @@ use super::float::size;
 use super::pace::Drivers;
 use super::retract::Retract;
 use super::short::Short;
+use super::snapshot::Origin;
 use crate::boards::MOTORS;
 use crate::gcode::command::Surface;
 use crate::gcode::heating::Heat;
@@ -28,11 +29,12 @@ pub const FRACTIONS: (i8, i8) = (-7, 6);
 pub struct Block {
     /// What the block does.
     pub body: Body,
-    line: [u8; 3],
+    line: Number,
 }
 
 impl Block {
     /// Whether the block is an action that does not stop the machine.
+    #[inline(never)]
     #[small]
     pub fn is_aside(&self) -> bool {
         matches!(
@@ -43,6 +45,7 @@ impl Block {
                     | QueuedAction::PerTurn(_)
                     | QueuedAction::Heat(_)
                     | QueuedAction::Advance(_)
+                    | QueuedAction::Origin(_)
             )
         )
     }
@@ -50,13 +53,13 @@ impl Block {
     /// Returns a block of the line with this N word, 0 for none; at most [`N_MAX`](crate::gcode::command::N_MAX).
     #[inline(always)]
     pub fn new(body: Body, line: u32) -> Self {
-        Self { body, line: number(line) }
+        Self { body, line: Number::of(line) }
     }
 
     /// Makes it a block of the line with this N word.
     #[inline(always)]
     pub fn set_line(&mut self, line: u32) {
-        self.line = number(line);
+        self.line = Number::of(line);
     }
 
     /// A block that does something other than move.
@@ -67,16 +70,28 @@ impl Block {
     /// The N word, 0 for none.
     #[inline(always)]
     pub fn line(&self) -> u32 {
-        let [a, b, c] = self.line;
-        u32::from_le_bytes([a, b, c, 0])
+        self.line.get()
     }
 }
 
-/// The bytes of an N word that a block keeps.
-#[inline(always)]
-fn number(line: u32) -> [u8; 3] {
-    let [a, b, c, _] = line.to_le_bytes();
-    [a, b, c]
+/// An N word, 0 for none, in three bytes.
+#[derive(Clone, Copy, Debug)]
+pub struct Number([u8; 3]);
+
+impl Number {
+    /// Keeps an N word, which is at most [`N_MAX`](crate::gcode::command::N_MAX).
+    #[inline(always)]
+    pub fn of(line: u32) -> Self {
+        let [a, b, c, _] = line.to_le_bytes();
+        Self([a, b, c])
+    }
+
+    /// Returns the N word.
+    #[inline(always)]
+    pub fn get(self) -> u32 {
+        let [a, b, c] = self.0;
+        u32::from_le_bytes([a, b, c, 0])
+    }
 }
 
 /// What a block does. Not one enum with [`QueuedAction`]: a line leaves one value free for a tag, no more.
@@ -120,6 +135,8 @@ pub enum QueuedAction {
     Heat(Heat),
     /// M900: sets the extruder's lead. Does not stop the machine.
     Advance(Lead),
+    /// The origin of the lines from here on, for reports. Does not stop the machine.
+    Origin(Origin),
     /// M0, M1, M60.
     ProgramStop,
     /// M2, M30.

@@ -355,7 +355,7 @@ impl Exec {
     /// segment that [`Prep`] held back, which has not been queued. `out.target` is then where the queued segments and
     /// the returned one end; [`Dda::settle`](crate::dda::Dda::settle) makes the last steps made the position.
     ///
-    /// Blocks that set drivers, pressure advance or G95 still take effect, as do those that set the position before the
+    /// Blocks that set drivers, pressure advance, G95 or the origin still take effect, as do those that set the position before the
     /// first dropped line, dwell, output or stop.
     ///
     /// Cost: 600 a block.
@@ -399,6 +399,7 @@ impl Exec {
                 Body::QueuedAction(QueuedAction::SetPosition(steps)) if !moved => {
                     out.target = *steps
                 }
+                Body::QueuedAction(QueuedAction::Origin(origin)) => out.origin = *origin,
                 Body::QueuedAction(
                     QueuedAction::SetPosition(_)
                     | QueuedAction::Override(_)
@@ -458,6 +459,7 @@ impl Exec {
             }
             QueuedAction::Override(_) => return Step::Override,
             QueuedAction::Heat(_) if Capability::Printer.is_built_in() => return Step::Heat,
+            QueuedAction::Origin(origin) => out.origin = *origin,
             QueuedAction::Drivers(drivers) => self.prep.set_drivers(*drivers),
             QueuedAction::Advance(lead) if Capability::Printer.is_built_in() => {
                 self.prep.set_lead(lead)

@@ -6,13 +6,30 @@
 
 use kerf_macros::small;
 
-use super::block::{Outputs, QueuedAction};
+use super::block::{Number, Outputs, QueuedAction};
 use crate::boards::MOTORS;
 use crate::capability::Capability;
 use crate::gcode::command::Surface;
+use crate::units::Length;
 
 /// How many surface speeds there are: none in an image without a lathe.
 const LATHES: usize = Capability::Lathe.is_built_in() as usize;
+
+/// What the coordinates of a move count from, as reports show it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Origin {
+    /// The work offset of the axis that each motor moves.
+    pub offset: [Length; MOTORS],
+    /// The coordinate system: 1 for G54, to 9 for G59.3; 0 before the first line.
+    pub system: u8,
+    /// The tool in the spindle, 0 for none.
+    pub tool: u16,
+}
+
+impl Origin {
+    /// Nothing is known of the origin.
+    pub const NONE: Self = Self { offset: [Length::ZERO; MOTORS], system: 0, tool: 0 };
+}
 
 /// What reports show of the motion that is being prepared.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -37,6 +54,8 @@ pub struct Snapshot {
     pub held: bool,
     /// The last state of the program.
     pub program: Program,
+    /// The origin of the block being run.
+    pub origin: Origin,
     /// The commanded outputs, bits of [`outputs`](crate::boards::outputs).
     pub outputs: u8,
     /// The commanded speed of the spindle, turns per minute.
@@ -60,6 +79,7 @@ impl Snapshot {
             running: false,
             held: false,
             program: Program::Ready,
+            origin: Origin::NONE,
             outputs: 0,
             speed: 0.0,
             surface: [Surface::NONE; LATHES],
@@ -104,11 +124,13 @@ impl Snapshot {
         Moment {
             position: self.positions(),
             velocity: self.velocity,
-            line: self.line,
-            finished: self.finished,
+            line: Number::of(self.line),
+            finished: Number::of(self.finished),
             running: self.running,
             held: self.held,
             program: self.program,
+            origin: self.origin,
+            speed: self.speed,
         }
     }
 }
@@ -121,15 +143,19 @@ pub struct Moment {
     /// Velocity along the path, mm/s.
     pub velocity: f32,
     /// The N word of the block being run.
-    pub line: u32,
+    pub line: Number,
     /// The N word of the line finished last.
-    pub finished: u32,
+    pub finished: Number,
     /// Whether something moves, or dwells.
     pub running: bool,
     /// Whether a feedhold has brought the machine to a standstill.
     pub held: bool,
     /// The last state of the program.
     pub program: Program,
+    /// The origin of the block being run.
+    pub origin: Origin,
+    /// The commanded speed of the spindle, turns per minute; 0 while it is off.
+    pub speed: f32,
 }
 
 /// The state of the program.

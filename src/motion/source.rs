@@ -17,6 +17,9 @@ use super::short::Short;
 use super::speed_constraints::SpeedConstraints;
 use crate::hal::ring::{Consumer, Index};
 
+/// How many actions in a row [`BlockSource::goes_on`] looks behind.
+const ASIDE: usize = 3;
+
 /// A limit ahead of exec.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Constraint {
@@ -68,11 +71,19 @@ impl BlockSource {
         self.look(|block| *block)
     }
 
-    /// Whether the oldest block is followed by a line. Cost: 40.
+    /// Whether the oldest block is followed by a line, perhaps behind actions that do not stop the machine:
+    /// [`ASIDE`] at most. Cost: 40, and as much for each action.
     #[inline(never)]
     #[small]
     pub fn goes_on(&self) -> bool {
-        self.ring.peek(1, |block| matches!(block.body, Body::Line(_))) == Some(true)
+        for ahead in 1..=ASIDE + 1 {
+            let kind = |block: &Block| (matches!(block.body, Body::Line(_)), block.is_aside());
+            match self.ring.peek(ahead, kind) {
+                Some((false, true)) => {}
+                next => return next.is_some_and(|(is_line, _)| is_line),
+            }
+        }
+        false
     }
 
     /// Returns what `look` makes of the oldest block; `None` if there is no block.

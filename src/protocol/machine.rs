@@ -133,6 +133,9 @@ pub trait Machine {
     fn set_tool_length(&mut self, axis: u8, length: Length) -> Result<(), Status>;
     /// Returns the current value, in the unit that [`Value`] states.
     fn value(&mut self, value: Value) -> i32;
+    /// Returns a value of the G-code model, as the last line that was read has left it. S is in whole turns per minute,
+    /// or m/min with G96.
+    fn programmed(&mut self, value: Value) -> i32;
     /// Makes all steps of one report or group describe the same moment: that of the first step that reads motion.
     /// `first`: whether this step begins the report or group.
     fn moment(&mut self, first: bool);

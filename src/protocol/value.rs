@@ -3,7 +3,8 @@
 use crate::gcode::overrides::Override;
 use crate::gcode::tables::TableRow;
 
-/// A value of the machine, and what [`Machine::value`](super::Machine::value) returns for it.
+/// A value of the machine, and what [`Machine::value`](super::Machine::value) returns for it. Modes are those of the last
+/// line that was read, unless stated otherwise.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Value {
     /// Line number of the block that was read last.
@@ -20,13 +21,15 @@ pub enum Value {
     Flow,
     /// 1 if anything is queued or runs.
     Working,
-    /// 1 if the last line that was queued moves the machine.
+    /// 1 if the last line that was queued moves the machine, and does not pause.
     MovesLast,
+    /// 1 if the last line that was queued pauses (G4).
+    PausesLast,
     /// 1 if a block is being carried out.
     Running,
     /// Units: 0 inch, 1 mm.
     Units,
-    /// 0 for G53, 1 to 9 for G54 to G59.3.
+    /// Coordinate system of the move that runs: 1 to 9 for G54 to G59.3.
     Coordinates,
     /// See [`MotionMode`](crate::gcode::modal::MotionMode).
     MotionMode,
@@ -40,18 +43,17 @@ pub enum Value {
     ArcDistance,
     /// Feed rate mode: 0 G93, 1 G94, 2 G95.
     FeedMode,
-    /// 1 if the spindle turns.
+    /// 1 if the spindle's output is on.
     SpindleOn,
-    /// 1 if the spindle turns counter-clockwise.
+    /// 1 if the output for counter-clockwise turns is on.
     SpindleDirection,
-    /// The measured speed of the spindle, in thousandths of a turn per minute; without an encoder the programmed S.
+    /// The measured speed of the spindle, in thousandths of a turn per minute; without an encoder the S with which it
+    /// turns, or while it is off the last S word.
     SpindleSpeed,
-    /// 1 after M7.
+    /// 1 if the mist coolant's output is on.
     Mist,
-    /// 1 after M8.
+    /// 1 if the flood coolant's output is on.
     Flood,
-    /// The programmed S, in thousandths of a turn per minute.
-    SpindleProgrammed,
     /// Pulses of the encoder per turn; 0 without an encoder.
     PulsesPerTurn,
     /// How far the axes are ahead of the spindle in a synchronized pass, in um, at the last index pulse; 0 without a
@@ -68,7 +70,7 @@ pub enum Value {
     Starvations,
     /// 1 if all settings and tables are in EEPROM, 0 if some are still being written.
     Kept,
-    /// Tool number.
+    /// Tool number, in the move that runs.
     Tool,
     /// The tool that the last T word has selected.
     SelectedTool,
@@ -98,9 +100,9 @@ pub enum Value {
     BytesInAll,
     /// Position in machine coordinates, in units of a `Length`.
     MachinePosition(u8),
-    /// Position in work coordinates, in units of a `Length`.
+    /// Position in work coordinates of the move that runs, in units of a `Length`.
     Position(u8),
-    /// Work offset, in units of a `Length`. Shown in millimetres even if the units are inches.
+    /// Work offset of the move that runs, in units of a `Length`. Shown in millimetres even if the units are inches.
     Offset(u8),
     /// Tool length, in units of a `Length`.
     ToolOffset(u8),

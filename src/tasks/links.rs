@@ -10,7 +10,7 @@
 //! | `uart` transmit ring | bytes | 127 each port | 131 B each | parser, reporter | TX interrupt | parser: the port waits, response half sent; reporter: waits |
 //! | [`Links::storage`] | which settings to look at, a row of the tables; what printing hosts have set until the next start | a range, 1; all, 1 | 46 B, 50 B | parser | storage | the range grows; a line that changes another row waits |
 //! | [`Links::rate`] | a new rate of the line | 1 | 6 B | parser | parser | overwritten: the newest counts |
-//! | [`Port::seen`] | the state of the machine when the report under way first read motion | 1 | 33 B each port | the task that reports on the port | that task | overwritten |
+//! | [`Port::seen`] | the state of the machine when the report under way first read motion | 1 | 53 B each port | the task that reports on the port | that task | overwritten |
 //! | [`Links::restart`] | a reset that is due | 1 | 1 B | parser | parser | overwritten |
 //! | [`Links::changes`] | changes that the planner handles before the next line | a bit each | 1 B | parser, planner | planner | bits merge |
 //! | [`Links::notices`], [`Links::probe`] | what is to be told: an exception, the end of a jog or of a flush, a probing | 1 each | 4 B, 26 B | all | reporter | overwritten: the newest counts, but in an alarm its reason |
@@ -56,8 +56,8 @@ pub struct Links {
     pub feeder: Cell<u8>,
     /// The planner works on `commands`.
     pub commands_taken: Cell<bool>,
-    /// The last line that the planner has been given moves the machine.
-    pub moves_last: Cell<bool>,
+    /// What the last line does that the planner has been given.
+    pub last: Cell<Last>,
     /// A line has come, or the planner is ready: wakes the parser.
     pub parser_wake: Wake,
     /// `commands` has been filled.
@@ -108,6 +108,28 @@ pub struct Links {
     pub settings: RefCell<Settings>,
 }
 
+/// What a line does, as far as the answers to later lines depend on it.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Last {
+    /// The line neither moves the machine nor pauses.
+    Other,
+    /// The line moves the machine.
+    Moves,
+    /// The line pauses (G4).
+    Pauses,
+}
+
+impl Last {
+    /// Returns what a line with these commands does.
+    pub fn of(commands: &Commands) -> Self {
+        match commands.dwell_ms {
+            Some(_) => Self::Pauses,
+            None if commands.moves() => Self::Moves,
+            None => Self::Other,
+        }
+    }
+}
+
 /// Changes other than by lines. The code that changes something sets its bit; the planner takes the bits before the
 /// next line.
 pub struct Changes(Cell<u8>);
@@ -118,9 +140,13 @@ impl Changes {
     /// A setting has changed.
     pub const SETTINGS: u8 = 2;
 
+    /// The origin, the coordinate system or the tool may have changed.
+    pub const ORIGIN: u8 = 16;
+
     /// Coolant outputs that have been toggled other than by a line, as bits of [`outputs`]. Toggling one twice is no
     /// change.
     pub const COOLANT: u8 = outputs::MIST | outputs::FLOOD;
+    const _APART: () = assert!(Self::COOLANT & (Self::STEPS | Self::SETTINGS | Self::ORIGIN) == 0);
 
     /// A set in which these bits are noted.
     pub const fn new(bits: u8) -> Self {

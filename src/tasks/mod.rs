@@ -20,6 +20,7 @@ mod jog;
 mod lent;
 pub mod lines;
 pub mod links;
+mod origin;
 pub mod overrides;
 mod overtake;
 pub mod parser;

@@ -34,6 +34,7 @@ use parts::{ArcWalk, Ongoing, Parts};
 use super::Never;
 use super::common;
 use super::links::{self, Changes, Links};
+use super::origin;
 use super::parser;
 use super::ports::OTHERS;
 use crate::capability::Capability;
@@ -118,6 +119,8 @@ enum Announcement {
     Drivers,
     /// The extruder's lead may have changed.
     Lead,
+    /// The origin may have changed, from the next line on: a chain that waits comes first.
+    Origin,
 }
 
 /// The result of a turn of the planner.
@@ -326,6 +329,9 @@ impl Planner {
     fn begin(&mut self) {
         self.steps = Steps::default();
         self.take_up_changes();
+        if self.announcement == Announcement::None {
+            self.announcement = Announcement::Origin;
+        }
     }
 
     /// Applies changed settings. Exec must be told of some of them before the next line.
@@ -350,7 +356,7 @@ impl Planner {
         if self.is_flushed() {
             return Turn::Done;
         }
-        if self.announcement != Announcement::None {
+        if self.has_announced() {
             self.tell();
             return Turn::More;
         }
@@ -361,14 +367,18 @@ impl Planner {
         }
         if Capability::Lathe.is_built_in() && self.turns_otherwise(&commands.motion) {
             self.per_turn = !self.per_turn;
-            let block = Block::action(QueuedAction::PerTurn(self.per_turn), self.line);
-            let _ = self.queue.push_aside(block);
-            self.announce();
+            self.push_aside(QueuedAction::PerTurn(self.per_turn));
             return Turn::More;
         }
         if matches!(self.begun, Begun::Parts(_)) {
             self.part(&commands);
             return Turn::More;
+        }
+        if self.announcement == Announcement::Origin {
+            self.announcement = Announcement::None;
+            if links.changes.take(Changes::ORIGIN) && self.set_origin() {
+                return Turn::More;
+            }
         }
         if let Ongoing::Arc(arc) = &mut self.walk
             && let Motion::Arc { target, arc: circle, .. } = &commands.motion
@@ -548,6 +558,7 @@ impl Planner {
             Announcement::Position => {
                 let position = self.position;
                 self.set_position(&position);
+                self.links.changes.note(Changes::ORIGIN);
                 self.announcement = Announcement::Drivers;
             }
             Announcement::Drivers => {
@@ -558,9 +569,36 @@ impl Planner {
             _ => {
                 #[cfg(feature = "printer")]
                 self.set_lead();
-                self.announcement = Announcement::None;
+                self.announcement = Announcement::Origin;
             }
         }
+    }
+
+    /// Whether exec is to be told of something before the chain that waits.
+    #[inline(always)]
+    fn has_announced(&self) -> bool {
+        !matches!(self.announcement, Announcement::None | Announcement::Origin)
+    }
+
+    /// Tells exec the origin of the lines from here on. While nothing is queued or runs, exec has it at once. Returns
+    /// whether a block has been queued.
+    #[inline(never)]
+    #[small]
+    fn set_origin(&mut self) -> bool {
+        let links = self.links;
+        let origin = origin::read(&links.settings.borrow(), &links.model.borrow());
+        let runs = queue::used() > 0;
+        let runs = common::with(links.thread, move |common| {
+            let runs = runs || common.motion.running;
+            if !runs {
+                common.motion.origin = origin;
+            }
+            runs
+        });
+        if runs {
+            self.push_aside(QueuedAction::Origin(origin));
+        }
+        runs
     }
 
     /// Redefines the position of the machine, as G28.3 does. No motor moves.
@@ -595,8 +633,14 @@ impl Planner {
     #[inline(never)]
     #[small]
     fn set_override(&mut self, change: Change) {
-        let block = Block::action(QueuedAction::Override(change), self.line);
-        let _ = self.queue.push_aside(block);
+        self.push_aside(QueuedAction::Override(change));
+    }
+
+    /// Queues an action at which the machine does not stop. There is room: see [`Self::push`].
+    #[inline(never)]
+    #[small]
+    fn push_aside(&mut self, action: QueuedAction) {
+        let _ = self.queue.push_aside(Block::action(action, self.line));
         self.announce();
     }
 

@@ -9,7 +9,7 @@
 //!
 //! Thread mode, in the parser's turn. Cost: 2,400 cycles a line, and the cost of its block.
 
-use super::links::Links;
+use super::links::{Last, Links};
 use super::planner::{self, Planner};
 use super::ports::Port;
 use crate::config::Settings;
@@ -84,7 +84,7 @@ pub(super) fn run(links: &Links, shared: &planner::Shared) -> Row {
         }
     };
     if count > 0 {
-        links.moves_last.set(true);
+        links.last.set(Last::Moves);
         links.pool_space.signal();
         links.reporter_wake.signal();
     }

@@ -25,12 +25,14 @@ use super::heat;
 use super::hold;
 use super::homing;
 use super::links::{Changes, Links};
+use super::origin;
 use super::overrides;
 use super::ports::{Port, RESET};
 use super::power;
 use super::setup::counted;
+use super::spindle;
 use super::switches;
-use crate::boards::{MOTORS, inputs};
+use crate::boards::{MOTORS, inputs, outputs};
 #[cfg(feature = "sd")]
 use crate::card::{Entry, Op};
 #[cfg(feature = "bed-plane")]
@@ -54,7 +56,7 @@ use crate::motion::snapshot::{Moment, Program};
 use crate::protocol::Level;
 #[cfg(feature = "dialect-reprap")]
 use crate::protocol::{Cold, Extruder};
-use crate::protocol::{Hold, Machine, Memory, Remembers, Store, Value, Warning};
+use crate::protocol::{Hold, Machine, Memory, Remembers, Store, Value, Warning, thousandths};
 use crate::status::Status;
 use crate::store::kept::ITEMS;
 use crate::store::program::{self, Startup};
@@ -91,15 +93,21 @@ pub struct Seen {
     motion: Moment,
     /// A line was being carried out.
     carries_out: bool,
+    /// The outputs that were on.
+    outputs: u8,
 }
 
 impl Seen {
     /// Returns the present state of the machine. Thread mode.
-    fn now(links: &Links) -> Self {
+    fn now(links: &Links, settings: &Settings) -> Self {
         // In this order, because exec may begin a queued block in between.
-        let queued = is_queued(links);
-        let motion = snapshot(links.thread).moment();
-        Self { motion, carries_out: queued || motion.running }
+        let (taken, queued) = (links.commands_taken.get(), queue::used() > 0);
+        let mut motion = snapshot(links.thread).moment();
+        let runs = queued || motion.running;
+        if !runs {
+            motion.origin = origin::read(settings, &links.model.borrow());
+        }
+        Self { motion, carries_out: taken || runs, outputs: spindle::on() }
     }
 }
 
@@ -128,7 +136,7 @@ impl<'a> View<'a> {
         self.seen.get_or_init(|| {
             let shared = if self.shares { self.port.seen.get() } else { None };
             shared.unwrap_or_else(|| {
-                let seen = Seen::now(self.links);
+                let seen = Seen::now(self.links, &self.settings);
                 if self.shares {
                     self.port.seen.set(Some(seen));
                 }
@@ -274,8 +282,21 @@ impl<'a> View<'a> {
         }
     }
 
+    #[inline(never)]
     fn offset(&self, axis: usize) -> Length {
-        self.links.model.borrow().work_offset().get(axis).copied().unwrap_or(Length::ZERO)
+        let model = self.links.model.borrow();
+        origin::offset(axis, &self.motion().origin, &self.settings, &model)
+    }
+
+    /// Whether this output is on, or was at the moment of the report.
+    #[inline(never)]
+    fn is_on(&self, output: u8) -> i32 {
+        (self.seen().outputs & output != 0).into()
+    }
+
+    /// Has the planner tell exec of the origin before the next line.
+    fn note_origin(&self) {
+        self.links.changes.note(Changes::ORIGIN);
     }
 
     /// Returns 1 if a switch is worked, 0 if not, -1 if there is no switch or it is off.
@@ -291,9 +312,12 @@ impl<'a> View<'a> {
         heat::standing(self.links, heater).unwrap_or_default()
     }
 
-    /// Returns S, in thousandths of a turn a minute.
+    /// Returns S, in thousandths of a turn a minute: that of the spindle while it turns, else that of the last S word.
+    #[inline(never)]
     fn programmed_speed(&self) -> i32 {
-        values::modal(self, Value::SpindleSpeed).min(2_000_000) * 1_000
+        let now = self.motion().speed;
+        let is_off = now.to_bits() == 0 && self.is_on(outputs::SPINDLE) == 0;
+        thousandths(if is_off { self.links.model.borrow().spindle_speed() } else { now })
     }
 }
 
@@ -313,11 +337,13 @@ impl Machine for View<'_> {
 
     fn set_row(&mut self, row: TableRow, axis: u8, value: Length) -> Result<(), Status> {
         self.may_set()?;
+        self.note_origin();
         self.links.model.borrow_mut().set(row, axis, value)
     }
 
     fn set_tool_length(&mut self, axis: u8, length: Length) -> Result<(), Status> {
         self.may_set()?;
+        self.note_origin();
         self.links.model.borrow_mut().set_tool_length(axis, length)
     }
 
@@ -327,6 +353,10 @@ impl Machine for View<'_> {
 
     fn value(&mut self, value: Value) -> i32 {
         values::value(self, value)
+    }
+
+    fn programmed(&mut self, value: Value) -> i32 {
+        values::modal(self, value)
     }
 
     fn moment(&mut self, first: bool) {
@@ -496,6 +526,7 @@ impl Machine for View<'_> {
     #[cfg(feature = "dialect-reprap")]
     fn clear_shift(&mut self, axes: u8) {
         self.links.model.borrow_mut().clear_shift(axes);
+        self.note_origin();
     }
 
     #[cfg(feature = "dialect-reprap")]

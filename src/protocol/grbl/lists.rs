@@ -87,29 +87,29 @@ progmem! {
 pub fn modes(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Option<u8> {
     if at == 0 {
         text(out, text!("[GC:"));
-        let motion = machine.value(Value::MotionMode) as usize;
+        let motion = machine.programmed(Value::MotionMode) as usize;
         text(out, MOTIONS.at(motion).unwrap_or(text!("G80")));
-        let system = machine.value(Value::Coordinates) as usize;
+        let system = machine.programmed(Value::Coordinates) as usize;
         text(out, SYSTEMS.at(system.wrapping_sub(1)).unwrap_or(text!(" G54")));
         text(out, text!(" G1"));
-        int(out, 7 + machine.value(Value::Plane));
+        int(out, 7 + machine.programmed(Value::Plane));
         text(out, text!(" G2"));
-        int(out, machine.value(Value::Units));
+        int(out, machine.programmed(Value::Units));
         text(out, text!(" G9"));
-        int(out, machine.value(Value::Distance));
+        int(out, machine.programmed(Value::Distance));
         text(out, text!(" G9"));
-        int(out, 3 + machine.value(Value::FeedMode));
+        int(out, 3 + machine.programmed(Value::FeedMode));
         return Some(1);
     }
-    let turns = machine.value(Value::SpindleOn) != 0;
-    let counter = machine.value(Value::SpindleDirection) != 0;
+    let turns = machine.programmed(Value::SpindleOn) != 0;
+    let counter = machine.programmed(Value::SpindleDirection) != 0;
     text(out, text!(" M"));
     out.put(match (turns, counter) {
         (false, _) => b'5',
         (true, false) => b'3',
         (true, true) => b'4',
     });
-    let (mist, flood) = (machine.value(Value::Mist), machine.value(Value::Flood));
+    let (mist, flood) = (machine.programmed(Value::Mist), machine.programmed(Value::Flood));
     if mist != 0 {
         text(out, text!(" M7"));
     }
@@ -122,11 +122,13 @@ pub fn modes(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Option<u
     text(out, text!(" T"));
     int(out, machine.value(Value::SelectedTool));
     text(out, text!(" F"));
-    super::write::speed(out, machine.value(Value::Feed), machine.value(Value::Units) == 0);
+    super::write::speed(
+        out,
+        machine.programmed(Value::Feed),
+        machine.programmed(Value::Units) == 0,
+    );
     text(out, text!(" S"));
-    let measures = Capability::Lathe.is_built_in();
-    let speed = if measures { Value::SpindleProgrammed } else { Value::SpindleSpeed };
-    int(out, (machine.value(speed) + 500) / 1_000);
+    int(out, machine.programmed(Value::SpindleSpeed));
     close(out);
     None
 }

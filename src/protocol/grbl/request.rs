@@ -263,7 +263,7 @@ impl Request {
     }
 
     /// Ends the answer to a line of G-code. A probing is waited for, so that its `[PRB:]` comes before `ok`. The end
-    /// of a program is waited for too. A target beyond the travel raises an alarm, except in a jog and in check mode.
+    /// of a program is waited for too, and the end of a pause, by which senders wait for the machine. A target beyond the travel raises an alarm, except in a jog and in check mode.
     fn gcode_done(&mut self, line: &[u8], machine: &mut impl Machine, out: &mut impl Out) -> Step {
         let is_beyond = self.status == Status::SoftLimit && command::jog(line).is_none();
         if is_beyond && machine.value(Value::Check) == 0 {
@@ -286,6 +286,9 @@ impl Request {
             }
             message(out, text!("Pgm End"));
             return Step::Done;
+        }
+        if machine.value(Value::PausesLast) != 0 && machine.value(Value::Working) != 0 {
+            return Step::Later(0);
         }
         if threads(machine) {
             return begins(machine);

@@ -56,7 +56,7 @@ pub fn overtakes(frame: &Frame, line: &[u8]) -> bool {
 #[inline(never)]
 #[small]
 pub fn waits(code: Option<(u8, u16)>) -> bool {
-    matches!(code, Some((b'M', 0 | 1 | 109 | 116 | 190 | 226 | 600 | 601)))
+    matches!(code, Some((b'G', 4) | (b'M', 0 | 1 | 109 | 116 | 190 | 226 | 600 | 601)))
 }
 
 /// Whether the words of a block are a text for people.

@@ -184,6 +184,10 @@ impl Machine for Fake {
         }
     }
 
+    fn programmed(&mut self, value: Value) -> i32 {
+        self.value(value)
+    }
+
     fn moment(&mut self, _first: bool) {}
 
     fn memory(&mut self) -> &mut Memory {

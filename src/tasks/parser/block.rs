@@ -14,7 +14,7 @@ use crate::tasks::alarm;
 #[cfg(feature = "dialect-reprap")]
 use crate::tasks::heat;
 use crate::tasks::hold;
-use crate::tasks::links::Links;
+use crate::tasks::links::{Changes, Last, Links};
 use crate::tasks::ports::Port;
 use crate::tasks::reporter::tell_startup;
 use crate::tasks::view::View;
@@ -130,6 +130,7 @@ pub fn end_program(links: &Links, resets: bool) {
     let _ = carry_out(links, b"M2", false);
     if resets {
         links.model.borrow_mut().reset();
+        links.changes.note(Changes::ORIGIN);
     }
 }
 
@@ -194,12 +195,16 @@ fn carry_out(links: &Links, block: &[u8], declined: bool) -> (Status, bool) {
         Ok(info) if info.deleted => (Status::Noop, true),
         Ok(info) => {
             if !commands.is_empty() && !machine::is_checking() {
-                links.moves_last.set(commands.moves());
+                links.last.set(Last::of(&commands));
                 if words.is_some() != jogs {
                     enter(words.is_some());
                 }
                 links.commands_taken.set(true);
                 links.planner_wake.signal();
+            }
+            if model.take_moved_origin() {
+                // The planner tells exec before the next line that does something.
+                links.changes.note(Changes::ORIGIN);
             }
             if info.lacks_length {
                 links.except(Status::NoToolLength);

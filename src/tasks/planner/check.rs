@@ -15,6 +15,7 @@ use kerf_macros::small;
 use super::parts::Ongoing;
 use super::{Begun, Planner};
 use crate::machine;
+use crate::tasks::links::Changes;
 
 impl Planner {
     /// Whether the state of the model from before check mode is kept here.
@@ -43,6 +44,7 @@ impl Planner {
         if let (Ongoing::Check(offsets), Begun::Check(modes)) = (&self.walk, &self.begun) {
             model.give_back(modes, offsets, &self.position);
             (self.walk, self.begun) = (Ongoing::None, Begun::Nothing);
+            self.links.changes.note(Changes::ORIGIN);
         }
     }
 }

@@ -14,7 +14,7 @@
 //!
 //! **N words.** A block has the N word of its last line: it is finished when that line is.
 
-use super::{Announcement, Begun, Parts, Planner, Shared, Turn};
+use super::{Begun, Parts, Planner, Shared, Turn};
 use crate::gcode::command::{Commands, Feed};
 use crate::hal::event::{Event, wait};
 use crate::hal::time::millis;
@@ -139,7 +139,7 @@ impl Planner {
     pub(super) fn make_up(&mut self) {
         if self.is_due() {
             self.take_up_changes();
-            while self.announcement != Announcement::None {
+            while self.has_announced() {
                 self.tell();
             }
             self.build_chain(false);

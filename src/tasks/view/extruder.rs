@@ -51,6 +51,8 @@ pub(super) fn extruder(view: &mut View<'_>, what: Extruder) -> Status {
             if let Err(status) = done {
                 return status;
             }
+            // The origin of its words moves along.
+            links.changes.note(Changes::ORIGIN);
             links.commands_taken.set(true);
             links.planner_wake.signal();
         }

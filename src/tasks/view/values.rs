@@ -3,7 +3,7 @@
 use kerf_macros::small;
 
 use super::{View, queue_free};
-use crate::capability::Capability;
+use crate::boards::outputs;
 use crate::gcode::modal::{Coolant, Turn};
 use crate::hal::serial::capacity;
 use crate::hal::{gpio, uart, watchdog};
@@ -11,6 +11,7 @@ use crate::machine;
 use crate::motion::queue;
 use crate::protocol::{Speech, Value, thousandths};
 use crate::tasks::health;
+use crate::tasks::links::Last;
 use crate::tasks::overrides;
 use crate::tasks::turning;
 
@@ -20,13 +21,14 @@ use crate::tasks::turning;
 pub(super) fn value(view: &mut View<'_>, value: Value) -> i32 {
     match value {
         Value::Working => view.has_work().into(),
-        Value::MovesLast => view.links.moves_last.get().into(),
+        Value::MovesLast => (view.links.last.get() == Last::Moves).into(),
+        Value::PausesLast => (view.links.last.get() == Last::Pauses).into(),
         Value::Running => view.motion().running.into(),
         // Lines that move nothing are finished when all lines before them are.
         Value::FinishedLine if view.stands() => modal(view, Value::BlockLine),
         Value::Flow => view.links.model.borrow().flow().into(),
-        Value::FinishedLine => view.motion().finished as i32,
-        Value::MotionLine => view.motion().line as i32,
+        Value::FinishedLine => view.motion().finished.get() as i32,
+        Value::MotionLine => view.motion().line.get() as i32,
         Value::Velocity => thousandths(view.motion().velocity * 60.0),
         Value::QueueFree => queue_free() as i32,
         Value::BlocksFree => queue::free() as i32,
@@ -53,7 +55,8 @@ pub(super) fn value(view: &mut View<'_>, value: Value) -> i32 {
         Value::Homed(axis) => i32::from(view.links.model.borrow().is_homed(axis)),
         Value::Override(which) => overrides::now(view.links.thread).factor(which).into(),
         Value::OverrideOn(which) => overrides::now(view.links.thread).is_on(which).into(),
-        Value::Tool => view.links.model.borrow().tool().into(),
+        Value::Tool => view.motion().origin.tool.into(),
+        Value::Coordinates => view.motion().origin.system.into(),
         Value::Choice => view.port.choice.get() as i32,
         Value::SelectedTool => view.links.model.borrow().selected_tool().into(),
         Value::Input(input) => view.input(input),
@@ -73,7 +76,10 @@ pub(super) fn value(view: &mut View<'_>, value: Value) -> i32 {
             Some(speed) => speed,
             None => view.programmed_speed(),
         },
-        Value::SpindleProgrammed if Capability::Lathe.is_built_in() => view.programmed_speed(),
+        Value::SpindleOn => view.is_on(outputs::SPINDLE),
+        Value::SpindleDirection => view.is_on(outputs::COUNTERCLOCKWISE),
+        Value::Mist => view.is_on(outputs::MIST),
+        Value::Flood => view.is_on(outputs::FLOOD),
         Value::PulsesPerTurn => turning::per_turn(view.links.thread).into(),
         Value::SyncError => turning::error(view.links.thread).into(),
         Value::Pass => turning::pass(view.links.thread) as i32,

@@ -32,6 +32,8 @@ mod session;
 mod side;
 #[path = "../../support/stream/mod.rs"]
 mod stream;
+#[path = "../../support/told.rs"]
+mod told_session;
 #[path = "../../support/transcript.rs"]
 mod transcript;
 
@@ -85,6 +87,7 @@ mod streams;
 mod switches;
 mod taps_and_feeds;
 mod threads;
+mod told;
 mod transcripts;
 mod turning_alarms;
 mod turning_faults;

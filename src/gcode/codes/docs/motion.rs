@@ -91,7 +91,8 @@ required even without axis words.",
         g(
             40,
             "Dwell",
-            "Pauses for P seconds, to the millisecond. The pause comes after earlier moves and before a move on its own line.",
+            "Pauses for P seconds, to the millisecond. The pause comes after earlier moves and before a move on its own line. \
+             In grbl's dialect and in that of printing hosts the line is answered when all that is over, in TinyG's when it has been read.",
             &[
                 no(PWordMissing, &["G4"]),
                 no(PWordNegative, &["G4 P-1"]),
