@@ -22,7 +22,7 @@ use super::seek::drop_blocks;
 use crate::boards::{MOTORS, outputs};
 use crate::config::groups::spindle;
 use crate::config::{Owner, Setting};
-use crate::encoder::COUNTS_PER_S;
+use crate::encoder::{COUNTS_PER_S, SURE};
 use crate::gcode::command::{Feed, Motion};
 use crate::gcode::setup::Setup;
 use crate::hal::event::{Event, wait};
@@ -43,9 +43,6 @@ use crate::units::{FIRST_ROTARY, Length, PerAxis};
 
 /// How long an index pulse may take to come, ms.
 const PATIENCE_MS: u32 = 6_000;
-
-/// Index pulses after which the speed of the spindle is known.
-const ENOUGH: u8 = 3;
 
 /// A feed that is faster than any axis, mm/min.
 const ANY_FEED: f32 = 1e6;
@@ -344,19 +341,19 @@ impl Planner {
                 let (seen, synced) = common.encoder.seen();
                 (seen, synced, common.encoder.turn())
             });
-            if seen >= ENOUGH && synced && turn != 0 {
+            if seen >= SURE && synced && turn != 0 {
                 return Some(Ok(Some(turn)));
             }
             // A spindle that is slower than the encoder can measure never gets beyond a pulse or two. In a hold the spindle
             // may stand still.
             if seen > most || machine::is_held() {
                 most = seen;
-                if seen < ENOUGH {
+                if seen < SURE {
                     since = millis();
                 }
             }
             let late = millis().wrapping_sub(since) > PATIENCE_MS;
-            late.then_some(Err(if seen < ENOUGH { Status::NoIndex } else { Status::NoSync }))
+            late.then_some(Err(if synced || turn == 0 { Status::NoIndex } else { Status::NoSync }))
         })
         .await
     }
