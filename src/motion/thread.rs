@@ -56,7 +56,7 @@ const WINDOW: u32 = COUNTS_PER_S / 1_000 * 16;
 const OVERDUE: f32 = 2.01;
 
 /// Margin of the time after which the spindle is lost, counts: 0.5 ms, because pulses are not quite even.
-const SLACK: f32 = COUNTS_PER_S as f32 * 0.0005;
+const SLACK: f32 = COUNTS_PER_S as f32 * 0.0022;
 
 /// A spindle slows down before it reverses. A pulse counts as forward up to this share of the time to the standstill; a
 /// later pulse counts as one in reverse. Taking a forward pulse for one in reverse is an error of one pulse. After the
@@ -83,15 +83,15 @@ const UNSURE: f32 = 0.08;
 
 /// A pulse that comes by itself is looked at more closely if two of them are farther apart than this, counts: 3 ms. Else
 /// a stray one comes in the same stretch as another.
-const APART: f32 = COUNTS_PER_S as f32 * 0.003;
+const APART: f32 = COUNTS_PER_S as f32 * 0.0022;
 
 /// How early a single pulse may be in a pass, as a share of the interval between two. A spindle that gains a fifth of
 /// its speed within a turn has its next index after 0.82 of a turn.
 const EARLY: f32 = 0.25;
 
-/// How late an index may be if there is no sync. A spindle that loses a fifth of its speed within each turn has its next
+/// How late a single pulse may be. A spindle that loses a fifth of its speed within each turn has its next
 /// index after 1.25 turns.
-const LATE_INDEX: f32 = 0.3;
+const LATE_SINGLE: f32 = 0.3;
 
 /// The speed is not measured by a single pulse that is farther than this from its expected time, as a share of the
 /// interval between two.
@@ -182,6 +182,8 @@ enum Kind {
         limit: Short,
         /// How the pass is left before its end.
         retract: Retract,
+        /// Whether the last pulse was early, so that it may be a stray one.
+        early: bool,
     },
     /// G33.1: the axes move back when the spindle has reversed.
     Tap {
@@ -201,7 +203,7 @@ impl Default for Kind {
 }
 
 impl Kind {
-    const NONE: Self = Self::Pass { limit: Short::ZERO, retract: Retract::NONE };
+    const NONE: Self = Self::Pass { limit: Short::ZERO, retract: Retract::NONE, early: false };
 }
 
 #[small]
@@ -242,7 +244,7 @@ impl Thread {
         let Pass { lead, limit, retract, turn_at } = *pass;
         let kind = match some(turn_at) {
             true => Kind::Tap { turn_at, decel: 0.0, window: WINDOW as u16 },
-            false => Kind::Pass { limit, retract },
+            false => Kind::Pass { limit, retract, early: false },
         };
         Self { stage: Stage::Armed, lead, kind, ..Self::new() }
     }
@@ -533,28 +535,24 @@ impl Thread {
         let count = f32::from(new);
         let off = passed - count;
         let is_single = new == 1 && self.is_pass() && self.interval > APART;
-        let (early, late) = match self.per_turn {
-            _ if !is_single => {
-                let unsure = LATE - UNSURE + UNSURE * count;
-                (unsure, unsure)
-            }
-            1 => (EARLY, LATE_INDEX),
-            _ => (EARLY, EARLY),
-        };
+        let unsure = LATE - UNSURE + UNSURE * count;
+        let (early, late) = if is_single { (EARLY, LATE_SINGLE) } else { (unsure, unsure) };
+        let is_odd = is_single && !(-ODD..=ODD).contains(&off);
         if self.turns_unevenly() || passed >= 100.0 {
             // Nothing is known of the next pulse.
         } else if !(-early..=late).contains(&off) {
             return self.take_misfit(new, at, passed, is_single);
-        } else if self.per_turn == 1 && self.is_pass() {
-            self.doubt = self.doubt.saturating_sub(1);
-            self.short = i8::from(off < -EARLY_INDEX);
-        } else if is_single && self.doubt == 0 && !(-ODD..=ODD).contains(&off) {
-            // Perhaps a stray pulse: the speed is not measured by it.
-            if self.doubts() {
-                self.ahead += self.pitch();
-                (self.at, self.since, self.measured) = (at, at, 0);
+        } else if let Kind::Pass { early, .. } = &mut self.kind {
+            *early = is_single && off < if self.per_turn == 1 { -EARLY_INDEX } else { -ODD };
+            if self.per_turn == 1 {
+                self.doubt = self.doubt.saturating_sub(1);
+            } else if is_odd && self.doubt == 0 {
+                // Perhaps a stray pulse: the speed is not measured by it.
+                if self.doubts() {
+                    self.anchor_at(1.0, at);
+                }
+                return;
             }
-            return;
         }
         self.ahead += self.pitch() * count;
         self.keep_pace(count, at);
@@ -569,21 +567,42 @@ impl Thread {
             fits => fits,
         };
         let is_early = passed < f32::from(new);
-        let was_odd = is_single && is_early && self.doubt == 1 && self.measured == 0;
-        if self.is_pass() && !self.doubts() {
+        let Kind::Pass { early: was_early, .. } = self.kind else {
+            return self.count_as(fits, new, at);
+        };
+        if !self.doubts() {
             return;
         }
-        self.expected = self.expected.wrapping_add(new.wrapping_sub(fits));
-        if fits != 0 {
-            self.ahead += self.pitch() * f32::from(fits);
-            self.keep_pace(f32::from(fits), at);
-        } else if self.per_turn == 1 && !(is_early && self.short == 0) {
-            // This pulse is a stray one, or the one before, which was early.
-            self.stage = Stage::Lost;
-        } else if self.per_turn > 1 && was_odd {
+        if fits == 0 && self.per_turn == 1 {
+            if was_early || !is_early {
+                // This pulse is a stray one, or the one before.
+                self.stage = Stage::Lost;
+            }
+        } else if fits == 0 && was_early {
             // More likely the one before is the stray one.
-            (self.at, self.since) = (at, at);
+            self.anchor_at(0.0, at);
         }
+        self.count_as(fits, new, at);
+    }
+
+    /// Counts `new` pulses as `fits`, the last of them at time `at`.
+    fn count_as(&mut self, fits: u8, new: u8, at: u32) {
+        let count = f32::from(fits);
+        self.expected = self.expected.wrapping_add(new.wrapping_sub(fits));
+        if fits != 0 && fits < new {
+            // Which of them is a stray one is not known: the last one that fits was due at this time.
+            self.anchor_at(count, self.at.wrapping_add((count * self.interval) as u32));
+        } else if fits != 0 {
+            self.ahead += self.pitch() * count;
+            self.keep_pace(count, at);
+        }
+    }
+
+    /// Counts `count` more pulses, the last of them at time `at`. Their rate is measured from here on.
+    #[inline(never)]
+    fn anchor_at(&mut self, count: f32, at: u32) {
+        self.ahead += self.pitch() * count;
+        (self.at, self.since, self.measured) = (at, at, 0);
     }
 
     /// Counts `count` more pulses, the last of them at time `at`, and measures their rate.

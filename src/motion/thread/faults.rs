@@ -420,3 +420,20 @@ fn a_stray_index_before_the_start_shifts_nothing() {
         }
     }
 }
+
+#[test]
+fn a_stray_pulse_of_sync_at_any_angle_shifts_a_part_of_a_pulse_and_ends_nothing() {
+    for (per_turn, most) in [(2u16, 0.2), (4, 0.1), (8, 0.05), (60, 0.04), (100, 0.03), (400, 0.03)]
+    {
+        for rpm in [300.0, 1_000.0] {
+            for hundredth in (0..100).step_by(3) {
+                let at = 12.0 + f64::from(hundredth) * 0.01;
+                let faults = Faults { single: Some((false, at)), ..NONE };
+                let case = Case { per_turn, rpm, lead: 1.0, load: Load::Steady, faults, seed: 9 };
+                let outcome = case.run();
+                let off = outcome.off.abs();
+                assert!(outcome.fault.is_none() && off < most, "{case:?} {outcome:?}");
+            }
+        }
+    }
+}
