@@ -10,7 +10,7 @@
 //! or of the index, is a *misfit*. With the index alone, a pulse less than 0.75 of the previous turn after the last one
 //! is a misfit; a missing pulse cannot be told from a slower spindle. Misfits are counted (`spx`), and the first one is
 //! reported (exception 40). After a misfit, and with the index alone after a turn of less than 0.75 or more than 4/3 of
-//! the one before, index pulses are counted anew: a pass begins at the fourth that fits ([`Encoder::is_sure`]).
+//! the one before, index pulses are counted anew. A pass begins when enough of them fit ([`Encoder::is_sure`]).
 //!
 //! **Direction.** With a second sync sensor (setting `spdi`), the count of sync pulses goes down while the spindle
 //! turns backwards. After a reversal outside of G33.1 the speed is measured anew. A threading pass gets pulses that
@@ -113,7 +113,7 @@ const TELLS: u8 = 0x08;
 const COUNT: u8 = 0x07;
 
 /// After this many index pulses in a row that fit, the time of a turn is a prediction for the next turn.
-pub const SURE: u8 = 4;
+const SURE: u8 = 4;
 
 #[small]
 impl Encoder {
@@ -185,9 +185,11 @@ impl Encoder {
         (seen, seen > 0 && synced)
     }
 
-    /// Whether the last turns fit one another, so that the next index pulse is one in its place.
+    /// Whether the last turns fit, so that the next index pulse is one in its place: two turns with the right number of
+    /// sync pulses, or three of about the same time with the index alone.
     pub fn is_sure(&self) -> bool {
-        self.seen & COUNT >= SURE
+        let turns = if self.per_turn == 1 { SURE - 1 } else { SURE - 2 };
+        self.seen & COUNT > turns
     }
 
     /// Notes that the spindle is about to reverse, or does so (G33.1). Exec.

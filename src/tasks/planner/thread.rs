@@ -22,7 +22,7 @@ use super::seek::drop_blocks;
 use crate::boards::{MOTORS, outputs};
 use crate::config::groups::spindle;
 use crate::config::{Owner, Setting};
-use crate::encoder::{COUNTS_PER_S, SURE};
+use crate::encoder::COUNTS_PER_S;
 use crate::gcode::command::{Feed, Motion};
 use crate::gcode::setup::Setup;
 use crate::hal::event::{Event, wait};
@@ -43,6 +43,10 @@ use crate::units::{FIRST_ROTARY, Length, PerAxis};
 
 /// How long an index pulse may take to come, ms.
 const PATIENCE_MS: u32 = 6_000;
+
+/// The least mean time between two pulses of sync in a pass, counts: 6,000 pulses a second. With more of them there is too
+/// little time for answers.
+const PULSE_LEAST: u32 = COUNTS_PER_S / 6_000;
 
 /// A feed that is faster than any axis, mm/min.
 const ANY_FEED: f32 = 1e6;
@@ -329,7 +333,7 @@ impl Planner {
     }
 
     /// Waits until the encoder gives the time of a turn, in counts. Returns `None` if the queue is to be dropped, and
-    /// an error if the spindle gives no pulse for too long.
+    /// an error if the spindle gives no pulses that fit for too long, or more of them than there is time for.
     async fn spindle_turns(&self) -> Result<Option<u32>, Status> {
         let (mut since, mut most) = (millis(), 0);
         // The power task reads the encoder, and then raises this event.
@@ -337,18 +341,21 @@ impl Planner {
             if self.is_flushed() {
                 return Some(Ok(None));
             }
-            let (seen, synced, turn) = common::with(self.links.thread, |common| {
-                let (seen, synced) = common.encoder.seen();
-                (seen, synced, common.encoder.turn())
+            let (seen, synced, is_sure, turn, least) = common::with(self.links.thread, |common| {
+                let encoder = &common.encoder;
+                let (seen, synced) = encoder.seen();
+                let least = u32::from(encoder.per_turn()) * PULSE_LEAST;
+                (seen, synced, encoder.is_sure(), encoder.turn(), least)
             });
-            if seen >= SURE && synced && turn != 0 {
-                return Some(Ok(Some(turn)));
+            if is_sure && synced && turn != 0 {
+                let is_fast = turn < least;
+                return Some(if is_fast { Err(Status::VelocityExceeded) } else { Ok(Some(turn)) });
             }
             // A spindle that is slower than the encoder can measure never gets beyond a pulse or two. In a hold the spindle
             // may stand still.
             if seen > most || machine::is_held() {
                 most = seen;
-                if seen < SURE {
+                if !is_sure {
                     since = millis();
                 }
             }
