@@ -56,7 +56,7 @@ const WINDOW: u32 = COUNTS_PER_S / 1_000 * 16;
 const OVERDUE: f32 = 2.01;
 
 /// Margin of the time after which the spindle is lost, counts: 0.5 ms, because pulses are not quite even.
-const SLACK: f32 = COUNTS_PER_S as f32 * 0.0022;
+const SLACK: f32 = COUNTS_PER_S as f32 * 0.0005;
 
 /// A spindle slows down before it reverses. A pulse counts as forward up to this share of the time to the standstill; a
 /// later pulse counts as one in reverse. Taking a forward pulse for one in reverse is an error of one pulse. After the
@@ -81,7 +81,7 @@ const LATE: f32 = 0.6;
 /// By how much the error of several pulses at once may be greater, for each of them: that of the speed.
 const UNSURE: f32 = 0.08;
 
-/// A pulse that comes by itself is looked at more closely if two of them are farther apart than this, counts: 3 ms. Else
+/// A pulse that comes by itself is looked at more closely if two of them are farther apart than this, counts: 2.2 ms. Else
 /// a stray one comes in the same stretch as another.
 const APART: f32 = COUNTS_PER_S as f32 * 0.0022;
 
@@ -357,6 +357,9 @@ impl Thread {
     /// reversed.
     #[inline(never)]
     pub fn note(&mut self, pulses: &Pulses, encoder: &Encoder) -> bool {
+        if self.stage >= Stage::Lost {
+            return false;
+        }
         let (time, per_turn, turn) = (encoder.time(), encoder.per_turn(), encoder.turn());
         let tells = encoder.tells();
         let had_turned = self.has_turned();
