@@ -7,9 +7,10 @@
 //! newest of each sensor counts.
 //!
 //! **Misfits.** Between two index pulses exactly `spn` sync pulses have to arrive. A missing or an extra pulse, of sync
-//! or of the index, is a *misfit*. With the index alone, a pulse less than 0.6 of the previous turn after the last one
+//! or of the index, is a *misfit*. With the index alone, a pulse less than 0.75 of the previous turn after the last one
 //! is a misfit; a missing pulse cannot be told from a slower spindle. Misfits are counted (`spx`), and the first one is
-//! reported (exception 40).
+//! reported (exception 40). After a misfit, and with the index alone after a turn of less than 0.75 or more than 4/3 of
+//! the one before, index pulses are counted anew. A pass begins when enough of them fit ([`Encoder::is_sure`]).
 //!
 //! **Direction.** With a second sync sensor (setting `spdi`), the count of sync pulses goes down while the spindle
 //! turns backwards. After a reversal outside of G33.1 the speed is measured anew. A threading pass gets pulses that
@@ -78,7 +79,7 @@ pub struct Encoder {
     sync_at: u32,
     /// How long the last turn took; 0 if it is not known.
     turn: u32,
-    /// Index pulses in a row up to [`SURE`], in the bits of [`COUNT`]. The other bits are the flags below.
+    /// Index pulses in a row that fit, up to [`SURE`], in the bits of [`COUNT`]. The other bits are the flags below.
     seen: u8,
     /// The number of misfits, up to 255.
     misfits: u8,
@@ -111,7 +112,7 @@ const TELLS: u8 = 0x08;
 /// The bits of [`Encoder::seen`] that count index pulses.
 const COUNT: u8 = 0x07;
 
-/// After this many index pulses in a row, the time of a turn is a prediction for the next turn.
+/// After this many index pulses in a row that fit, the time of a turn is a prediction for the next turn.
 const SURE: u8 = 4;
 
 #[small]
@@ -135,10 +136,10 @@ impl Encoder {
         }
     }
 
-    /// Returns the state of a spindle at a steady speed.
+    /// Returns the state of a spindle at a steady speed, whose turns fit.
     #[cfg(test)]
     pub fn at(time: u32, per_turn: u16, turn: u32) -> Self {
-        Self { per_turn, time, turn, ..Self::new() }
+        Self { per_turn, time, turn, seen: SURE, ..Self::new() }
     }
 
     /// Returns this state, with sync pulses that tell the direction if `tells`.
@@ -182,6 +183,13 @@ impl Encoder {
             self.per_turn == 1 || self.time.wrapping_sub(self.sync_at) < STILL.max(self.turn);
         let seen = self.seen & COUNT;
         (seen, seen > 0 && synced)
+    }
+
+    /// Whether the last turns fit, so that the next index pulse is one in its place: two turns with the right number of
+    /// sync pulses, or three of about the same time with the index alone.
+    pub fn is_sure(&self) -> bool {
+        let turns = if self.per_turn == 1 { SURE - 1 } else { SURE - 2 };
+        self.seen & COUNT > turns
     }
 
     /// Notes that the spindle is about to reverse, or does so (G33.1). Exec.
@@ -304,16 +312,21 @@ impl Encoder {
         self.index_at = at;
         let (before, turn) = (self.seen & COUNT, self.turn);
         let turns_round = self.seen & ROUND != 0;
+        let is_first = before == 0 || turns_round;
+        let fits = match self.per_turn {
+            _ if is_first => true,
+            1 => turn == 0 || took >= turn / 4 * 3 && took / 4 <= turn / 3,
+            n => synced == n.wrapping_mul(turns),
+        };
         let seen = u8::try_from(turns).map_or(SURE, |turns| before.saturating_add(turns));
-        self.seen = self.seen & !(COUNT | ROUND) | seen.min(SURE);
-        if before == 0 || turns_round {
+        let seen = if fits { seen.min(SURE) } else { 1 };
+        self.seen = self.seen & !(COUNT | ROUND) | seen;
+        if is_first {
             return false;
         }
         self.turn = took;
-        match self.per_turn {
-            1 => before == SURE && took < turn / 8 * 5 - turn / 40,
-            n => synced != n.wrapping_mul(turns),
-        }
+        let may_be_slower = self.per_turn == 1 && (before < SURE || took > turn);
+        !(fits || may_be_slower)
     }
 
     /// Whether the spindle stands still.

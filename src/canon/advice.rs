@@ -85,8 +85,8 @@ const ADVICE: &[(Status, &str, &str)] = &[
     ),
     (
         SpindleLost,
-        "The pulses of the spindle stopped in a thread. The axes have stopped and their position is known.",
-        "Take the tool out of the cut, then `{clear:n}`. Find out why the spindle or its pulses stopped.",
+        "The pulses of the spindle stopped in a thread, or no spindle gives such pulses. The axes have stopped and their position is known.",
+        "Take the tool out of the cut, then `{clear:n}`. Find out why the spindle or its pulses stopped. If `spx` is not 0, see 40.",
     ),
     (
         NoEncoderInput,
@@ -249,7 +249,7 @@ const ADVICE: &[(Status, &str, &str)] = &[
     (MachineCoordinatesMotion, "G53 needs a G0 or G1 move.", "Write for example `G53 G0 Z0`."),
     (
         VelocityExceeded,
-        "In the thread an axis would be faster than its `fr`. Nothing has moved.",
+        "In the thread an axis would be faster than its `fr`, or the encoder gives more than 6,000 pulses a second. Nothing has moved.",
         "Reduce the spindle speed.",
     ),
     (

@@ -17,7 +17,7 @@ const TALK = ['ej', 'js', 'tv', 'ec', 'ee', 'ex', 'rxm', 'sv', 'si', 'qv', 'dia'
 const STOPPING = ['saf', 'est'];
 /// Settings that images without their capability lack, with the values that are equivalent to their absence. A setting
 /// with that value is left out.
-const OPTIONAL = { sp: { n: 0, b: 0, r: 0, l: 0, di: 0 } };
+const OPTIONAL = { sp: { n: 0, b: 0, r: 0, l: 0.2, di: 0 } };
 /// Longest line that is sent.
 const LINE = 200;
 

@@ -62,9 +62,9 @@ group! {
         R "r": shift(1_000_000).with(IDLE), 0,
             length(text!("spindle thread retract"), NONE),
             "Retract distance of X if a thread is aborted: the spindle is lost, the error is above `spl`, or a feedhold comes. A negative value retracts towards lower X. G76 always retracts towards its drive line, whatever the sign. X retracts 32,767 steps at most. 0: the axes stop in the cut, and a feedhold waits for the end of the pass.";
-        L "l": up_to(cold(3), 100_000).with(UNIT | IDLE), 0,
+        L "l": up_to(cold(3), 100_000).with(UNIT | IDLE), 200,
             length(text!("spindle thread error limit"), NONE),
-            "Maximum distance in a thread between the axes and the position that the spindle demands. It counts once the axes have been within it. A larger distance is alarm 46. 0: no limit.";
+            "Maximum distance in a thread between the axes and the position that the spindle demands. It counts once the axes have been within it. A larger distance is alarm 46. It also ends a thread whose pulses disagree by more. 0: no limit.";
         DI "di": choice().with(IDLE), 0,
             words(text!("spindle direction sensor"), OFF_ON),
             "Direction sensing. 1: the encoder has a second sync sensor, which gives the direction. It has no effect with `spn` 0 or 1, or on a board without a pin for it.";

@@ -44,8 +44,9 @@ use crate::units::{FIRST_ROTARY, Length, PerAxis};
 /// How long an index pulse may take to come, ms.
 const PATIENCE_MS: u32 = 6_000;
 
-/// Index pulses after which the speed of the spindle is known.
-const ENOUGH: u8 = 3;
+/// The least mean time between two pulses of sync in a pass, counts: 6,000 pulses a second. With more of them there is too
+/// little time for answers.
+const PULSE_LEAST: u32 = COUNTS_PER_S / 6_000;
 
 /// A feed that is faster than any axis, mm/min.
 const ANY_FEED: f32 = 1e6;
@@ -332,7 +333,7 @@ impl Planner {
     }
 
     /// Waits until the encoder gives the time of a turn, in counts. Returns `None` if the queue is to be dropped, and
-    /// an error if the spindle gives no pulse for too long.
+    /// an error if the spindle gives no pulses that fit for too long, or more of them than there is time for.
     async fn spindle_turns(&self) -> Result<Option<u32>, Status> {
         let (mut since, mut most) = (millis(), 0);
         // The power task reads the encoder, and then raises this event.
@@ -340,23 +341,26 @@ impl Planner {
             if self.is_flushed() {
                 return Some(Ok(None));
             }
-            let (seen, synced, turn) = common::with(self.links.thread, |common| {
-                let (seen, synced) = common.encoder.seen();
-                (seen, synced, common.encoder.turn())
+            let (seen, synced, is_sure, turn, least) = common::with(self.links.thread, |common| {
+                let encoder = &common.encoder;
+                let (seen, synced) = encoder.seen();
+                let least = u32::from(encoder.per_turn()) * PULSE_LEAST;
+                (seen, synced, encoder.is_sure(), encoder.turn(), least)
             });
-            if seen >= ENOUGH && synced && turn != 0 {
-                return Some(Ok(Some(turn)));
+            if is_sure && synced && turn != 0 {
+                let is_fast = turn < least;
+                return Some(if is_fast { Err(Status::VelocityExceeded) } else { Ok(Some(turn)) });
             }
             // A spindle that is slower than the encoder can measure never gets beyond a pulse or two. In a hold the spindle
             // may stand still.
             if seen > most || machine::is_held() {
                 most = seen;
-                if seen < ENOUGH {
+                if !is_sure {
                     since = millis();
                 }
             }
             let late = millis().wrapping_sub(since) > PATIENCE_MS;
-            late.then_some(Err(if seen < ENOUGH { Status::NoIndex } else { Status::NoSync }))
+            late.then_some(Err(if synced || turn == 0 { Status::NoIndex } else { Status::NoSync }))
         })
         .await
     }

@@ -893,3 +893,43 @@ fn threads_of_1_000_turns_and_100_pulses_leave_time_for_answers() {
     wait_for_rest(&mut machine, &mut host, 20_000);
     assert_eq!(asked(&mut machine, &mut host, "stv"), 0.0, "late segments");
 }
+
+/// The most pulses a second of `docs/lathe.md`: 400 pulses in a turn at 900 turns a minute.
+#[test]
+fn a_thread_with_6_000_pulses_a_second_leaves_time_for_answers_and_one_with_more_is_refused() {
+    for (marks, rpm) in [(400, 900.0), (120, 3_000.0)] {
+        let (mut machine, mut host) = lathe(marks, rpm, |_| {});
+        begin(&mut machine, &mut host, "g91 g33 z-20 k0.4", 2.0);
+        let mut longest = 0.0f64;
+        for n in 0..40 {
+            machine.send_to(kerf_sim::AUX, b"{mpoz:n}\n");
+            let began = machine.cycle();
+            assert_eq!(host.ask(&mut machine, "{sps:n}", 1_000).unwrap().status, 0);
+            // The question and its answer are about 45 bytes, 4 ms.
+            longest = longest.max(machine.seconds(host.heard_at() - began) * 1e3 - 4.0);
+            host.run_for_ms(&mut machine, 7 + n % 11).unwrap();
+        }
+        println!("N {marks}, {rpm} rpm: an answer takes {longest:.1} ms at most");
+        assert!(longest < 20.0, "{marks}, {rpm}: {longest} ms");
+        wait_for_rest(&mut machine, &mut host, 20_000);
+        assert_eq!(machine.recorder().motors()[Z].position, (-20.0 * STEPS) as i64);
+        // A tenth more is too much.
+        machine.tamper(|mechanics, now| mechanics.force_spindle(1.1 * rpm, now));
+        host.run_for_ms(&mut machine, 1_000).unwrap();
+        let steps = machine.recorder().steps();
+        for line in ["g33 z-12 k0.4", "g33.1 z-5 k0.4", "g76 p0.4 z-5 i-1 j0.2 k0.2"] {
+            host.take_reports();
+            set(&mut machine, &mut host, "m3 s900");
+            host.run_for_ms(&mut machine, 200).unwrap();
+            machine.tamper(|mechanics, now| mechanics.force_spindle(1.1 * rpm, now));
+            host.run_for_ms(&mut machine, 1_000).unwrap();
+            set(&mut machine, &mut host, line);
+            host.run_for_ms(&mut machine, 2_000).unwrap();
+            let told = host.take_reports().iter().any(|report| report["er"]["st"] == 146);
+            assert!(told, "{marks}, {line}: nothing is told");
+            set(&mut machine, &mut host, "{clear:n}");
+            set(&mut machine, &mut host, "g91");
+        }
+        assert_eq!(machine.recorder().steps(), steps);
+    }
+}

@@ -92,5 +92,6 @@ mod transcripts;
 mod turning_alarms;
 mod turning_faults;
 mod turning_holds;
+mod turning_strays;
 mod watchdog;
 mod wrap;

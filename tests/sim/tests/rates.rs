@@ -200,3 +200,44 @@ fn any_two_motors_make_no_pause_at_their_highest_rate() {
         assert!(report.problems.is_empty(), "{leads} and {follows}: {:?}", report.problems);
     }
 }
+
+/// Returns the share of steps in a second of cruise whose interval is not the usual one, and by how many cycles it is
+/// off at most, for a motor alone. If it is `busy`, the host asks all the time.
+fn unevenness(rate: f64, busy: bool) -> (f64, u64) {
+    let speed = rate / 1_280.0 * 60.0;
+    let (mut machine, mut host) = machine(&MEGA2560_GRBL, &[&format!("{{x:{{vm:{speed:.3}}}}}")]);
+    let way = (rate / 1_280.0 * 1.2 + 10.0).round();
+    let whole = (way * 1_280.0) as u64;
+    set(&mut machine, &mut host, &format!("g0 x{way}"));
+    while machine.recorder().steps() < whole {
+        if busy {
+            machine.send(b"{posx:n}\n");
+        }
+        host.run_for_ms(&mut machine, 10).unwrap();
+    }
+    let steps = steps_of(&machine, 0);
+    let middle = steps[0].midpoint(steps[steps.len() - 1]);
+    let cruise = between(&steps, middle - SECOND / 2, middle + SECOND / 2);
+    let mut gaps: Vec<u64> = cruise.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    gaps.sort_unstable();
+    let usual = gaps[gaps.len() / 2];
+    // A period is a whole number of cycles, so intervals differ by one.
+    let off = || gaps.iter().map(|gap| gap.abs_diff(usual)).filter(|off| *off > 1);
+    (off().count() as f64 / gaps.len() as f64, off().max().unwrap_or(0))
+}
+
+/// README.md has these figures.
+#[test]
+fn the_fastest_motor_steps_evenly_up_to_66_667_steps_a_second_and_nearly_so_at_100_000() {
+    for rate in [20_000.0, 66_667.0, 80_000.0, 100_000.0] {
+        for busy in [false, true] {
+            let (share, most) = unevenness(rate, busy);
+            let percent = share * 100.0;
+            println!(
+                "{rate}, busy {busy}: {percent:.1} % of the intervals are off, by up to {most} cycles"
+            );
+            let (shares, cycles) = if rate > 66_667.0 { (0.25, 56) } else { (0.0, 0) };
+            assert!(share <= shares && most <= cycles, "{rate}: {percent:.1} %, {most} cycles");
+        }
+    }
+}
