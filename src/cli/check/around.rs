@@ -1,5 +1,5 @@
-//! The machine of a dry run, and what is around it: a spindle that turns as it is switched, and heaters that have the
-//! temperature that is asked for.
+//! The machine of a dry run, and what is around it: a spindle that turns as it is switched, and strong heaters that come
+//! to the temperature that is asked for.
 
 use kerf::boards::outputs::{COUNTERCLOCKWISE, SPINDLE};
 use kerf::hal::imp::{Machine, gpio, pwm, was_reset};
@@ -17,6 +17,9 @@ const OPEN_MS: u64 = 200;
 const HEAT_MS: u64 = 50;
 /// Time in which the spindle comes 63 % of the way to another speed, ms.
 const SPINDLE_MS: f64 = 500.0;
+/// How far the temperature of hot end and bed changes between two looks, degrees. The firmware takes a faster rise for
+/// a fault.
+const HEAT_BY: [f64; 2] = [0.5, 0.1];
 /// Temperature of a heater that is off, degrees.
 const ROOM: f64 = 22.0;
 const MOTORS: usize = 4;
@@ -79,6 +82,8 @@ pub struct Around {
     inert: bool,
     /// The sensors of hot end and bed, if the machine prints.
     sensors: Option<[Kind; 2]>,
+    /// The temperatures of hot end and bed.
+    degrees: [f64; 2],
 }
 
 impl Around {
@@ -98,6 +103,7 @@ impl Around {
             rpm: 0.0,
             inert: false,
             sensors: None,
+            degrees: [ROOM; 2],
         })
     }
 
@@ -184,13 +190,15 @@ impl Around {
         Err(format!("no answer to {line}"))
     }
 
-    /// Gives a heater the temperature of its target, if the line tells one. Returns whether it does.
+    /// Brings a heater nearer to its target, if the line tells one. Returns whether it does.
     fn heats(&mut self, heard: &str) -> bool {
         let Some(sensors) = self.sensors else { return false };
         for (heater, name) in ["he1s", "he3s"].into_iter().enumerate() {
             if let Ok(target) = value(heard, name) {
-                let degrees = if target > 0.0 { target } else { ROOM };
-                self.machine.set_sensor(heater, reading(sensors[heater], degrees) as u16);
+                let lacks = if target > 0.0 { target } else { ROOM } - self.degrees[heater];
+                self.degrees[heater] += lacks.clamp(-HEAT_BY[heater], HEAT_BY[heater]);
+                let read = reading(sensors[heater], self.degrees[heater]);
+                self.machine.set_sensor(heater, read as u16);
                 return true;
             }
         }

@@ -36,8 +36,13 @@ pub struct Line {
 /// Settings that change what answers look like, or restart the board.
 const NOT_SENT: [&str; 8] = ["ej", "jv", "js", "dia", "baud", "boot", "reset", "defa"];
 
-/// Returns the lines that a sender sends: blank lines and `%` are left out, and for a printing host comments.
+/// The byte order mark of UTF-8, with which some programs begin a file.
+const MARK: &[u8] = "\u{FEFF}".as_bytes();
+
+/// Returns the lines that a sender sends: a mark at the beginning, blank lines and `%` are left out, and for a printing
+/// host comments.
 pub fn of(job: &[u8], dialect: Dialect) -> impl Iterator<Item = Line> {
+    let job = job.strip_prefix(MARK).unwrap_or(job);
     let lines = (1..).zip(job.split(|byte| *byte == b'\n'));
     lines.filter_map(move |(number, line)| {
         let mut line = line.trim_ascii();

@@ -68,6 +68,10 @@ pub fn is_text(block: &[u8]) -> bool {
 #[inline(never)]
 #[small]
 pub fn may_move(block: &[u8]) -> bool {
+    if block.first() == Some(&b'$') {
+        // The name of a setting is no word.
+        return false;
+    }
     let mut bytes = Bytes::of(block);
     let (mut before, mut is_first) = (b' ', true);
     while let Some(byte) = bytes.next() {
