@@ -58,7 +58,7 @@ impl Cuts {
     /// Stores the lines of `before`, with a start for each, then notes what is written for `lines`.
     fn of(before: &[&'static str], lines: &'static [&str], ms: u64) -> Self {
         let mut old = Vec::new();
-        for line in before.iter().copied() {
+        for &line in before {
             old = with(&old, move |sender| {
                 sender.ask(&format!("{line}\n"), 5_000);
                 eeprom::contents()
@@ -80,7 +80,7 @@ impl Cuts {
         std::iter::once(image.clone()).chain(self.written.iter().map(move |(at, byte)| {
             let mut cut = image.clone();
             torn = torn.wrapping_mul(5).wrapping_add(99);
-            cut[usize::from(*at)] = if torn % 4 == 0 { torn } else { *byte };
+            cut[usize::from(*at)] = if torn.is_multiple_of(4) { torn } else { *byte };
             image[usize::from(*at)] = *byte;
             cut
         }))

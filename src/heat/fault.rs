@@ -360,10 +360,13 @@ mod tests {
         None
     }
 
+    /// Targets, each for some steps; and seconds until a fault, and seconds of power until then.
+    type Case<'a> = (&'a [(f64, u32)], Option<(f64, f64)>);
+
     #[test]
     fn a_change_of_target_gives_no_more_time() {
         let slow = Status::HeatTooSlow;
-        let cases: [(&[(f64, u32)], Option<(f64, f64)>); 8] = [
+        let cases: [Case; 8] = [
             (&[(200.0, 1)], Some((20.2, 20.0))),
             (&[(200.0, 95), (205.0, 95)], Some((20.2, 20.0))),
             (&[(200.0, 1), (201.0, 1)], Some((20.2, 20.0))),

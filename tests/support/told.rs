@@ -272,7 +272,7 @@ impl<S: Side> Told<S> {
         let state = &self.state;
         let offset = state.offset();
         let feed = 900 + 300 * ((x * 10.0) as u64 % 4);
-        let mut text = if (x * 10.0) as u64 % 5 == 0 { "G0" } else { "G1" }.to_string();
+        let mut text = if ((x * 10.0) as u64).is_multiple_of(5) { "G0" } else { "G1" }.to_string();
         for (axis, letter) in ['X', 'Y', 'Z'].iter().enumerate() {
             text += &format!(" {}", state.word(*letter, state.at[axis] - offset[axis]));
         }
@@ -509,8 +509,8 @@ impl<S: Side> Told<S> {
         // The position is where the motors are, or will be in some milliseconds.
         let (first, last) = (report.asked.saturating_sub(2), report.heard + AHEAD);
         let window = &self.seen[first as usize..(last as usize).min(self.seen.len())];
-        for axis in 0..AXES {
-            let at = machine[axis] * STEPS;
+        for (axis, at) in machine.iter().enumerate() {
+            let at = at * STEPS;
             let steps = || window.iter().map(|pins| pins.steps[axis] as f64);
             let (low, high) = (steps().fold(f64::MAX, f64::min), steps().fold(f64::MIN, f64::max));
             if !(low - 2.0..=high + 2.0).contains(&at) {
@@ -531,10 +531,9 @@ impl<S: Side> Told<S> {
             return Err(format!("offset {offset:?}, and the lines that run have {wanted:?}"));
         }
         let tolerance = if value("unit") == Some(0.0) { 0.03 } else { CLOSE };
-        for axis in 0..AXES {
-            if (machine[axis] - offset[axis] - work[axis]).abs() > tolerance {
-                return Err(format!("work position {work:?} of {machine:?} - {offset:?}"));
-            }
+        let is_off = |axis: usize| (machine[axis] - offset[axis] - work[axis]).abs() > tolerance;
+        if (0..AXES).any(is_off) {
+            return Err(format!("work position {work:?} of {machine:?} - {offset:?}"));
         }
         let switched =
             &self.seen[first as usize..=(report.heard as usize).min(self.seen.len() - 1)];

@@ -23,8 +23,9 @@ pub const DATA: u64 = 500;
 /// has taken the last free bytes. The flag that says whether lines are merged takes 8 more, because statics end at a
 /// multiple of 8. The position of the last probing on the axes that do not probe, and whether the last line moves, take
 /// 16 together. The work offset, the coordinate system and the tool of the move that runs take 18 bytes in exec's
-/// snapshot, and as much in the copy that a report on each port keeps, with the outputs and S.
-pub const STATIC_RAM: u64 = 6_144;
+/// snapshot, and as much in the copy that a report on each port keeps, with the outputs and S. Tool numbers of two bytes
+/// take 8 more.
+pub const STATIC_RAM: u64 = 6_152;
 /// Bytes that must remain between the statics and the deepest stack found by analysis.
 pub const FREE_STACK: i64 = 400;
 

@@ -1,7 +1,7 @@
 //! Machines that are selected on the chip: how long that takes, that a job runs on each, and that it survives a power
 //! cut.
 
-use kerf::boards::MEGA2560_GRBL;
+use kerf::boards::{MEGA2560_GRBL, RAMPS14_CNC};
 use kerf::config::machines::ALL;
 use kerf_sim::{Host, LINES_IN_FLIGHT, Machine};
 
@@ -14,7 +14,7 @@ fn value(machine: &mut Machine, host: &mut Host, name: &str) -> f64 {
 
 #[test]
 fn a_job_runs_on_every_machine() {
-    let (mut machine, mut host) = booted(&MEGA2560_GRBL);
+    let (mut machine, mut host) = booted(&RAMPS14_CNC);
     set(&mut machine, &mut host, "{sv:0,qv:0}");
     for (number, profile) in ALL.iter().enumerate() {
         let before = machine.cycle();

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use kerf::boards::{MEGA2560_GRBL, MEGA2560_GRBL_LATHE, MEGA2560_LATHE, RAMPS14};
+use kerf::boards::{MEGA2560_GRBL, MEGA2560_GRBL_LATHE, MEGA2560_LATHE, RAMPS14, RAMPS14_CNC};
 
 use crate::common::firmware;
 use crate::{pages, transcript};
@@ -11,6 +11,20 @@ use crate::{pages, transcript};
 const TURNING: [&str; 3] = ["encoder.", "thread", "lathe-"];
 /// Transcripts that only the image of a printer can play.
 const PRINTING: [&str; 2] = ["bed", "reprap"];
+/// Transcripts about built-in jobs and help screens, which the image for the grbl-style shield has no room for.
+const HELPING: [&str; 11] = [
+    "actions",
+    "alarm.",
+    "check-mode",
+    "jobs",
+    "kill",
+    "program",
+    "text-grbl",
+    "text-help",
+    "text-in-json",
+    "text-setting-joined",
+    "verbosity",
+];
 /// Transcripts that also need grbl's dialect.
 const BOTH: [&str; 2] = ["grbl-thread", "grbl-lathe"];
 
@@ -30,6 +44,9 @@ fn the_image_keeps_to_the_transcripts() {
     let (printing, others): (Vec<_>, Vec<_>) =
         others.into_iter().partition(|one| begins(&PRINTING, one));
     transcript::play_all(printing, 2, || firmware(&RAMPS14));
+    let (helping, others): (Vec<_>, Vec<_>) =
+        others.into_iter().partition(|one| begins(&HELPING, one));
+    transcript::play_all(helping, 2, || firmware(&RAMPS14_CNC));
     transcript::play_all(others, 2, || firmware(&MEGA2560_GRBL));
     transcript::play_all(turning, 2, || firmware(&MEGA2560_LATHE));
     transcript::play_all(both, 2, || firmware(&MEGA2560_GRBL_LATHE));
