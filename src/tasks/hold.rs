@@ -377,8 +377,9 @@ fn drop_queue(links: &Links) {
 #[small]
 fn is_moving(links: &Links, port: &Port) -> bool {
     let mut view = View::of(links, port);
-    let rests = machine::is_stopped() || machine::is_checking() || view.hold() == Hold::Rests;
-    !rests && view.carries_out()
+    // An axis between its switch and its zero is not where it says, also in a hold.
+    let held = view.hold() == Hold::Rests && machine::cycle() != machine::Cycle::Homing;
+    !(held || machine::is_stopped() || machine::is_checking()) && view.carries_out()
 }
 
 /// Whether there is anything to hold. In an alarm nothing moves, and lines that wait are refused.

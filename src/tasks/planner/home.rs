@@ -375,8 +375,8 @@ impl Planner {
         }
         if let Some(status) = failure {
             model.blame(at.axis);
-            // An alarm has already reported what ended the cycle.
-            if !machine::is_alarmed() {
+            // An alarm has already reported what ended the cycle, and a reset will be.
+            if !machine::is_alarmed() && !links.is_interrupted() {
                 links.except(status);
             }
         }

@@ -7,7 +7,7 @@ use crate::machine::Machine;
 use crate::oracle::Setup;
 
 /// Time between two checks for an answer, ms.
-const LOOK_MS: u64 = 5;
+const LOOK_MS: u64 = 1;
 /// Longest time of an answer, ms of AVR time.
 const ASK_MS: u64 = 30_000;
 /// Longest time of a start, ms of AVR time.

@@ -52,8 +52,8 @@ fn mistakes_are_explained() {
         (
             &elf,
             &job,
-            &["--board", "ramps14-sd"],
-            "jobs are sent in TinyG's or grbl's dialect, which the board ramps14-sd lacks",
+            &["--board", "ramps14"],
+            "jobs are sent in TinyG's or grbl's dialect, which the board ramps14 lacks",
         ),
         (&text, &job, &[], "text.elf is not an AVR program"),
         (&elf, &blank, &[], "blank.gcode has no lines to send"),

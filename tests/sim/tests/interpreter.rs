@@ -8,8 +8,9 @@ use kerf_sim::{Image, Machine, Stopwatch};
 use crate::common::image;
 
 /// Most cycles for a typical G1 line.
-// Shared ends of its functions take 60 cycles of that, because flash is full.
-const BUDGET: f64 = 6_100.0;
+// Shared ends of its functions take 60 cycles of that, because flash is full. Names behind a percent sign, byte order
+// marks and comments within comments take 100 more on the slow path.
+const BUDGET: f64 = 6_200.0;
 const REPEATS: usize = 20;
 
 /// Returns the mean cycles for a line. The lines before it set its modes.

@@ -12,13 +12,14 @@ const TURNING: [&str; 3] = ["encoder.", "thread", "lathe-"];
 /// Transcripts that only the image of a printer can play.
 const PRINTING: [&str; 2] = ["bed", "reprap"];
 /// Transcripts about built-in jobs and help screens, which the image for the grbl-style shield has no room for.
-const HELPING: [&str; 11] = [
+const HELPING: [&str; 12] = [
     "actions",
     "alarm.",
     "check-mode",
     "jobs",
     "kill",
-    "program",
+    "program.",
+    "program-over",
     "text-grbl",
     "text-help",
     "text-in-json",

@@ -103,6 +103,9 @@ impl Bed {
     pub fn new(path: &Path, board: &'static Board) -> Result<Self> {
         let image = Image::read(path)?;
         let mut bed = Bed { path: path.to_path_buf(), image, board, has_acceleration: true };
+        if !board.features.contains(&"dialect-tinyg") {
+            return Ok(bed);
+        }
         let mut machine = bed.machine()?;
         let mut host = Host::new(LINES_IN_FLIGHT);
         host.boot(&mut machine, 1_000)?;

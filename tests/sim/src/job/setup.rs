@@ -9,12 +9,23 @@ use super::ASK_MS;
 use crate::host::Host;
 use crate::oracle::{AXES, AxisMode, Decimal, MotorSetup, Setup};
 use crate::runs::Runs;
+use crate::speech::Speech;
 
 const AXIS_NAMES: [char; AXES] = ['x', 'y', 'z', 'a', 'b', 'c'];
 
 /// Reads motors and axes from the firmware.
 pub fn read_setup(machine: &mut impl Runs, host: &mut Host) -> Result<Setup> {
+    // The settings of a motor are asked for as a group, which other firmwares have, too. grbl's dialect has no groups.
+    let mut group = (0, Value::Null);
     setup_of(|name| {
+        let (owner, key) = name.split_at(1);
+        if let Some(motor) = owner.parse().ok().filter(|_| host.speech() == Speech::TinyG) {
+            if group.0 != motor {
+                let response = host.ask(machine, &format!("{{{motor}:n}}"), ASK_MS)?;
+                group = (motor, response.body.get(owner).cloned().unwrap_or_default());
+            }
+            return group.1.get(key).cloned().with_context(|| format!("no {name}: {}", group.1));
+        }
         let response = host.ask(machine, &format!("{{{name}:n}}"), ASK_MS)?;
         let value = response.body.get(name).cloned();
         value.with_context(|| format!("no {name} in {}", response.raw))
