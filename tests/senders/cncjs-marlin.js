@@ -35,7 +35,7 @@ async function connect() {
 }
 
 async function settings() {
-  for (const line of ['M92 X80 Y80 Z400 E93', 'M203 X150 Y150 Z10 E50', 'M201 X1000 Y1000 Z100 E5000']) {
+  for (const line of ['M92 X80 Y80 Z400 E93', 'M203 X150 Y150 Z10 E50', 'M201 X1000 Y1000 Z100 E5000', 'M500']) {
     await ask(line, 'ok');
   }
   return ask('M503', 'echo:  M92');

@@ -5,8 +5,9 @@ from steps import ensure
 
 
 def settings(ask):
-    """Sets the steps and limits of a printer. Returns the answer to M503."""
-    for line in ["M92 X80 Y80 Z400 E93", "M203 X150 Y150 Z10 E50", "M201 X1000 Y1000 Z100 E5000"]:
+    """Sets the steps and limits of a printer, and stores them: a later connection resets the board. Returns the answer
+    to M503."""
+    for line in ["M92 X80 Y80 Z400 E93", "M203 X150 Y150 Z10 E50", "M201 X1000 Y1000 Z100 E5000", "M500"]:
         ask(line, "ok")
     text = ask("M503", "M92")
     ensure("X80.000 Y80.000 Z400.000 E93.000" in text, text)
