@@ -7,7 +7,7 @@ use anyhow::Result;
 use kerf_sim::emulated::{Emulated, Talks};
 use kerf_sim::job::{read_lines, read_setup};
 use kerf_sim::oracle::Setup;
-use kerf_sim::{Host, Machine, oracle, print};
+use kerf_sim::{Host, Machine, by_name, oracle, print};
 
 /// Time for motion that is still under way when the sender has left, ms of AVR time.
 const SETTLE_MS: u64 = 1_000;
@@ -33,9 +33,7 @@ impl Arrival {
     pub fn of(machine: &mut Machine, twin: &mut Machine, job: &Path) -> Result<Arrival> {
         let lines = read_lines(job)?;
         Host::new(1).run_for_ms(machine, SETTLE_MS)?;
-        let mut host = Host::new(1);
-        host.boot(twin, BOOT_MS)?;
-        let setup = read_setup(twin, &mut host)?;
+        let setup = setup_of(twin)?;
         let expected = match print::is_print(machine.board(), &lines) {
             true => print::end_of(&lines, &setup)?,
             false => oracle::run(lines.iter().map(|(n, l)| (*n, l.as_str())), &setup)?.steps,
@@ -77,6 +75,17 @@ impl Arrival {
     pub fn is_exact(&self) -> bool {
         self.0.iter().all(|motor| motor.steps == motor.expected)
     }
+}
+
+/// Asks a machine that has just been started for its motors and axes.
+fn setup_of(machine: &mut Machine) -> Result<Setup> {
+    if machine.board().features.contains(&"dialect-tinyg") {
+        let mut host = Host::new(1);
+        host.boot(machine, BOOT_MS)?;
+        return read_setup(machine, &mut host);
+    }
+    by_name::boot(machine)?;
+    by_name::read_setup(machine)
 }
 
 impl Display for Arrival {
