@@ -58,9 +58,10 @@ async function jog() {
 
 /// Stops a program in the middle of a long move: what is queued goes on, M112 ends it.
 async function stop() {
-  await server.load('far', `G21 G90\nG1 X${FAR} F60\nG1 X${FAR + 1}\n`);
+  await server.load('far', `G21 G90\nG1 X${FAR} F20\nG1 X${FAR + 1}\n`);
   server.command('gcode:start');
-  await until(() => x() > 0);
+  // CNCjs ends a job by a G4, which is answered when the machine rests. Until then it asks nothing.
+  await sleep(1000);
   server.command('gcode:stop', { force: true });
   await until(() => server.workflow === 'idle');
   const heard = hear();
