@@ -9,14 +9,18 @@ use crate::status::Status;
 /// A part of the firmware that an image may lack.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Capability {
-    /// Canned cycles: G73, G81 to G89.
+    /// Canned cycles: G73, G81 to G83, G85, G89.
     Cycles,
+    /// Canned cycles that act on the spindle: G84, G86 to G88. They need [`Capability::Cycles`] as well.
+    Boring,
     /// Probing: G38.2 to G38.5.
     Probing,
     /// Built-in jobs: `{test:n}`, except the stored program.
     Jobs,
     /// Help for people at a terminal: `h`, `$h`, `$test` and so on.
     Help,
+    /// Text mode of TinyG's dialect: lines that begin with `$`, and answers as text.
+    Text,
     /// Turning: the encoder of the spindle, and the codes that use it.
     Lathe,
     /// Printing: heaters, their sensors and fans, and the codes for them.
@@ -33,11 +37,13 @@ pub enum Capability {
 
 impl Capability {
     /// All capabilities.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 12] = [
         Self::Cycles,
+        Self::Boring,
         Self::Probing,
         Self::Jobs,
         Self::Help,
+        Self::Text,
         Self::Lathe,
         Self::Printer,
         Self::CoreXy,
@@ -51,9 +57,11 @@ impl Capability {
     pub const fn is_built_in(self) -> bool {
         match self {
             Self::Cycles => cfg!(feature = "cycles"),
+            Self::Boring => cfg!(feature = "boring"),
             Self::Probing => cfg!(feature = "probing"),
             Self::Jobs => cfg!(feature = "jobs"),
             Self::Help => cfg!(feature = "help"),
+            Self::Text => cfg!(feature = "text"),
             Self::Lathe => cfg!(feature = "lathe"),
             Self::Printer => cfg!(feature = "printer"),
             Self::CoreXy => cfg!(feature = "corexy"),
@@ -74,9 +82,11 @@ impl Capability {
     pub const fn name(self) -> &'static str {
         match self {
             Self::Cycles => "cycles",
+            Self::Boring => "boring",
             Self::Probing => "probing",
             Self::Jobs => "jobs",
             Self::Help => "help",
+            Self::Text => "text",
             Self::Lathe => "lathe",
             Self::Printer => "printer",
             Self::CoreXy => "corexy",

@@ -82,8 +82,10 @@ fn the_machine_says_that_it_lacks_something() {
     };
     ask("");
     let lacks = format!("\"f\":[1,{},", number(Status::NotBuiltIn));
+    assert!(!Capability::Help.is_built_in() || Capability::Text.is_built_in());
     for (capability, line) in [
         (Capability::Cycles, "g81x1z-1r1f100"),
+        (Capability::Boring, "m3s100g86x1z-1r1p1f100"),
         (Capability::Probing, "g38.3x1f100"),
         (Capability::Lathe, "g33z-1k1"),
         (Capability::Lathe, "{spn:1}"),
@@ -105,8 +107,14 @@ fn the_machine_says_that_it_lacks_something() {
         (Capability::Jobs, "$test"),
     ] {
         let answer = ask(line);
-        let lacks = "err: Not built into this image: ";
+        // In an image without text mode the answer is JSON.
+        let refused =
+            answer.contains("err: Not built into this image: ") || answer.contains(&lacks);
         let is_built_in = capability.is_built_in() && Capability::Help.is_built_in();
-        assert_eq!(answer.contains(lacks), !is_built_in, "{line}: {answer}");
+        assert_eq!(refused, !is_built_in, "{line}: {answer}");
+    }
+    for line in ["$xvm", "?", "$ej=0", "{ej:0}"] {
+        let answer = ask(line);
+        assert_eq!(answer.contains(&lacks), !Capability::Text.is_built_in(), "{line}: {answer}");
     }
 }

@@ -5,6 +5,7 @@
 
 use super::groups::{axis, motor, system};
 use super::{Settings, StepRatio, setting::small_of};
+use crate::capability::Capability;
 use crate::units::Length;
 
 /// Motors.
@@ -191,7 +192,7 @@ impl Settings {
 
     /// Whether the machine starts in JSON mode.
     pub fn starts_in_json(&self) -> bool {
-        self.system(system::EJ) != 0
+        !Capability::Text.is_built_in() || self.system(system::EJ) != 0
     }
 
     /// Whether lines of text mode are answered in JSON, as `txt`.

@@ -387,6 +387,11 @@ impl Setting {
         self.0 == const { row_of(&system::LIST, "baud") }
     }
 
+    /// Whether this is `ej`, the mode in which TinyG's dialect starts.
+    pub fn is_start_mode(self) -> bool {
+        self.0 == const { row_of(&system::LIST, "ej") }
+    }
+
     /// Whether this is `dia`, the dialect of the ports.
     pub fn is_dialect(self) -> bool {
         self.0 == const { row_of(&system::LIST, "dia") }

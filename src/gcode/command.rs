@@ -8,6 +8,7 @@ use super::heating::Heat;
 use super::modal::{MotionMode, Plane, Turn};
 use super::overrides::Change;
 use super::threading::ThreadCycle;
+use crate::capability::Capability;
 use crate::units::{Length, PerAxis};
 
 /// The highest N word: blocks keep it in three bytes.
@@ -294,14 +295,28 @@ pub struct Cycle {
     pub peck: Length,
     /// P: how long to dwell at the bottom.
     pub dwell_ms: u32,
-    /// G87: how far beside the hole the tool enters and leaves.
-    pub aside: [Length; 2],
-    /// G87: the level at which the bore ends.
-    pub top: Length,
+    /// G87: how far beside the hole the tool enters and leaves, along the first and second axis of the plane; then the
+    /// level at which the bore ends.
+    pub back: [Length; BACK],
     /// How fast to feed.
     pub feed: Feed,
     /// How the spindle turns.
     pub spindle: Spindle,
+}
+
+/// The lengths that only G87 has, in an image that has it.
+pub const BACK: usize = if Capability::Boring.is_built_in() { 3 } else { 0 };
+
+impl Cycle {
+    /// How far beside the hole the tool enters and leaves, along the first and second axis of the plane.
+    pub fn aside(&self) -> [Length; 2] {
+        [0, 1].map(|i| self.back.get(i).copied().unwrap_or_default())
+    }
+
+    /// The level at which a bore from below ends.
+    pub fn top(&self) -> Length {
+        self.back.get(2).copied().unwrap_or_default()
+    }
 }
 
 /// How a line stops or ends the program.

@@ -7,12 +7,13 @@ use kerf_macros::small;
 
 use super::axes::{self, Value};
 use super::block::Block;
-use super::command::{Commands, Cycle, Feed, Motion, Spindle};
+use super::command::{BACK, Commands, Cycle, Feed, Motion, Spindle};
 use super::modal::{Distance, FeedMode, MotionMode, Plane, Retract, Turn};
 use super::setup::{AxisMode, Setup};
 use super::state::State;
 use super::sticky::Sticky;
 use super::words::{AXES, L, ROTARY};
+use crate::capability::Capability;
 use crate::status::Status;
 use crate::units::Length;
 
@@ -46,7 +47,7 @@ impl State {
         cycle.feed = self.rate(block, false)?;
         cycle.peck = peck(mode, &self.sticky)?;
         cycle.dwell_ms = dwell_ms(mode, &self.sticky)?;
-        if mode == MotionMode::BackBore {
+        if Capability::Boring.is_built_in() && mode == MotionMode::BackBore {
             self.back_bore(cycle)?;
         }
         self.end_at_last(cycle)
@@ -85,6 +86,7 @@ impl State {
             return Err(Status::InverseTimeNotAllowed);
         }
         let turns = match mode {
+            _ if !Capability::Boring.is_built_in() => true,
             MotionMode::Tap => self.modal.spindle == Turn::Clockwise,
             MotionMode::BoreStop | MotionMode::BackBore | MotionMode::BoreByHand => {
                 self.modal.spindle != Turn::Off
@@ -153,14 +155,17 @@ impl State {
         let [first, second, across] = self.modal.plane.axes();
         let word = |axis: u8| self.sticky.offsets.get(usize::from(axis)).copied().flatten();
         let missing = Status::ArcOffsetsMissing;
-        cycle.aside = [word(first).ok_or(missing)?, word(second).ok_or(missing)?];
+        let aside = [word(first).ok_or(missing)?, word(second).ok_or(missing)?];
         let top = word(across).ok_or(missing)?;
         let base = match self.modal.distance {
             Distance::Absolute => self.origin.get(usize::from(across)).copied().unwrap_or_default(),
             Distance::Incremental => cycle.bottom,
         };
-        cycle.top = base.checked_add(top).ok_or(Status::OutOfRange)?;
-        if cycle.top < cycle.bottom { Err(Status::AxisInvalid) } else { Ok(()) }
+        let top = base.checked_add(top).ok_or(Status::OutOfRange)?;
+        for (length, value) in cycle.back.iter_mut().zip([aside[0], aside[1], top]) {
+            *length = value;
+        }
+        if top < cycle.bottom { Err(Status::AxisInvalid) } else { Ok(()) }
     }
 
     fn at(&self, axis: u8) -> Length {
@@ -192,8 +197,7 @@ fn blank(mode: MotionMode, plane: Plane, spindle: Spindle) -> Cycle {
         clear: zero,
         peck: zero,
         dwell_ms: 0,
-        aside: [zero; 2],
-        top: zero,
+        back: [zero; BACK],
         feed: Feed::PerMinute(0.0),
         spindle,
     }

@@ -194,7 +194,7 @@ fn check_cycle(
     let mut all = [cycle.retract, cycle.bottom, cycle.clear].iter().all(|at| inside(across, *at));
     for number in [1, cycle.holes] {
         let hole = cycle.hole(number).ok_or(Status::OutOfRange)?;
-        for ((axis, at), aside) in [first, second].into_iter().zip(hole).zip(cycle.aside) {
+        for ((axis, at), aside) in [first, second].into_iter().zip(hole).zip(cycle.aside()) {
             let beside = at.units.checked_add(aside).ok_or(Status::OutOfRange)?;
             all = all && inside(axis, at.units) && inside(axis, beside);
         }

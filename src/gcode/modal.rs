@@ -60,7 +60,7 @@ impl MotionMode {
 
     /// Whether this is G73 or one of G81 to G89. Always false in an image without canned cycles.
     pub fn is_cycle(self) -> bool {
-        Capability::Cycles.is_built_in() && self.capability() == Some(Capability::Cycles)
+        Capability::Cycles.is_built_in() && matches!(self as u8, 6..=15)
     }
 
     /// Returns the capability that an image needs for this mode. `None` if every image has it.
@@ -68,6 +68,7 @@ impl MotionMode {
     pub const fn capability(self) -> Option<Capability> {
         match self as u8 {
             5 | 16..=18 => Some(Capability::Probing),
+            9 | 11..=13 => Some(Capability::Boring),
             6..=15 => Some(Capability::Cycles),
             19..=21 => Some(Capability::Lathe),
             _ => None,

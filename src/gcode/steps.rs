@@ -131,6 +131,21 @@ enum Op {
     Stop,
 }
 
+impl Op {
+    /// Whether only the cycles of [`Capability::Boring`] have this operation.
+    const fn is_boring(self) -> bool {
+        matches!(
+            self,
+            Op::Aside
+                | Op::Feed(Level::Top)
+                | Op::SpindleOff
+                | Op::SpindleOn
+                | Op::SpindleBack
+                | Op::Stop
+        )
+    }
+}
+
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Level {
     R,
@@ -142,7 +157,7 @@ enum Level {
 /// The operations with which all cycles begin.
 const APPROACH: [Op; 3] = [Op::Rise, Op::Over, Op::Rapid(Level::R)];
 /// The greatest number of operations after the approach.
-const OPS: usize = 12;
+const OPS: usize = if Capability::Boring.is_built_in() { 12 } else { 3 };
 /// The motion mode of the first cycle in [`CYCLES`].
 const FIRST: usize = MotionMode::Drill as usize;
 
@@ -152,27 +167,32 @@ progmem! {
         ops(&[Op::Feed(Level::Bottom), Op::Rapid(Level::Clear)]),
         ops(&[Op::Feed(Level::Bottom), Op::Dwell, Op::Rapid(Level::Clear)]),
         ops(&[Op::Peck, Op::Rapid(Level::Clear)]),
-        ops(&[
+        boring(&[
             Op::Feed(Level::Bottom), Op::SpindleOff, Op::SpindleBack, Op::Dwell,
             Op::Feed(Level::Clear), Op::SpindleOff, Op::SpindleOn,
         ]),
         ops(&[Op::Feed(Level::Bottom), Op::Feed(Level::Clear)]),
-        ops(&[
+        boring(&[
             Op::Feed(Level::Bottom), Op::Dwell, Op::SpindleOff, Op::Rapid(Level::Clear),
             Op::SpindleOn,
         ]),
-        ops(&[
+        boring(&[
             Op::Aside, Op::SpindleOff, Op::Rapid(Level::Bottom), Op::Over, Op::SpindleOn,
             Op::Feed(Level::Top), Op::Feed(Level::Bottom), Op::SpindleOff, Op::Aside,
             Op::Rapid(Level::Clear), Op::Over, Op::SpindleOn,
         ]),
-        ops(&[
+        boring(&[
             Op::Feed(Level::Bottom), Op::Dwell, Op::SpindleOff, Op::Stop,
             Op::Rapid(Level::Clear), Op::SpindleOn,
         ]),
         ops(&[Op::Feed(Level::Bottom), Op::Dwell, Op::Feed(Level::Clear)]),
         ops(&[Op::Peck, Op::Rapid(Level::Clear)]),
     ];
+}
+
+/// Returns the operations of a cycle that acts on the spindle; none in an image without such cycles.
+const fn boring(some: &[Op]) -> [Op; OPS] {
+    if Capability::Boring.is_built_in() { ops(some) } else { [Op::End; OPS] }
 }
 
 const fn ops(some: &[Op]) -> [Op; OPS] {
@@ -350,6 +370,9 @@ impl Steps {
     #[inline(never)]
     fn op(&mut self, op: Op, cycle: &Cycle, position: &PerAxis<Length>) -> Option<Step> {
         let across = usize::from(cycle.plane.axes()[2]);
+        if !Capability::Boring.is_built_in() && op.is_boring() {
+            return None;
+        }
         let spindle = |turn| Some(Step::Spindle(Spindle { turn, ..cycle.spindle }));
         match op {
             Op::Rise if position.get(across)? < &cycle.retract => {
@@ -357,7 +380,7 @@ impl Steps {
             }
             Op::Rise | Op::End => None,
             Op::Over => self.over(cycle, position, [Length::ZERO; 2]),
-            Op::Aside => self.over(cycle, position, cycle.aside),
+            Op::Aside => self.over(cycle, position, cycle.aside()),
             Op::Rapid(to) => level(position, across, cycle.level(to), None),
             Op::Feed(to) => level(position, across, cycle.level(to), Some(cycle.feed)),
             Op::Peck => self.peck(cycle, position, across),
@@ -426,7 +449,7 @@ impl Cycle {
             Level::R => self.retract,
             Level::Bottom => self.bottom,
             Level::Clear => self.clear,
-            Level::Top => self.top,
+            Level::Top => self.top(),
         }
     }
 }

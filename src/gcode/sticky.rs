@@ -5,6 +5,7 @@
 
 use super::axes;
 use super::block::Block;
+use super::command::BACK;
 use super::modal::{MotionMode, Plane, Units};
 use super::words::{I, P, Q, R};
 use crate::status::Status;
@@ -28,7 +29,7 @@ pub struct Sticky {
     /// P.
     pub dwell_ms: Option<u32>,
     /// I, J and K of G87.
-    pub offsets: [Option<Length>; 3],
+    pub offsets: [Option<Length>; BACK],
 }
 
 #[small]
@@ -42,7 +43,7 @@ impl Sticky {
         depth: None,
         peck: None,
         dwell_ms: None,
-        offsets: [None; 3],
+        offsets: [None; BACK],
     };
 
     /// Takes the words of a line with the cycle `mode`. Words that the line lacks stay in force if the same cycle goes

@@ -2,16 +2,13 @@
 //!
 //! Raise a cap only together with the reason for it.
 
-/// Bytes of flash. The cap is the size of the image for the board of the lathe with today's capabilities. That image
-/// leaves out grbl's dialect (21,000), help and built-in jobs (3,800). Turning takes 25,000 of it: G76 takes 6,000, for
-/// its words, its geometry and powers of floats; G33.1 takes 3,300; the retract of X within moves that are already
-/// queued takes 600. The chip has 253,952 bytes beside its largest boot loader, 8 KiB. The difference is no reserve for
-/// new features: they have to make room. Calls through a pointer reach 128 KiB; the linker routes longer calls through
-/// jumps at the beginning of the image (`.trampolines`). The last 300 bytes are for the board of the printer: the
-/// watchdog checks whether ticks interrupt, G-code waits for the end of a jog, motors with very fine steps merge no
-/// lines, and exec makes a normal segment where a long one does not fit (200). Another 100 are for two limits: that of
-/// a move which is too short for a ramp, and those of an arc whose path is measured in degrees.
-pub const FLASH: u64 = 253_800;
+/// Bytes of flash. The boot loader of the Arduino Mega erases pages up to 245,760 only: it cannot update a larger image,
+/// because it programs the pages beyond over their old content. The difference is a reserve. What has no room is left
+/// out of an image by its board's file ([`Capability`](kerf::capability::Capability)). Canned cycles take 6,000 bytes,
+/// those of them that act on the spindle about 1,000; text mode of TinyG's dialect, the dialect of grbl, and that of
+/// TinyG without text mode about 20,000 each; turning takes 25,000, of which G76 takes 6,000 and G33.1 3,300; help and
+/// built-in jobs take 3,800, probing 1,330.
+pub const FLASH: u64 = 243_000;
 /// Bytes that the profile of an image may add to its flash, beside an image for the machine `careful`: two calls, and
 /// entries that lead from its own defaults back to those of `careful` (`config::machines::ADDS`). `cargo xtask test`
 /// measures them on one board. Each other board must leave so much room that it fits with every profile.

@@ -1,6 +1,7 @@
 //! How output is written: as JSON or text, how much is shown, and with which phrases.
 
 use super::variation::Variation;
+use crate::capability::Capability;
 use crate::config::Settings;
 
 /// How to write, and the position in the current object. Kept from step to step.
@@ -64,12 +65,12 @@ impl Format {
 
     /// Whether output is text.
     pub fn is_plain(self) -> bool {
-        self.flags & PLAIN != 0
+        Capability::Text.is_built_in() && self.flags & PLAIN != 0
     }
 
     /// Whether lines are written into a JSON string.
     pub fn is_wrapped(self) -> bool {
-        self.flags & WRAPPED != 0
+        Capability::Text.is_built_in() && self.flags & WRAPPED != 0
     }
 
     /// Returns whose phrases are used.

@@ -37,6 +37,7 @@ mod wrapped;
 mod write;
 
 use super::{CHUNK, Dialect, Ending, Machine, Notice, Out};
+use crate::capability::Capability;
 use crate::config::Settings;
 use crate::machine::Alarm;
 use crate::status::Status;
@@ -97,7 +98,7 @@ impl Dialect for Tinyg {
 
     #[inline(always)]
     fn brief(mode: Mode, settings: &Settings) -> Option<bool> {
-        if mode != Mode::Json {
+        if mode.is_text() {
             return None;
         }
         let numbered = block::is_brief(settings, true);
@@ -117,7 +118,7 @@ impl Dialect for Tinyg {
     /// In text mode an empty line is answered with a prompt.
     #[inline(always)]
     fn answers_empty(mode: Mode) -> bool {
-        mode == Mode::Text
+        mode.is_text()
     }
 
     #[inline(always)]
@@ -147,11 +148,17 @@ pub enum Mode {
 }
 
 impl Mode {
+    /// Whether answers are text. Never in an image without text mode.
+    #[inline(always)]
+    fn is_text(self) -> bool {
+        Capability::Text.is_built_in() && self == Mode::Text
+    }
+
     /// Returns the format of automatic reports.
     fn format(self, machine: &impl Machine) -> Format {
-        match self {
-            Mode::Json => Format::json(machine.settings()),
-            Mode::Text => Format::plain(machine.settings()),
+        match self.is_text() {
+            false => Format::json(machine.settings()),
+            true => Format::plain(machine.settings()),
         }
     }
 }

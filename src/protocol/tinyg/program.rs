@@ -11,6 +11,7 @@
 use super::json::{Kind, Pair};
 use super::request::{Context, Phase, Request};
 use super::write::Writer;
+use crate::capability::Capability;
 use crate::protocol::{Machine, Out, Store};
 use crate::status::Status;
 
@@ -55,7 +56,7 @@ impl Request {
         let start = u16::from(self.item) * STEP;
         self.item += 1;
         // In text mode, wrapped in a string or not, the program ends with a prompt instead of a quote.
-        let is_value = self.is_json && !self.format.is_wrapped();
+        let is_value = !Capability::Text.is_built_in() || self.is_json && !self.format.is_wrapped();
         let mut writer = Writer::body(c.out, &mut self.format);
         for at in start..start + STEP {
             match c.machine.program(at) {

@@ -25,6 +25,7 @@ use super::remark::Remark;
 use super::token::Group;
 use super::write::Writer;
 use super::{Format, Mode, help};
+use crate::capability::Capability;
 use crate::config::Settings;
 use crate::protocol::{Answers, Machine, Next, Out, Span};
 use crate::status::Status;
@@ -78,6 +79,22 @@ pub(super) enum Phase {
     Failure,
     Complaint,
     Done,
+}
+
+impl Phase {
+    /// Whether only text mode has this phase.
+    fn is_text(self) -> bool {
+        matches!(
+            self,
+            Self::Wrap
+                | Self::Command
+                | Self::Listing
+                | Self::Help
+                | Self::Prompt
+                | Self::Failure
+                | Self::Complaint
+        )
+    }
 }
 
 /// A line that is being answered.
@@ -143,7 +160,7 @@ impl Request {
         let start = json::skip_blanks(line);
         let end = line.len() as u8;
         match line.get(usize::from(start)) {
-            None if *mode == Mode::Json => return None,
+            None if !mode.is_text() => return None,
             None => request.phase = Phase::Prompt,
             Some(b'{') => {
                 *mode = Mode::Json;
@@ -156,9 +173,12 @@ impl Request {
                     Err(status) => request.give_back(status),
                 }
             }
-            Some(_)
-                if *mode == Mode::Json && settings.wraps_text() && help::is_text_command(line) =>
+            Some(b'$' | b'?' | b'h' | b'H')
+                if !Capability::Text.is_built_in() && help::is_text_command(line) =>
             {
+                request.fail(Status::NotBuiltIn, Mode::Json);
+            }
+            Some(_) if !mode.is_text() && settings.wraps_text() && help::is_text_command(line) => {
                 request.block = Span { start, end };
                 request.phase = Phase::Wrap;
             }
@@ -177,7 +197,7 @@ impl Request {
             }
             Some(_) => {
                 request.block = Span { start, end };
-                request.is_text = *mode == Mode::Text;
+                request.is_text = mode.is_text();
             }
         }
         Some(request)
@@ -193,7 +213,7 @@ impl Request {
         settings: &Settings,
     ) -> Request {
         let mut request = Request::new(length, settings);
-        if mode == Mode::Json && line.first() == Some(&b'{') {
+        if !mode.is_text() && line.first() == Some(&b'{') {
             request.give_back(status);
         } else {
             request.fail(status, mode);
@@ -232,7 +252,7 @@ impl Request {
 
     pub(super) fn fail(&mut self, status: Status, mode: Mode) {
         self.status = status;
-        self.phase = if mode == Mode::Text { Phase::Prompt } else { Phase::Warning };
+        self.phase = if mode.is_text() { Phase::Prompt } else { Phase::Warning };
     }
 
     /// Begins the response, unless it has begun already.
@@ -272,6 +292,9 @@ impl Answers for Request {
         };
         let line = line.get(..end).unwrap_or(&[]);
         let context = &mut Context { line, machine, out };
+        if !Capability::Text.is_built_in() && self.phase.is_text() {
+            return Next::Done(Status::InternalError);
+        }
         match self.phase {
             Phase::Echo => self.echo(context),
             Phase::EchoText => self.echo_text(context),

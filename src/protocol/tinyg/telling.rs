@@ -64,7 +64,7 @@ impl Tells for Telling {
         match &mut self.part {
             Part::Greeting(banner, occasion) => {
                 let more = banner.step(machine, out);
-                if !more && *occasion == Occasion::Ready && mode == Mode::Text {
+                if !more && *occasion == Occasion::Ready && mode.is_text() {
                     put_ready_prompt(machine, out);
                 }
                 more

@@ -11,6 +11,7 @@ use super::request::{Context, Phase, Request};
 use super::token::Group;
 use super::write::Writer;
 use super::{CHUNK, help};
+use crate::capability::Capability;
 use crate::protocol::{Machine, Out, Span};
 use crate::status::Status;
 use crate::text;
@@ -40,6 +41,9 @@ impl Request {
         let start = pair.value.start + blanks;
         match c.line.get(usize::from(start)) {
             Some(b'{') => return Err(Status::TextNested),
+            _ if !Capability::Text.is_built_in() && help::is_text_command(text) => {
+                return Err(Status::NotBuiltIn);
+            }
             Some(b'$') => {
                 self.at = start + 1;
                 self.phase = Phase::Command;

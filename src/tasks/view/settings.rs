@@ -51,6 +51,10 @@ pub(super) fn set(view: &mut View<'_>, setting: Setting, value: i32) -> Result<W
         }
         view.links.changes.note(Changes::STEPS);
     }
+    // Text mode.
+    if setting.is_start_mode() && value == 0 {
+        Capability::Text.check()?;
+    }
     if setting.is_baud() {
         view.links.rate.set(baud::rate(value));
     }

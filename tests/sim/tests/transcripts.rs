@@ -11,15 +11,17 @@ use crate::{pages, transcript};
 const TURNING: [&str; 3] = ["encoder.", "thread", "lathe-"];
 /// Transcripts that only the image of a printer can play.
 const PRINTING: [&str; 2] = ["bed", "reprap"];
-/// Transcripts about built-in jobs and help screens, which the image for the grbl-style shield has no room for.
-const HELPING: [&str; 12] = [
-    "actions",
-    "alarm.",
+/// Transcripts with canned cycles and help screens, which the image for the grbl-style shield has no room for.
+const DRILLING: [&str; 14] = [
     "check-mode",
-    "jobs",
-    "kill",
-    "program.",
-    "program-over",
+    "cycles-",
+    "feed-modes",
+    "grbl-more",
+    "groups",
+    "machine-coordinates",
+    "planes",
+    "program-end",
+    "steps",
     "text-grbl",
     "text-help",
     "text-in-json",
@@ -32,9 +34,10 @@ const BOTH: [&str; 2] = ["grbl-thread", "grbl-lathe"];
 #[test]
 fn the_image_keeps_to_the_transcripts() {
     let mut all = transcript::read_all(Path::new("../../transcripts"));
-    // No image for this chip has drivers with UART, or both printing hosts and a second port or TinyG's dialect. The
-    // emulated `skr-pico` has them.
-    let elsewhere = ["drivers", "reprap-ports", "corexy", "heat"];
+    // No image for this chip has drivers with UART, built-in jobs, or both printing hosts and a second port or TinyG's
+    // dialect. The emulated `skr-pico` has them.
+    let elsewhere =
+        ["actions", "corexy", "drivers", "heat", "job", "program.", "program-over", "reprap-ports"];
     all.retain(|one| !elsewhere.iter().any(|name| one.name.starts_with(name)));
     let begins = |names: &[&str], one: &transcript::Transcript| {
         names.iter().any(|name| one.name.starts_with(name))
@@ -45,9 +48,9 @@ fn the_image_keeps_to_the_transcripts() {
     let (printing, others): (Vec<_>, Vec<_>) =
         others.into_iter().partition(|one| begins(&PRINTING, one));
     transcript::play_all(printing, 2, || firmware(&RAMPS14));
-    let (helping, others): (Vec<_>, Vec<_>) =
-        others.into_iter().partition(|one| begins(&HELPING, one));
-    transcript::play_all(helping, 2, || firmware(&RAMPS14_CNC));
+    let (drilling, others): (Vec<_>, Vec<_>) =
+        others.into_iter().partition(|one| begins(&DRILLING, one));
+    transcript::play_all(drilling, 2, || firmware(&RAMPS14_CNC));
     transcript::play_all(others, 2, || firmware(&MEGA2560_GRBL));
     transcript::play_all(turning, 2, || firmware(&MEGA2560_LATHE));
     transcript::play_all(both, 2, || firmware(&MEGA2560_GRBL_LATHE));
