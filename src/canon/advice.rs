@@ -80,8 +80,8 @@ const ADVICE: &[(Status, &str, &str)] = &[
     ),
     (
         NoSync,
-        "No sync pulses came at the start of a thread, but index pulses did. Nothing has moved.",
-        "Check the sync sensor and its cable, or set `{spn:1}` to use the index alone.",
+        "No sync pulses came at the start of a thread, but index pulses did; or G33.1 was to use the index alone. Nothing has moved.",
+        "Check the sync sensor and its cable. Without one, `{spn:1}` cuts threads by the index alone, and does not tap.",
     ),
     (
         SpindleLost,

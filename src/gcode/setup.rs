@@ -51,8 +51,10 @@ pub trait Setup {
     fn has_probe(&self) -> bool {
         true
     }
-    /// Returns `Ok` if an encoder measures the spindle, else the reason why not.
-    fn encoder(&self) -> Result<(), Status> {
+    /// Returns `Ok` if an encoder measures the spindle, with `has_sync` one that has a sync sensor; else the reason why
+    /// not.
+    fn encoder(&self, has_sync: bool) -> Result<(), Status> {
+        let _ = has_sync;
         Ok(())
     }
     /// Returns the highest temperature of a heater, eighths of a degree. 0 if there is no such heater.

@@ -173,7 +173,7 @@ impl State {
         setup: &impl Setup,
         out: &mut Commands,
     ) -> Result<(), Status> {
-        can_turn(setup)?;
+        can_turn(setup, returns)?;
         if block.has(ROTARY) {
             return Err(Status::RotaryNotAllowed);
         }
@@ -201,7 +201,7 @@ impl State {
         setup: &impl Setup,
         out: &mut Commands,
     ) -> Result<(), Status> {
-        can_turn(setup)?;
+        can_turn(setup, false)?;
         if !block.has(words::bit(Z as u8)) {
             return Err(Status::AxisWordMissing);
         }
@@ -310,12 +310,13 @@ impl State {
     }
 }
 
-/// Returns `Ok` if the image and the machine can cut threads, else the reason why not.
+/// Returns `Ok` if the image and the machine can cut threads, and with `taps` tap; else the reason why not. The index
+/// alone tells neither a stray pulse from a true one near the reversal, nor where the spindle reverses.
 #[inline(never)]
 #[small]
-fn can_turn(setup: &impl Setup) -> Result<(), Status> {
+fn can_turn(setup: &impl Setup, taps: bool) -> Result<(), Status> {
     Capability::Lathe.check()?;
-    setup.encoder()
+    setup.encoder(taps)
 }
 
 /// Whether a length is more than 50 m.

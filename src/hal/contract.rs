@@ -208,8 +208,8 @@ contract! {
         /// Sets which sensors are read from now on (bit 0 index, bit 1 sync, bit 2 the second sensor of sync), and
         /// for how many counts their contacts bounce: up to half of 2^16. Thread mode.
         fn set_up(lines: u8, bounce: u16);
-        /// Whether any sensor is read. Any level.
-        fn is_set_up() -> bool;
+        /// Returns which sensors are read, as bits of [`Sensors::set_up`]; 0 without an encoder. Any level.
+        fn in_use() -> u8;
         /// Returns the pulses counted and timed so far. Has to be called at least each 100 ms, or times become
         /// ambiguous. Thread mode and exec. Cost: 300.
         fn read() -> Pulses;

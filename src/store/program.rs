@@ -7,10 +7,11 @@
 //! 3, 4        checksum of the text
 //! 5 ...       the text; each line ends in a line feed
 //! ```
-//! One program begins at the first byte and goes up, the other begins at the last byte and goes down. A new program is
-//! written on the side where none is valid. [`end`] makes it valid and then the old one invalid. So after a power
-//! failure there is the old program or the new one. Only if both have no room together, the first line that needs the
-//! room of the old one makes that invalid: then there may be none.
+//! The area has two sides. The program of one side begins at the first byte and goes up. The program of the other side
+//! begins at the last byte and goes down. A valid program is on one side, and a new one is written on the other. [`end`]
+//! marks the new program as valid. Then it marks the old one as invalid. So after a power failure there is the old
+//! program or the new one. There is an exception: both may have no room together. Then the first line that needs the room
+//! of the old program marks that as invalid, and after a power failure there may be none.
 //!
 //! The program is written line by line, one byte per call: the caller that stores a line repeats the call until the
 //! line is stored, so nothing is buffered in RAM. A byte that is already right is not written again. The program is

@@ -21,6 +21,8 @@ use crate::units::{AXES, Length, PerAxis};
 
 /// The most by which an arc may exceed the reach: see `gcode::limits`.
 const REACH_SLACK: i32 = 256;
+/// The sensors of an encoder without sync ([`encoder::in_use`]).
+const INDEX_ALONE: u8 = 1;
 
 #[small]
 impl Setup for Settings {
@@ -81,11 +83,14 @@ impl Setup for Settings {
         ACTIVE.inputs[inputs::PROBE].is_some() && pins::left_out() >> inputs::PROBE & 1 == 0
     }
 
-    fn encoder(&self) -> Result<(), Status> {
-        match ACTIVE.encoder {
-            None => Err(Status::NoEncoderInput),
-            Some(_) if encoder::is_set_up() => Ok(()),
-            Some(_) => Err(Status::NoEncoder),
+    fn encoder(&self, has_sync: bool) -> Result<(), Status> {
+        if ACTIVE.encoder.is_none() {
+            return Err(Status::NoEncoderInput);
+        }
+        match encoder::in_use() {
+            0 => Err(Status::NoEncoder),
+            INDEX_ALONE if has_sync => Err(Status::NoSync),
+            _ => Ok(()),
         }
     }
 

@@ -59,7 +59,7 @@ pub fn set_up(thread: Thread, storage: &Storage) {
 #[inline(never)]
 #[small]
 pub fn look(links: &Links) {
-    if !Capability::Lathe.is_built_in() || !encoder::is_set_up() {
+    if !Capability::Lathe.is_built_in() || encoder::in_use() == 0 {
         return;
     }
     // Another exception is reported first.

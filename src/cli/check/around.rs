@@ -68,8 +68,9 @@ pub struct Around {
     /// The port that takes settings: that of the job in TinyG's dialect, else the second one.
     port: Port,
     heard: [String; 2],
-    /// The machine's time, ms.
+    /// The machine's time, ms, and how much of it passed without a step.
     pub ms: u64,
+    pub still_ms: u64,
     pub axes: [Axis; AXES.len()],
     lowest: [i64; MOTORS],
     highest: [i64; MOTORS],
@@ -95,6 +96,7 @@ impl Around {
             port,
             heard: Default::default(),
             ms: 0,
+            still_ms: 0,
             axes: Default::default(),
             lowest: [0; MOTORS],
             highest: [0; MOTORS],
@@ -109,6 +111,7 @@ impl Around {
 
     /// Lets a millisecond pass.
     pub fn pass(&mut self) {
+        let steps = self.steps();
         let (machine, lowest, highest) = (&self.machine, &mut self.lowest, &mut self.highest);
         machine.run_until(1, || {
             let position = machine.emitted().position;
@@ -119,6 +122,7 @@ impl Around {
             false
         });
         self.ms += 1;
+        self.still_ms += u64::from(self.steps() == steps);
         self.turn();
         if self.sensors.is_some() && self.ms.is_multiple_of(HEAT_MS) {
             self.machine.send_aux(b"{he1s:n}\n{he3s:n}\n");

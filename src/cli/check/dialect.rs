@@ -2,6 +2,9 @@
 //! machine's lines mean.
 
 use kerf::canon::{by_number, of_alarm, of_error, text as text_of};
+use kerf::protocol::dialect::Dialect as _;
+use kerf::protocol::grbl::Grbl;
+use kerf::protocol::tinyg::Tinyg;
 use kerf::realtime::{self, Asked};
 use kerf::status::Status;
 
@@ -38,13 +41,17 @@ pub enum Heard {
     Notice(String),
     /// An alarm.
     Alarm(Reason),
+    /// An exception: an alarm if the machine is in one, else a notice.
+    Exception(Reason),
     /// A stop that waits for M108.
     Paused,
 }
 
-/// Statuses of exceptions after which a job continues: a stop, pulses of the encoder that do not fit, a tool without a
-/// length.
-const NOTES: [u8; 4] = [38, 39, 40, 180];
+/// The characters that hold a sender up, and let it go on.
+const XOFF: u8 = 0x13;
+const XON: u8 = 0x11;
+/// Characters of grbl that act at once, beside overrides: door, spindle, flood, mist.
+const OF_GRBL: [u8; 4] = [0x84, 0x9E, 0xA0, 0xA1];
 /// Status of a line that was skipped.
 const PASSED_OVER: u8 = 3;
 
@@ -70,17 +77,21 @@ impl Dialect {
     /// Returns the dialect of a file by its look, and why.
     pub fn of(text: &str) -> (Self, String) {
         let found = (1..).zip(text.lines()).find_map(|(number, line)| {
-            let line = line.trim().to_ascii_uppercase();
+            let as_written = line.trim();
+            let line = as_written.to_ascii_uppercase();
             if is_of_a_slicer(&line) {
                 return Some((Self::RepRap, format!("line {number} is a slicer's comment")));
             }
             if is_of_a_print(&line) {
                 return Some((Self::RepRap, format!("line {number} heats or extrudes")));
             }
-            let commands = line.strip_prefix('$').is_some_and(|rest| !rest.is_empty());
-            commands.then(|| (Self::Grbl, format!("line {number} is a command of grbl's")))
+            if Tinyg::is_decided_by(as_written.as_bytes()) {
+                return Some((Self::TinyG, format!("line {number} is a command of TinyG's")));
+            }
+            is_of_grbl(as_written)
+                .then(|| (Self::Grbl, format!("line {number} is a command of grbl's")))
         });
-        found.unwrap_or_else(|| (Self::TinyG, "no line is of a print".to_string()))
+        found.unwrap_or_else(|| (Self::TinyG, "no line tells another".to_string()))
     }
 
     /// The line that makes an undecided port speak this dialect.
@@ -120,14 +131,9 @@ impl Dialect {
     /// they are text.
     pub fn take_out(self, line: &[u8]) -> (Vec<u8>, Vec<&'static str>) {
         let (mut rest, mut acts) = (Vec::new(), Vec::new());
-        let (mut before, mut comment) = (0, false);
+        let mut before = 0;
         for byte in line.iter().copied() {
-            comment = match byte {
-                b'(' | b';' => true,
-                b')' => false,
-                _ => comment,
-            };
-            match self.acts(byte, before, comment) {
+            match self.acts(byte, before) {
                 Some(act) if !acts.contains(&act) => acts.push(act),
                 Some(_) => {}
                 None => rest.push(byte),
@@ -137,8 +143,20 @@ impl Dialect {
         (rest, acts)
     }
 
+    /// Whether the machine answers a line. TinyG's dialect answers none of which nothing is left without the characters
+    /// that act at once.
+    pub fn answers(self, line: &[u8]) -> bool {
+        let is_left = |byte: &u8| {
+            !byte.is_ascii_whitespace()
+                && realtime::bit(*byte) == 0
+                && *byte != XON
+                && *byte != XOFF
+        };
+        self != Self::TinyG || line.iter().any(is_left)
+    }
+
     /// Returns what a character does when it arrives. `before` is the one before it.
-    fn acts(self, byte: u8, before: u8, comment: bool) -> Option<&'static str> {
+    fn acts(self, byte: u8, before: u8) -> Option<&'static str> {
         if self == Self::RepRap {
             return None;
         }
@@ -146,29 +164,41 @@ impl Dialect {
             realtime::HOLD => Some("! is a feedhold, in a comment too: the machine waits for ~"),
             realtime::RESET => Some("the character 18 (hex) resets the machine"),
             realtime::KILL => Some("the character 04 (hex) ends the job"),
-            realtime::FLUSH if self == Self::TinyG && !comment => Some("% drops the queued moves"),
+            0 if byte == XOFF && self == Self::TinyG => {
+                Some("the character 13 (hex) holds the answers back until 11 (hex)")
+            }
             0 if before <= realtime::ASCII && Asked::NOTHING.with(byte).is_some() => {
                 Some("a character above 7F (hex) changes an override or ends a jog")
+            }
+            0 if before <= realtime::ASCII && self == Self::Grbl && OF_GRBL.contains(&byte) => {
+                Some("a character above 7F (hex) acts as a door or switches spindle or coolant")
             }
             _ => None,
         }
     }
 }
 
-/// Whether a line, in capitals, is a comment that slicers write.
+/// Whether a line is a command that grbl alone has: those that select its dialect on a port, and `$H`, `$X`, `$110=..`.
+fn is_of_grbl(line: &str) -> bool {
+    let code = code_of(line);
+    let code = code.trim();
+    let named = code.strip_prefix('$').unwrap_or_default();
+    let is_homing = named.strip_prefix('H').is_some_and(|axis| axis.len() <= 1);
+    let (number, sets) = named.split_once('=').map_or(("", false), |(number, _)| (number, true));
+    let is_setting = sets && !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit());
+    Grbl::is_decided_by(code.as_bytes()) || is_homing || named == "X" || is_setting
+}
+
+/// Whether a line, in capitals, is a comment that slicers write. CAM programs write other comments with the same words,
+/// as in `; Type: Pocket`.
 fn is_of_a_slicer(line: &str) -> bool {
-    const MARKS: [&str; 9] = [
-        "LAYER:",
-        "LAYER_CHANGE",
-        "TYPE:",
-        "FLAVOR:",
-        "SLIC3R",
-        "PRUSASLICER",
-        "CURA_STEAMENGINE",
-        "ORCASLICER",
-        "SIMPLIFY3D",
-    ];
-    line.strip_prefix(';').is_some_and(|comment| MARKS.iter().any(|mark| comment.contains(mark)))
+    const BEGINNINGS: [&str; 4] = ["LAYER:", "LAYER_CHANGE", "TYPE:", "FLAVOR:"];
+    const NAMES: [&str; 5] =
+        ["SLIC3R", "PRUSASLICER", "CURA_STEAMENGINE", "ORCASLICER", "SIMPLIFY3D"];
+    line.strip_prefix(';').is_some_and(|comment| {
+        BEGINNINGS.iter().any(|mark| comment.starts_with(mark))
+            || NAMES.iter().any(|name| comment.contains(name))
+    })
 }
 
 /// Whether a line, in capitals, heats, or moves the extruder. G28 is no sign: files for mills have it, too.
@@ -229,8 +259,7 @@ fn tinyg(line: &str) -> Heard {
         (Some(code), _) if number(code) == Some(Status::Alarmed) => Heard::Locked,
         (Some(code), _) => Heard::Refused(says(code)),
         (_, Some(code)) if number(code) == Some(Status::Alarmed) => Heard::Nothing,
-        (_, Some(code)) if NOTES.contains(&code) => Heard::Notice(says(code).text),
-        (_, Some(code)) => Heard::Alarm(says(code)),
+        (_, Some(code)) => Heard::Exception(says(code)),
         _ => Heard::Nothing,
     }
 }

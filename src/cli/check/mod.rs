@@ -81,7 +81,7 @@ pub fn check(job: &[u8], question: &Question) -> Result<Answer, String> {
     let began = around.begin();
     let stream = Stream::new(&mut around, dialect, zero, longest_dwell_ms(&text));
     let streamed = stream.run(lines::of(job, dialect))?;
-    let ms = around.ms - began;
+    let ms = around.ms - began + streamed.skipped_ms;
     // A printer has no work zero: its files are in machine coordinates.
     let known = question.zero.or((dialect == Dialect::RepRap).then_some(zero));
     let extents = (0..AXES.len()).filter_map(|n| {
@@ -120,12 +120,13 @@ fn prepare(
     Ok(zero)
 }
 
-/// Returns an upper bound of the dwells of a job, ms: the largest P or S of its lines with G4, as seconds.
+/// Returns an upper bound of the dwells of a job, ms: the largest P or S of its lines with G4 or a cycle, as seconds. A
+/// cycle repeats its dwell in the lines behind it.
 fn longest_dwell_ms(text: &str) -> u64 {
     let dwells = text.lines().filter_map(|line| {
         let code = lines::bare(line);
-        let (_, words) = code.split_once("G4").or_else(|| code.split_once("G04"))?;
-        let digits = words.split_once(['P', 'S'])?.1;
+        let dwells = ["G4", "G04", "G8"].into_iter().find_map(|of| code.split_once(of));
+        let digits = dwells?.1.split_once(['P', 'S'])?.1;
         let end = digits.find(|c: char| !(c.is_ascii_digit() || c == '.')).unwrap_or(digits.len());
         digits.get(..end)?.parse::<f64>().ok()
     });

@@ -16,10 +16,17 @@ const POLL_MS: u64 = 20;
 const UNANSWERED_MS: u64 = 30_000;
 /// Longest time without an answer and without a step, beyond the dwells of the job, ms.
 const STUCK_MS: u64 = 600_000;
-/// Machine states: alarm, hold, and those in which it does not rest.
-const ALARM: u8 = 2;
+/// Longest time without a step in the whole job, ms. A slow move has such times between its steps, too.
+const STILL_MS: u64 = 6 * 3_600_000;
+/// Bytes in flight, line ends included: as many as the machine always has room for.
+const BYTES: usize = 254;
+/// Machine states: alarms, hold, and those in which it does not rest.
+const ALARMS: [u8; 4] = [2, 11, 12, 13];
 const HOLD: u8 = 6;
 const BUSY: [u8; 6] = [5, HOLD, 7, 8, 9, 10];
+
+/// The words for an alarm whose reason is not known.
+const IN_ALARM: &str = "an alarm, at this line or one before it";
 
 /// A line that was refused.
 pub struct Refused {
@@ -39,6 +46,8 @@ pub struct Streamed {
     pub notes: Vec<(usize, String)>,
     /// The most lines that were answered in one second.
     pub busiest: usize,
+    /// By how much dwells were shortened, ms.
+    pub skipped_ms: u64,
     /// The times at which the lines of the last second were answered, ms.
     answered: VecDeque<u64>,
 }
@@ -69,6 +78,12 @@ pub struct Stream<'a> {
     learns: bool,
     /// Whether an alarm has come that is still to be cleared.
     alarmed: bool,
+    /// Exceptions of which it is not known yet whether they are alarms, each with its line.
+    excepted: Vec<(usize, Reason)>,
+    /// Whether the dry run ends here.
+    ended: bool,
+    /// The number of the last line that was counted.
+    counted: usize,
     /// Lines sent, each with a number in the dialect of printing hosts.
     sent: usize,
     /// The number of the last line that was answered.
@@ -101,6 +116,9 @@ impl<'a> Stream<'a> {
             alone: false,
             learns: false,
             alarmed: false,
+            excepted: Vec::new(),
+            ended: false,
+            counted: 0,
             sent: 0,
             last: 0,
             because: None,
@@ -117,17 +135,11 @@ impl<'a> Stream<'a> {
         let mut lines = lines.peekable();
         loop {
             self.fill(&mut lines)?;
-            if self.waits.is_empty() {
+            if self.waits.is_empty() || self.ended {
                 break;
             }
             self.pass();
-            if self.around.was_reset() {
-                self.stop("the machine restarts: the lines behind were not tried");
-                return Ok(self.done);
-            }
-            if !self.mind()? {
-                return Ok(self.done);
-            }
+            self.mind()?;
         }
         self.rest()?;
         Ok(self.done)
@@ -138,7 +150,7 @@ impl<'a> Stream<'a> {
         &mut self,
         lines: &mut std::iter::Peekable<impl Iterator<Item = Line>>,
     ) -> Result<(), String> {
-        loop {
+        while !self.ended {
             let none = self.waits.is_empty();
             if (self.alone || self.alarmed) && none {
                 self.rest()?;
@@ -154,26 +166,34 @@ impl<'a> Stream<'a> {
             let Some(next) = self.again.front().or_else(|| lines.peek()) else { return Ok(()) };
             let barrier =
                 !next.acts.is_empty() || !matches!(next.kind, Kind::Beside | Kind::Untried(_));
-            if self.waits.len() >= limit || (barrier && !none) {
+            let bytes: usize = self.waits.iter().map(|line| line.bytes.len() + 1).sum();
+            let is_full = self.waits.len() >= limit || bytes + next.bytes.len() >= BYTES;
+            if !none && (is_full || barrier) {
                 return Ok(());
             }
             let Some(line) = self.again.pop_front().or_else(|| lines.next()) else { return Ok(()) };
             self.take(line)?;
         }
+        Ok(())
     }
 
     /// Sends a line, or says why not.
     fn take(&mut self, line: Line) -> Result<(), String> {
-        self.done.lines += usize::from(!line.again);
         let number = line.number;
+        if !line.again && self.counted != number {
+            self.counted = number;
+            self.done.lines += 1;
+        }
         if !line.again {
             self.done.stops.extend(line.acts.iter().map(|act| (number, act.to_string())));
         }
         match line.kind {
             Kind::Untried(why) => self.note(number, format!("not tried: {why}")),
+            Kind::Stops(why) => self.done.stops.push((number, why.to_string())),
             Kind::Homes(axes) => return self.home(number, axes),
             // Nothing is left of a line but characters that act at once.
             _ if line.bytes.trim_ascii().is_empty() => {}
+            _ if !self.dialect.answers(&line.bytes) => self.send(&line.bytes),
             Kind::Sets | Kind::Alone | Kind::Beside => {
                 self.learns = line.kind == Kind::Sets;
                 self.alone = line.kind != Kind::Beside;
@@ -228,10 +248,19 @@ impl<'a> Stream<'a> {
     /// Sends a line that is no part of the job, and waits until it is done.
     fn tell(&mut self, number: usize, line: &str) -> Result<(), String> {
         let (text, bytes) = (line.to_string(), line.as_bytes().to_vec());
-        let line = Line { number, text, bytes, acts: Vec::new(), kind: Kind::Beside, again: true };
+        let line = Line {
+            number,
+            text,
+            bytes,
+            acts: Vec::new(),
+            kind: Kind::Beside,
+            skipped_ms: 0,
+            again: true,
+        };
         self.send(&line.bytes);
         self.waits.push_back(line);
-        while !self.waits.is_empty() && self.mind()? {
+        while !self.waits.is_empty() && !self.ended {
+            self.mind()?;
             self.pass();
         }
         self.rest()
@@ -260,7 +289,10 @@ impl<'a> Stream<'a> {
                     self.others += 1;
                     self.around.send(b"M108\n");
                 }
-                Heard::Alarm(reason) => self.alarm(reason),
+                Heard::Alarm(reason) => self.alarm(self.line_of_alarm(), reason),
+                Heard::Exception(reason) => {
+                    self.excepted.push((self.line_of_alarm(), reason));
+                }
                 Heard::Done => self.answer(None),
                 Heard::Refused(reason) => self.answer(Some(reason)),
                 Heard::Locked if self.dialect == Dialect::RepRap => self.locked(false),
@@ -279,21 +311,28 @@ impl<'a> Stream<'a> {
         self.done.answered_at(self.around.ms);
         let Some(line) = self.waits.pop_front() else { return };
         self.last = line.number;
-        if let Some(reason) = refused.or(self.because.take()) {
-            self.done.refused.push(Refused { line: line.number, text: line.text, reason });
+        match refused.or(self.because.take()) {
+            Some(reason) => {
+                self.done.refused.push(Refused { line: line.number, text: line.text, reason });
+            }
+            None => self.done.skipped_ms += line.skipped_ms,
         }
     }
 
     /// Takes the refusal of the oldest line by an alarm that was not cleared. It has not been read, so it is sent once
     /// more. `answered` says that no other answer to it comes.
     fn locked(&mut self, answered: bool) {
-        let Some(line) = self.waits.front() else { return };
+        if !self.alarmed && self.excepted.is_empty() && !self.waits.is_empty() {
+            self.stop(IN_ALARM);
+        }
+        let Some(line) = self.waits.front_mut() else { return };
         self.alarmed = true;
         if line.again {
             let text = "the alarm stays".to_string();
             self.because = Some(Reason { text, status: Some(Status::Alarmed) });
         } else {
             self.again.push_back(Line { again: true, acts: Vec::new(), ..line.clone() });
+            line.skipped_ms = 0;
         }
         if answered {
             self.answer(None);
@@ -301,8 +340,7 @@ impl<'a> Stream<'a> {
     }
 
     /// Takes an alarm: says that it ends the job, or that a probing cannot be tried. It is cleared later.
-    fn alarm(&mut self, reason: Reason) {
-        let line = self.waits.front().filter(|_| self.alone).map_or(self.last, |line| line.number);
+    fn alarm(&mut self, line: usize, reason: Reason) {
         if reason.status == Some(Status::ProbeFailed) {
             self.note(line, format!("{}: it cannot be tried here", reason.text));
         } else {
@@ -312,12 +350,47 @@ impl<'a> Stream<'a> {
         self.alarmed = true;
     }
 
-    /// Asks for the machine's state while no line is answered. Returns false if the job cannot go on.
-    fn mind(&mut self) -> Result<bool, String> {
+    /// Returns the number of the line to which an alarm of this moment belongs.
+    fn line_of_alarm(&self) -> usize {
+        self.waits.front().filter(|_| self.alone).map_or(self.last, |line| line.number)
+    }
+
+    /// Tells the exceptions that have come: as an alarm if the machine is in one.
+    fn judge(&mut self) -> Result<(), String> {
+        if self.excepted.is_empty() {
+            return Ok(());
+        }
+        let is_alarm = ALARMS.contains(&self.around.state()?);
+        for (line, reason) in std::mem::take(&mut self.excepted) {
+            match is_alarm {
+                true => self.alarm(line, reason),
+                false => self.note(line, reason.text),
+            }
+        }
+        Ok(())
+    }
+
+    /// Ends the dry run at this line.
+    fn end(&mut self, why: &str) {
+        if !self.ended {
+            self.stop(&format!("{why}: the lines behind were not tried"));
+        }
+        self.ended = true;
+    }
+
+    /// Looks for what ends the dry run, and asks for the machine's state while no line is answered.
+    fn mind(&mut self) -> Result<(), String> {
+        self.judge()?;
+        if self.around.was_reset() {
+            self.end("the machine restarts");
+        }
+        if self.around.still_ms > STILL_MS {
+            self.end("in all the machine has stood still for 6 hours");
+        }
         let now = self.around.ms;
         let since = |then: u64| now.saturating_sub(then);
-        if since(self.heard_at.max(self.asked_at)) < ASK_MS {
-            return Ok(true);
+        if self.ended || since(self.heard_at.max(self.asked_at)) < ASK_MS {
+            return Ok(());
         }
         let state = self.look()?;
         let rests = !BUSY.contains(&state);
@@ -329,10 +402,9 @@ impl<'a> Stream<'a> {
             }
         }
         if since(self.heard_at.max(self.moved_at)) > STUCK_MS + self.dwell_ms {
-            self.stop("the machine waits here for ever: the lines behind were not tried");
-            return Ok(false);
+            self.end("the machine waits here for ever");
         }
-        Ok(true)
+        Ok(())
     }
 
     /// Asks for the machine's state. Ends a hold, and an alarm.
@@ -340,12 +412,16 @@ impl<'a> Stream<'a> {
         let state = self.around.state()?;
         self.asked_at = self.around.ms;
         self.listen();
+        self.judge()?;
         match state {
             HOLD => {
                 self.stop("the machine holds and waits for ~");
                 self.around.send(b"~");
             }
-            ALARM => {
+            state if ALARMS.contains(&state) => {
+                if !self.alarmed {
+                    self.stop(IN_ALARM);
+                }
                 self.around.ask("{clear:n}")?;
             }
             _ => {}
@@ -355,17 +431,20 @@ impl<'a> Stream<'a> {
 
     /// Waits until the machine rests.
     fn rest(&mut self) -> Result<(), String> {
-        loop {
+        while !self.ended {
             let state = self.look()?;
-            if !BUSY.contains(&state) && state != ALARM {
+            if !BUSY.contains(&state) && !ALARMS.contains(&state) {
                 return Ok(());
             }
             let since = self.around.ms.saturating_sub(self.moved_at.max(self.heard_at));
             if since > STUCK_MS + self.dwell_ms {
-                self.stop("the machine does not come to rest");
-                return Ok(());
+                self.end("the machine does not come to rest");
+            }
+            if self.around.still_ms > STILL_MS {
+                self.end("in all the machine has stood still for 6 hours");
             }
             (0..POLL_MS).for_each(|_| self.pass());
         }
+        Ok(())
     }
 }

@@ -112,9 +112,9 @@ pub fn set_up(lines: u8, bounce: u16) {
 
 /// Whether any sensor is read. Any level.
 #[small]
-pub fn is_set_up() -> bool {
+pub fn in_use() -> u8 {
     // SAFETY: a single load.
-    unsafe { (&raw const (*SHARED.0.get()).in_use).read_volatile() != 0 }
+    unsafe { (&raw const (*SHARED.0.get()).in_use).read_volatile() }
 }
 
 /// Returns the time now, in counts.

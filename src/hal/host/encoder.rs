@@ -56,8 +56,8 @@ pub fn set_up(lines: u8, bounce: u16) {
 }
 
 /// Whether any sensor is read.
-pub fn is_set_up() -> bool {
-    all().in_use.get() != 0
+pub fn in_use() -> u8 {
+    all().in_use.get()
 }
 
 /// Returns the pulses counted and timed so far.

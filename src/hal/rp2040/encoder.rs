@@ -65,9 +65,9 @@ pub fn set_up(lines: u8, bounce: u16) {
     inputs::leave_out(ACTIVE.shared_inputs(lines));
 }
 
-/// Whether any sensor is read. Any level.
-pub fn is_set_up() -> bool {
-    with(|state| state.in_use != 0)
+/// Returns which sensors are read, as bits of [`set_up`]; 0 without an encoder. Any level.
+pub fn in_use() -> u8 {
+    with(|state| state.in_use)
 }
 
 /// Returns the pulses counted and timed so far. Thread mode and exec.

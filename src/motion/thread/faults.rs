@@ -69,6 +69,15 @@ struct Faults {
     single: Option<(bool, f64)>,
     /// The first pulse of index or sync behind this angle is missing.
     lacks: Option<(bool, f64)>,
+    halved: Option<Halved>,
+}
+
+/// From an angle on every second pulse is missing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Halved {
+    index: bool,
+    sync: bool,
+    from: f64,
 }
 
 #[derive(Debug)]
@@ -107,6 +116,8 @@ struct Spindle {
     angle: f64,
     time: u64,
     pulses: Pulses,
+    /// Whether the next pulse of sync, and of the index, is one of the missing half.
+    skips: [bool; 2],
 }
 
 impl Spindle {
@@ -173,6 +184,13 @@ impl Spindle {
             self.faults.lacks = None;
             return true;
         }
+        let skip = &mut self.skips[usize::from(index)];
+        let halves =
+            |half: Halved| angle >= half.from && if index { half.index } else { half.sync };
+        if self.faults.halved.is_some_and(halves) {
+            *skip = !*skip;
+            return *skip;
+        }
         let share = if index { self.faults.no_index } else { self.faults.no_sync / self.per_turn };
         self.random.share() < share
     }
@@ -200,6 +218,7 @@ impl Case {
             angle: from,
             time: 0,
             pulses: Pulses::NONE,
+            skips: [false; 2],
         };
         let mut encoder = Encoder::new();
         encoder.set_up(self.per_turn, false, &spindle.pulses);
@@ -327,6 +346,7 @@ const NONE: Faults = Faults {
     no_sync: 0.0,
     single: None,
     lacks: None,
+    halved: None,
 };
 
 const LOADS: [Load; 3] = [Load::Steady, Load::Cuts(0.5), Load::Heavy];
@@ -435,5 +455,30 @@ fn a_stray_pulse_of_sync_at_any_angle_shifts_a_part_of_a_pulse_and_ends_nothing(
                 assert!(outcome.fault.is_none() && off < most, "{case:?} {outcome:?}");
             }
         }
+    }
+}
+
+#[test]
+fn an_encoder_that_drops_every_second_pulse_begins_no_thread_and_ends_one() {
+    let loads = [Load::Steady, Load::Cuts(0.5)];
+    for (index, sync) in [(true, false), (false, true), (true, true)] {
+        let halved = |from| Faults { halved: Some(Halved { index, sync, from }), ..NONE };
+        // The count of sync shows it before the axes move, unless both are halved alike. With the index alone it is a
+        // spindle of half the speed.
+        each(&loads, halved(0.0), |case, outcome| {
+            let is_seen = case.per_turn > 1 && index != sync;
+            assert!(!is_seen || !outcome.moved, "{case:?} {outcome:?}");
+        });
+        each(&loads, halved(8.0), |case, outcome| {
+            case.holds(outcome);
+            let ends = match case.per_turn {
+                1 => index,
+                // One or two missing pulses of sync in a turn are made good.
+                2 | 4 if !index => return,
+                // A missing index has no effect beside sync.
+                _ => sync,
+            };
+            assert_eq!(outcome.fault.is_some(), ends, "{case:?} {outcome:?}");
+        });
     }
 }

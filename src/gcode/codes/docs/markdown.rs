@@ -188,6 +188,7 @@ fn example(refusal: &Refusal) -> String {
         On::Usual => "",
         On::NoSwitches => " (without switches)",
         On::DisabledX => " (with `{xam:0}`)",
+        On::IndexAlone => " (with `{spn:1}`)",
         On::SoftLimits => " (with `{sl:1}`)",
     };
     lines.join(", ") + on

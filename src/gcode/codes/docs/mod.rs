@@ -75,6 +75,8 @@ pub enum On {
     Usual,
     /// A machine that has neither switches nor a probe nor an encoder.
     NoSwitches,
+    /// The machine of `Usual` whose encoder has no sync sensor.
+    IndexAlone,
     /// The machine of `Usual` with X disabled.
     DisabledX,
     /// The machine of `Usual` with soft limits, X from 0 to 150.
@@ -102,8 +104,12 @@ impl Setup for On {
         *self != On::NoSwitches
     }
 
-    fn encoder(&self) -> Result<(), Status> {
-        if *self == On::NoSwitches { Err(Status::NoEncoder) } else { Ok(()) }
+    fn encoder(&self, has_sync: bool) -> Result<(), Status> {
+        match self {
+            On::NoSwitches => Err(Status::NoEncoder),
+            On::IndexAlone if has_sync => Err(Status::NoSync),
+            _ => Ok(()),
+        }
     }
 
     fn homing(&self, _axis: u8) -> Result<(), Status> {

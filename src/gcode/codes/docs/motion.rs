@@ -4,7 +4,7 @@ use super::{On, Section, g, no, no_on};
 use crate::status::Status::{
     ArcAxisMissing, ArcEndpointIsStart, ArcOffsetsMissing, ArcRadiusTolerance, ArcSpecification,
     AxisDisabled, AxisNotAllowed, AxisWordMissing, FeedrateMissing, HWordInvalid,
-    InverseTimeNotAllowed, KWordInvalid, KWordMissing, LWordInvalid, NoEncoder, OutOfRange,
+    InverseTimeNotAllowed, KWordInvalid, KWordMissing, LWordInvalid, NoEncoder, NoSync, OutOfRange,
     PWordInvalid, PWordMissing, PWordNegative, ProbeFailed, ProbeTooShort, QWordInvalid,
     RWordInvalid, RotaryNotAllowed, SWordMissing, SpindleMustTurn,
 };
@@ -124,10 +124,11 @@ If the spindle stops in the cut, the axes come to rest with alarm 44.",
             "Moves to the axis words as G33 does. There Kerf reverses the spindle; the axes follow it to its stop and back in \
 step. At the start of the line Kerf reverses the spindle again. Once it has reversed, the axes return to the \
 start. The tap overshoots the axis words while the spindle slows down: leave room for it. If the spindle does \
-not reverse within the travel of one second, alarm 47 is raised. M3 or M4 must be active. `!` waits for the \
-end of the cycle.",
+not reverse within the travel of one second, alarm 47 is raised. M3 or M4 must be active. A sync \
+sensor is required. `!` waits for the end of the cycle.",
             &[
                 no_on(On::NoSwitches, NoEncoder, &["M3 S100 G33.1 Z-5 K1"]),
+                no_on(On::IndexAlone, NoSync, &["M3 S100 G33.1 Z-5 K1"]),
                 no(AxisWordMissing, &["M3 S100 G33.1 K1"]),
                 no(RotaryNotAllowed, &["M3 S100 G33.1 A5 K1"]),
                 no(KWordMissing, &["M3 S100 G33.1 Z-5"]),
