@@ -66,6 +66,11 @@ impl Control {
         (self.sum, self.power) = (0, 0);
     }
 
+    /// Gives no power in the next step.
+    pub fn rest(&mut self) {
+        self.power = 0;
+    }
+
     /// Sets the power of the next step.
     pub fn drive(&mut self, now: i16, power: u8) {
         self.measure(now);

@@ -231,7 +231,9 @@ impl Heater {
         if self.kind != Kind::None {
             let rule = Rule { rise_s, hottest: self.hottest, reach };
             let given = core::mem::take(&mut self.given);
-            self.watch.step(mean, wanted, given, &rule)?;
+            // The fan cools the hot end.
+            let wind = if number == 0 { fan } else { 0 };
+            self.watch.step(mean, wanted, given, wind, &rule)?;
         }
         match (wanted, tune) {
             (0, _) => self.control.stop(mean),
@@ -239,6 +241,9 @@ impl Heater {
             _ => {
                 self.control.step(mean, wanted, fan, &self.factors);
             }
+        }
+        if self.watch.asks() {
+            self.control.rest();
         }
         self.given = self.given.max(self.control.power());
         Ok(())
