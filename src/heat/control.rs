@@ -66,8 +66,9 @@ impl Control {
         (self.sum, self.power) = (0, 0);
     }
 
-    /// Gives no power in the next step.
-    pub fn rest(&mut self) {
+    /// Gives no power in the next step. The integral stays.
+    pub fn rest(&mut self, now: i16) {
+        self.measure(now);
         self.power = 0;
     }
 

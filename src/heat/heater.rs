@@ -237,13 +237,11 @@ impl Heater {
         }
         match (wanted, tune) {
             (0, _) => self.control.stop(mean),
+            _ if self.watch.asks() => self.control.rest(mean),
             (_, Some(tune)) => self.control.drive(mean, tune.step(mean)),
             _ => {
                 self.control.step(mean, wanted, fan, &self.factors);
             }
-        }
-        if self.watch.asks() {
-            self.control.rest();
         }
         self.given = self.given.max(self.control.power());
         Ok(())
