@@ -14,6 +14,8 @@ pub enum Wire {
     Short,
     /// The sensor has fallen out of its heater.
     Loose,
+    /// The sensor reads the same for ever.
+    Frozen,
 }
 
 /// A printer whose firmware runs in mocked time.
@@ -95,10 +97,12 @@ impl Printer {
             let (seconds, fan) = (STEP as f64 / 1_000.0, on & 4 != 0);
             self.hot_end.pass(seconds, on & 1 != 0 || self.stuck, fan);
             self.bed.pass(seconds, on & 2 != 0, fan);
-            self.loose += (AIR - self.loose) * seconds / 5.0;
+            if self.wire == Wire::Loose {
+                self.loose += (AIR - self.loose) * seconds / 5.0;
+            }
             let hot_end = match self.wire {
                 Wire::Well => self.read(self.kind, self.hot_end.sensor),
-                Wire::Loose => self.read(self.kind, self.loose),
+                Wire::Loose | Wire::Frozen => self.read(self.kind, self.loose),
                 Wire::Open => SAMPLES * 1_023,
                 Wire::Short => 0,
             };
@@ -230,6 +234,20 @@ fn a_sensor_that_has_come_loose_is_noticed_by_the_rule() {
     println!("loose: off after {off:?} ms, block at {:.0}", printer.hot_end.block);
     assert!(off.is_some_and(|ms| ms < 40_000), "{off:?}");
     assert!(printer.said.contains("\"st\":50"), "{}", printer.said);
+}
+
+/// The reading freezes just below the target, at which a weak heater might need full power for ever.
+#[test]
+fn a_sensor_that_is_frozen_below_its_target_is_noticed() {
+    let Some(mut printer) = Printer::hot() else { return };
+    printer.said.clear();
+    (printer.wire, printer.loose) = (Wire::Frozen, 198.6);
+    let mut most = 0f64;
+    printer.run(400_000, |printer| most = most.max(printer.hot_end.block));
+    println!("frozen: at most {most:.0}, {}", printer.said);
+    assert!(most < 290.0, "{most}");
+    assert!(printer.said.contains("\"st\":50"), "{}", printer.said);
+    assert_eq!(printer.machine.heaters_on() & 3, 0);
 }
 
 #[test]

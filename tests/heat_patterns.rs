@@ -60,6 +60,8 @@ enum Pattern {
     Two([f64; 2], [f64; 2]),
     /// Targets around the reading, up to so far from it, for so long at most.
     Around(f64, f64),
+    /// One target.
+    Hold(f64),
     /// Autotunes of so many seconds at most, at this target, and as much time off between them.
     Tunes(f64, [f64; 2]),
 }
@@ -98,6 +100,8 @@ enum Fault {
     None,
     /// The sensor comes to the first temperature with this time constant, seconds.
     Loose(f64, f64),
+    /// The reading stays where it is, but for a drift (degrees a second) and noise (steps of the converter).
+    Frozen(f64, f64),
     Open,
     Dead,
     Stuck,
@@ -116,11 +120,13 @@ const HOT_ENDS: [Heated; 7] = [
     ("25 W, very weak", || Plant::of(14.0, 25.0, 0.085, 0.01, [2.5, 2.0]), 230.0),
 ];
 
-const BEDS: [Heated; 5] = [
+const BEDS: [Heated; 7] = [
     ("120 W", Plant::bed, 110.0),
     ("150 W, weak", || Plant::of(900.0, 150.0, 1.55, 0.0, [8.0, 6.0]), 100.0),
     ("150 W, very weak", || Plant::of(900.0, 150.0, 2.3, 0.0, [8.0, 6.0]), 70.0),
     ("mains", || Plant::of(900.0, 500.0, 2.0, 0.0, [8.0, 10.0]), 120.0),
+    ("mains, strong", || Plant::of(900.0, 750.0, 2.0, 0.0, [8.0, 10.0]), 120.0),
+    ("mains, light", || Plant::of(700.0, 600.0, 1.8, 0.0, [6.0, 8.0]), 120.0),
     ("thick, slow sensor", || Plant::of(1_500.0, 300.0, 2.2, 0.0, [15.0, 25.0]), 110.0),
 ];
 
@@ -189,8 +195,34 @@ impl Rig {
         }
     }
 
+    /// A heater with gains, a room, a supply and a power of its own. It comes barely to its highest target.
+    fn varied(random: &mut Random, number: usize) -> Self {
+        let mut rig = Self::new(random, number);
+        let gains = match number {
+            0 => [20.0, 0.8, 80.0],
+            _ if random.below(3) == 0 => [60.0, 0.5, 600.0],
+            _ => [0.0; 3],
+        };
+        let rows = [(hot_end::P, 2.0f64), (hot_end::I, 2.5), (hot_end::D, 1.5)];
+        for ((row, by), gain) in rows.into_iter().zip(gains) {
+            let gain = gain * by.powf(random.between(-1.0, 1.0));
+            rig.heater.set(row, (gain * 1e3) as i32);
+        }
+        rig.heater.set(hot_end::HY, random.between(500.0, 3_000.0) as i32);
+        rig.plant.air = random.between(5.0, 35.0);
+        rig.plant.watts *= random.between(0.75, 1.1);
+        // The weakest bed comes to 80 degrees.
+        rig.plant.watts *= ((80.0 - rig.plant.air) / (rig.plant.most() - rig.plant.air)).max(1.0);
+        rig.reach = rig.reach.min(rig.plant.most() - 1.0);
+        if random.below(3) != 0 {
+            (rig.plant.block, rig.plant.sensor) = (rig.plant.air, rig.plant.air);
+        }
+        rig
+    }
+
     fn reads(&self) -> f64 {
-        if matches!(self.fault, Fault::Loose(..)) { self.loose } else { self.plant.sensor }
+        let is_real = !matches!(self.fault, Fault::Loose(..) | Fault::Frozen(..));
+        if is_real { self.plant.sensor } else { self.loose }
     }
 
     fn set_fault(&mut self, fault: Fault) {
@@ -215,9 +247,14 @@ impl Rig {
         if let Fault::Loose(to, seconds) = self.fault {
             self.loose += (to - self.loose) * SAMPLE_S / seconds;
         }
+        let mut steps = 0.0;
+        if let Fault::Frozen(drift, noise) = self.fault {
+            self.loose += drift * SAMPLE_S;
+            steps = noise;
+        }
         self.at += SAMPLE_S;
         self.most = self.most.max(self.plant.block);
-        let noise = (self.noise.unit() - 0.5) * 6.0;
+        let noise = (self.noise.unit() - 0.5) * (6.0 + 2.0 * steps * f64::from(SAMPLES));
         let full = SAMPLES * 1_023;
         let felt = match self.fault {
             Fault::Open => full,
@@ -273,6 +310,10 @@ impl Rig {
                 };
                 random.between(1.0, 60.0)
             }
+            Pattern::Hold(to) => {
+                self.to = to;
+                random.between(10.0, 300.0)
+            }
             Pattern::Two(to, lasts) => {
                 self.to = to[n % 2];
                 lasts[n % 2]
@@ -317,6 +358,105 @@ fn a_heater_that_is_well_has_no_fault_under_any_pattern() {
             }
         }
         Ok(())
+    });
+}
+
+/// No target makes a fault of a heater that is well, however weak or strong, cold or badly tuned it is.
+#[test]
+fn a_heater_that_is_well_has_no_fault_while_it_holds() {
+    try_all(300, |seed| {
+        let mut random = Random::new(seed);
+        let mut rig = Rig::varied(&mut random, seed as usize % 2);
+        for _ in 0..4 {
+            let (low, high) = (rig.plant.air + 3.0, rig.reach);
+            let to = [random.between(low, high), high][random.below(2)];
+            let pattern = match random.below(3) {
+                0 => Pattern::random(&mut random, rig.reach),
+                _ => Pattern::Hold(to),
+            };
+            rig.run(&mut random, pattern, 1_500.0, None);
+            if rig.told.is_some() {
+                return Err(format!(
+                    "{pattern:?}, {:.0} degrees in the room: {rig}",
+                    rig.plant.air
+                ));
+            }
+        }
+        Ok(())
+    });
+}
+
+/// A strong bed that is switched on and off gets hotter than its target, and cools slowly.
+#[test]
+fn a_strong_bed_that_overshoots_has_no_fault() {
+    try_all(100, |seed| {
+        let mut random = Random::new(seed);
+        let mut rig = Rig::varied(&mut random, 1);
+        let watts = random.between(500.0, 750.0);
+        rig.plant = Plant::of(900.0, watts, 2.0, 0.0, [8.0, random.between(6.0, 12.0)]);
+        rig.heater.set(bed::P, 0);
+        rig.plant.air = random.between(15.0, 35.0);
+        let mut over = 0f64;
+        for _ in 0..3 {
+            let to = random.between(30.0, 60.0);
+            rig.run(&mut random, Pattern::Hold(to), 900.0, None);
+            over = over.max(rig.most - to);
+            if rig.told.is_some() {
+                return Err(format!("{over:.1} degrees too hot at {to:.1}: {rig}"));
+            }
+        }
+        Ok(())
+    });
+}
+
+/// A bed warms the closed chamber, and the hot end in it gets warmer than its target. Its transistor that stays on is
+/// told nevertheless.
+#[test]
+fn a_hot_end_that_a_chamber_warms_has_no_fault_unless_its_transistor_stays_on() {
+    try_all(100, |seed| {
+        let mut random = Random::new(seed);
+        let mut rig = Rig::varied(&mut random, 0);
+        (rig.plant.block, rig.plant.sensor) = (rig.plant.air, rig.plant.air);
+        let (to, pace) = (random.between(20.0, 60.0), random.between(0.01, 0.2));
+        let warmest = random.between(45.0, 75.0);
+        let pattern = [Pattern::Hold(to), Pattern::Two([0.0, to], [5.0, 20.0])][random.below(2)];
+        while rig.at < 3_000.0 {
+            rig.plant.air = (rig.plant.air + pace).min(warmest);
+            rig.run(&mut random, pattern, 1.0, None);
+        }
+        if rig.told.is_some() {
+            return Err(format!("{pattern:?}, {warmest:.0} degrees in the chamber: {rig}"));
+        }
+        rig.set_fault(Fault::Stuck);
+        rig.run(&mut random, pattern, 300.0, None);
+        let is_well = rig.told.is_some_and(|(_, at)| at < 3_040.0);
+        is_well.then_some(()).ok_or_else(|| format!("stuck, {pattern:?}: {rig}"))
+    });
+}
+
+/// A heater with a sensor that freezes at any moment, with any gains.
+#[test]
+fn a_frozen_sensor_is_noticed_under_any_pattern() {
+    try_all(600, |seed| {
+        let pause = [None, Some(0.2), Some(3.0), Some(15.0)][seed as usize % 4];
+        let mut random = Random::new(seed);
+        let number = random.below(4) / 3;
+        let mut rig = Rig::varied(&mut random, number);
+        let pattern = match random.below(3) {
+            0 => Pattern::random(&mut random, rig.reach),
+            _ => Pattern::Hold(random.between(rig.plant.air + 10.0, rig.reach)),
+        };
+        let before = [90.0, 400.0, 1_200.0][random.below(3)];
+        let before = random.between(1.0, before);
+        rig.run(&mut random, pattern, before, None);
+        let most = [0.03, 0.007][number];
+        let drift = [0.0, random.between(-most, most)][random.below(2)];
+        let noise = [0.0, random.between(0.0, 1.0)][random.below(2)];
+        rig.told = None;
+        rig.set_fault(Fault::Frozen(drift, noise));
+        rig.run(&mut random, pattern, 1_500.0, pause);
+        let is_well = rig.most <= limit_of(rig.number);
+        is_well.then_some(()).ok_or_else(|| format!("{pattern:?}, {pause:?}, {before:.1}: {rig}"))
     });
 }
 

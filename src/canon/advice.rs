@@ -120,12 +120,12 @@ const ADVICE: &[(Status, &str, &str)] = &[
     ),
     (
         HeatRunaway,
-        "A heater's temperature does not fit its power: it fell under power, rose without power, or is far from its target. All heaters are off and locked.",
+        "A heater's temperature does not fit its power: it fell under power, rose or stayed without power, or is far below its target. All heaters are off and locked.",
         "If it keeps heating, pull the plug: its transistor has failed. Fix the sensor to its heater. Tune again (printing.md). `^x`, then heat again.",
     ),
     (
         HeatTooSlow,
-        "A heater had power and did not get hotter. All heaters are off and locked.",
+        "A heater had power and did not get hotter, or did not get colder without power. All heaters are off and locked.",
         "Check the heater, its wires, its supply and the seat of the sensor. `^x`, then heat again.",
     ),
     (

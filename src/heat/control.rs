@@ -66,6 +66,12 @@ impl Control {
         (self.sum, self.power) = (0, 0);
     }
 
+    /// Gives no power in the next step. The integral stays.
+    pub fn rest(&mut self, now: i16) {
+        self.measure(now);
+        self.power = 0;
+    }
+
     /// Sets the power of the next step.
     pub fn drive(&mut self, now: i16, power: u8) {
         self.measure(now);

@@ -231,10 +231,13 @@ impl Heater {
         if self.kind != Kind::None {
             let rule = Rule { rise_s, hottest: self.hottest, reach };
             let given = core::mem::take(&mut self.given);
-            self.watch.step(mean, wanted, given, &rule)?;
+            // The fan cools the hot end.
+            let wind = if number == 0 { fan } else { 0 };
+            self.watch.step(mean, wanted, given, wind, &rule)?;
         }
         match (wanted, tune) {
             (0, _) => self.control.stop(mean),
+            _ if self.watch.asks() => self.control.rest(mean),
             (_, Some(tune)) => self.control.drive(mean, tune.step(mean)),
             _ => {
                 self.control.step(mean, wanted, fan, &self.factors);
