@@ -111,6 +111,7 @@ mod path;
 mod probe_order;
 mod realtime;
 mod reprap;
+mod reprap_lines;
 mod settings;
 mod squaring;
 mod streams;
