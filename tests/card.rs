@@ -1,13 +1,18 @@
 //! SD cards that hold anything: damaged partitions, boot sectors, tables and directories. Each command is answered
 //! within bounded work, and the machine goes on.
 
+use std::thread;
+
 use kerf::hal::imp::{Machine, card::Blocks};
+use kerf::heat::sensor::{Kind, reading};
 
 use crate::seeds::seeds;
 
 /// Where the partition begins, and the first cluster of the file `A.G`.
 const FIRST: u32 = 63;
 const FILE: u32 = 3;
+/// The cluster of the file `B.G`.
+const OTHER: u32 = 2_000;
 /// The most blocks that a command may read: a list has 254 files, and a directory 128 blocks.
 const READS: u32 = 255 * 130;
 
@@ -23,6 +28,12 @@ struct Card {
 
 impl Card {
     fn new(is_32: bool, seed: u64) -> Self {
+        let moves = "G1 X0.01 F600 ; a slicer's comment, which is long\n".repeat(40);
+        Self::with(is_32, seed, &format!("G91\n{moves}"))
+    }
+
+    /// Returns a card whose file `A.G` has this text.
+    fn with(is_32: bool, seed: u64, text: &str) -> Self {
         let (kind, reserved, entries, in_all, tables) =
             if is_32 { (0x0C, 32, 0, 80_000, 620) } else { (0x06, 1, 64, 20_000, 79) };
         let table = FIRST + reserved;
@@ -48,17 +59,15 @@ impl Card {
             card.link(2, u32::MAX);
         }
         card.put(FIRST, 510, &[0x55, 0xAA]);
-        let text =
-            format!("G91\n{}", "G1 X0.01 F600 ; a slicer's comment, which is long\n".repeat(40));
         card.file(0, b"A       G  ", 0x20, FILE, text.len() as u32);
         card.file(1, b"FOLDER     ", 0x10, 20, 0);
-        card.file(2, b"B       G  ", 0x20, 21, 5);
+        card.file(2, b"B       G  ", 0x20, OTHER, 5);
         for (n, part) in (0..).zip(text.as_bytes().chunks(512)) {
             card.put(card.data(FILE + n), 0, part);
             let is_last = (n as usize + 1) * 512 >= text.len();
             card.link(FILE + n, if is_last { u32::MAX } else { FILE + n + 1 });
         }
-        card.link(21, u32::MAX);
+        card.link(OTHER, u32::MAX);
         card
     }
 
@@ -249,8 +258,8 @@ fn a_sound_card_is_listed_printed_and_changed() {
             ("M21", "echo:SD card ok\nok\n"),
             ("M20", "Begin file list\nA.G 2004\nB.G 5\nEnd file list\nok\n"),
             ("M23 /a.g", "File opened: a.g Size: 2004\nFile selected\nok\n"),
-            ("M30 A.G", "echo:SD card cannot be read\nok\n"),
-            ("M30 folder", "echo:SD card cannot be read\nok\n"),
+            ("M30 A.G", "echo:not possible now\nok\n"),
+            ("M30 folder", "Deletion failed, File: folder.\nok\n"),
             ("M30 B.G", "File deleted:B.G\nok\n"),
             ("M20", "Begin file list\nA.G 2004\nEnd file list\nok\n"),
             ("G92 X0", "ok\n"),
@@ -262,6 +271,162 @@ fn a_sound_card_is_listed_printed_and_changed() {
         assert_eq!(printer.machine.received(), b"Done printing file\n");
         let place = printer.ask("M114", 0);
         assert!(place.contains("X:0.400 "), "{place}");
+    }
+}
+
+impl Printer {
+    /// Puts a card into the slot whose file has this text, and begins to print it.
+    fn print(&mut self, text: &str) {
+        self.machine.insert_card(Some(Card::with(false, 0, text).blocks));
+        for line in ["M21", "M23 A.G"] {
+            assert!(self.ask(line, 0).ends_with("ok\n"), "{line}");
+        }
+        self.machine.send(b"M24\n");
+    }
+
+    /// Returns what is heard until nothing comes for some time.
+    fn hear(&mut self) -> String {
+        let (mut heard, mut silent) = (String::new(), 0);
+        while silent < 30_000 {
+            self.machine.run_ms(10);
+            let more = String::from_utf8_lossy(&self.machine.received()).into_owned();
+            silent = if more.is_empty() { silent + 10 } else { 0 };
+            heard += &more;
+        }
+        heard
+    }
+}
+
+/// What only the answer to a line of the host may begin with.
+const ANSWERS: [&str; 5] = ["ok", "Resend", "rs", "start", "wait"];
+
+/// Lines of a file are not the host's: none is counted by it.
+#[test]
+fn a_file_answers_nothing() {
+    let mut printer = Printer::boot();
+    let sum = |text: &str| {
+        let sum = text.bytes().fold(0, |sum, byte| sum ^ byte);
+        format!("{text}*{sum}\n")
+    };
+    let mut text = String::from("G91\n\n");
+    for number in (0..1_000)
+        .filter(|number| !matches!(number, 0..=32 | 60 | 112 | 226 | 303 | 502 | 600 | 601))
+    {
+        text += &format!("M{number}\n");
+    }
+    for line in [
+        "M20",
+        "M21",
+        "M23 B.G",
+        "M27",
+        "M110 N5",
+        "M105",
+        "M114",
+        "M118 ok",
+        "M118 E1 ok",
+        "M118 A1 x",
+    ] {
+        text += &format!("{line}\n{}", sum(&format!("N7 {line}")));
+    }
+    for line in [
+        "M118 Resend: 5",
+        "T0",
+        "T1",
+        "$xvm",
+        "$$",
+        "G28 X",
+        "G29",
+        "G4 P1",
+        "G1 X1.2.3",
+        "M105 ; a*5",
+    ] {
+        text += &format!("{line}\n{}", sum(&format!("N9 {line}")));
+    }
+    text += "G92 X0\n";
+    // One step of 0.1 mm each: lines with a number, in no order, with a right checksum or none.
+    for number in [5, 3, 8, 9, 9, 0] {
+        text += &sum(&format!("N{number} G1 X0.1 F6000"));
+        text += &format!("N{number} G1 X0.1\n");
+    }
+    // Damaged lines are not carried out.
+    text += "N3 G1 X10*55\nN4 G1 X10*5N5 G1 X10*7\nN3 M105*1\nG1 X0.1\n";
+    printer.ask("G92 X0", 0);
+    printer.print(&text);
+    let heard = printer.hear();
+    // That of M24.
+    let heard = heard.replacen("ok\n", "", 1);
+    for line in heard.lines() {
+        assert!(!ANSWERS.iter().any(|answer| line.starts_with(answer)), "{line} in {heard}");
+        assert!(line != "Error:", "{heard}");
+    }
+    assert!(heard.contains("echo:ok\n") && heard.contains("echo:Resend: 5\n"), "{heard}");
+    assert!(heard.contains("\n T:") && heard.contains("X:0.000 Y:0.000"), "{heard}");
+    assert_eq!(heard.matches("Error:checksum mismatch\n").count(), 3, "{heard}");
+    assert!(heard.ends_with("Done printing file\n"), "{heard}");
+    let place = printer.ask("M114", 0);
+    assert!(place.contains("X:1.300 "), "{place}");
+}
+
+/// A host presses pause while the file heats.
+#[test]
+fn a_file_is_paused_while_it_heats() {
+    for pause in ["M25", "N1 M25*21"] {
+        thread::spawn(|| pause_while_heating(pause)).join().unwrap();
+    }
+}
+
+fn pause_while_heating(pause: &str) {
+    let mut printer = Printer::boot();
+    printer.machine.set_sensor(0, reading(Kind::Semitec, 25.0) as u16);
+    printer.machine.run_ms(1_000);
+    printer.ask("M110 N0", 0);
+    printer.print("M109 S50\nG1 X10 F6000\n");
+    printer.machine.run_ms(1_000);
+    printer.machine.received();
+    printer.machine.send(format!("{pause}\n").as_bytes());
+    printer.machine.run_ms(100);
+    assert_eq!(printer.machine.received(), b"//action:paused\nok\n", "{pause}");
+    printer.machine.set_sensor(0, reading(Kind::Semitec, 50.0) as u16);
+    printer.machine.run_ms(10_000);
+    let place = printer.ask("M114", 0);
+    assert!(place.contains("X:0.000 "), "{place}");
+    assert_eq!(printer.ask("M24", 0), "ok\n");
+    printer.machine.run_ms(3_000);
+    let place = printer.ask("M114", 0);
+    assert!(place.contains("X:10.000 "), "{place}");
+}
+
+/// What is missing is named: a file, the selection of one, or the card.
+#[test]
+fn what_is_missing_is_named() {
+    let mut printer = Printer::boot();
+    printer.machine.insert_card(None);
+    for line in ["M21", "M20", "M23 A.G", "M32 A.G", "M30 A.G"] {
+        assert_eq!(printer.ask(line, 0), "echo:SD card cannot be read\nok\n", "{line}");
+    }
+    let none = "echo:no file selected; M23\nok\n";
+    assert_eq!(printer.ask("M24", 0), none);
+    assert_eq!(printer.ask("M26 S1", 0), none);
+    printer.machine.insert_card(Some(Card::new(false, 0).blocks));
+    for (line, answer) in [
+        ("M21", "echo:SD card ok\nok\n"),
+        ("M24", none),
+        ("M26 S1", none),
+        ("M23 NIX.G", "open failed, File: NIX.G.\nok\n"),
+        ("M32 /nix.g#", "open failed, File: nix.g.\nok\n"),
+        ("M23 FOLDER", "open failed, File: FOLDER.\nok\n"),
+        ("M23", "open failed, File: .\nok\n"),
+        ("M30 NIX.G", "Deletion failed, File: NIX.G.\nok\n"),
+        ("M24", none),
+        ("M27", "Not SD printing\nok\n"),
+        ("M23 A.G", "File opened: A.G Size: 2004\nFile selected\nok\n"),
+        ("M26 S9999", "echo:number out of range, not carried out\nok\n"),
+        ("M26 S-5", "echo:number out of range, not carried out\nok\n"),
+        ("M26 S99999999999", "echo:number out of range, not carried out\nok\n"),
+        ("M26", "echo:number out of range, not carried out\nok\n"),
+        ("M26 S5", "ok\n"),
+    ] {
+        assert_eq!(printer.ask(line, 0), answer, "{line}");
     }
 }
 

@@ -1,24 +1,15 @@
 //! Power fails at each byte that the EEPROM is given, and what is there at the next start.
 
 use std::collections::BTreeSet;
-use std::thread;
 
 use kerf::config::{Setting, Settings};
 use kerf::hal::eeprom::Eeprom;
-use kerf::hal::imp::{Machine, eeprom};
+use kerf::hal::imp::eeprom;
 use kerf::store::{Log, Memory, kept};
 
-/// A sender's end of the line.
-struct Sender(Machine);
+use crate::kept_machine::{Sender, with};
 
 impl Sender {
-    /// Sends a text, and returns what the machine sends within some milliseconds.
-    fn ask(&mut self, text: &str, ms: u64) -> String {
-        self.0.send(text.as_bytes());
-        self.0.run_ms(ms);
-        String::from_utf8(self.0.received()).expect("ASCII")
-    }
-
     /// Returns a value.
     fn value(&mut self, name: &str) -> String {
         let heard = self.ask(&format!("{{{name}:n}}\n"), 20);
@@ -31,21 +22,6 @@ impl Sender {
     fn wait(&mut self) {
         while self.value("kept") == "0" {}
     }
-}
-
-/// Does something with a machine that has these EEPROM contents, in a thread of its own.
-fn with<T: Send + 'static>(
-    contents: &[u8],
-    run: impl FnOnce(&mut Sender) -> T + Send + 'static,
-) -> T {
-    let contents = contents.to_vec();
-    let machine = move || {
-        eeprom::put(&contents);
-        let mut sender = Sender(Machine::boot(115_200).expect("one machine for each thread"));
-        sender.ask("", 100);
-        run(&mut sender)
-    };
-    thread::spawn(machine).join().unwrap()
 }
 
 /// What the EEPROM holds when power fails at each byte. The last byte that was written has any value then.

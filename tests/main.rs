@@ -30,6 +30,8 @@ mod host;
 mod jobs;
 #[path = "support/keeps.rs"]
 mod keeps;
+#[path = "support/kept.rs"]
+mod kept_machine;
 #[path = "support/motion_text.rs"]
 mod motion_text;
 #[path = "support/ops.rs"]
@@ -109,6 +111,7 @@ mod path;
 mod probe_order;
 mod realtime;
 mod reprap;
+mod reprap_lines;
 mod settings;
 mod squaring;
 mod streams;

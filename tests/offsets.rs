@@ -4,31 +4,9 @@ use std::thread;
 
 use kerf::hal::imp::{Machine, eeprom};
 
-/// Does something with a machine that has these EEPROM contents, in a thread of its own.
-fn with<T: Send + 'static>(
-    contents: Vec<u8>,
-    run: impl FnOnce(&mut Sender) -> T + Send + 'static,
-) -> T {
-    let machine = move || {
-        eeprom::put(&contents);
-        let mut sender = Sender(Machine::boot(115_200).expect("one machine for each thread"));
-        sender.ask("", 100);
-        run(&mut sender)
-    };
-    thread::spawn(machine).join().unwrap()
-}
-
-/// A sender's end of the line.
-struct Sender(Machine);
+use crate::kept_machine::{Sender, with};
 
 impl Sender {
-    /// Sends a text, and returns what the machine sends within some milliseconds.
-    fn ask(&mut self, text: &str, ms: u64) -> String {
-        self.0.send(text.as_bytes());
-        self.0.run_ms(ms);
-        String::from_utf8(self.0.received()).expect("ASCII")
-    }
-
     /// Sends a line and waits until it is executed, however long that takes.
     fn carry_out(&mut self, line: &str) {
         let mut heard = self.ask(&format!("{line}\n"), 20);

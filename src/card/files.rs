@@ -4,7 +4,7 @@ use heapless::Vec;
 
 use super::device::{BLOCK, Blocks, Fault};
 use super::fat::{File, Found, HIDDEN, Volume};
-use super::{Entry, NAME_MAX};
+use super::{Entry, NAME_MAX, prints_byte};
 use crate::status::Status;
 
 /// The longest line, without its comment.
@@ -36,8 +36,6 @@ pub struct Card {
     blocks: Blocks,
     volume: Option<Volume>,
     file: Option<File>,
-    /// Whether lines are taken from the file.
-    prints: bool,
     /// Whether the rest of the line is skipped, because it is a comment or too long.
     skips: bool,
     is_long: bool,
@@ -50,11 +48,11 @@ pub struct Card {
 impl Card {
     /// Returns a card that has not been initialized.
     pub fn new() -> Self {
+        prints_byte().set(0);
         Self {
             blocks: Blocks::new(),
             volume: None,
             file: None,
-            prints: false,
             skips: false,
             is_long: false,
             jumps: false,
@@ -82,37 +80,45 @@ impl Card {
 
     /// Closes the selected file, if there is one: the print has ended.
     pub fn close(&mut self) {
-        (self.prints, self.jumps) = (false, true);
+        prints_byte().set(0);
+        self.jumps = true;
         self.file = None;
         self.blocks.settle();
     }
 
-    /// Selects a file, M23.
+    /// Selects a file, M23. [`Status::UnrecognizedName`]: there is none with this name.
     #[inline(never)]
     pub fn open(&mut self, name: &[u8]) -> Status {
         self.close();
-        let Ok(found) = self.find(name) else { return Status::CardError };
+        let found = match self.find(name) {
+            Ok(found) => found,
+            Err(status) => return status,
+        };
         self.file = Some(File::new(found));
         (self.skips, self.is_long) = (false, false);
         Status::Ok
     }
 
-    /// Deletes a file, M30, unless it is selected.
+    /// Deletes a file, M30, unless it is selected ([`Status::NotAccepted`]). [`Status::UnrecognizedName`]: there is none
+    /// with this name.
     #[inline(never)]
     pub fn delete(&mut self, name: &[u8]) -> Status {
-        let Ok(found) = self.find(name) else { return Status::CardError };
+        let found = match self.find(name) {
+            Ok(found) => found,
+            Err(status) => return status,
+        };
         if self.file.is_some_and(|file| file.found.place == found.place) {
-            return Status::CardError;
+            return Status::NotAccepted;
         }
         status(Volume::delete(&found, &mut self.blocks))
     }
 
-    /// Sets whether lines are taken from the file: M24, M25.
+    /// Sets whether lines are taken from the file: M24, M25. Without a file none are: [`Status::NotAccepted`].
     pub fn print(&mut self, prints: bool) -> Status {
         if prints && self.file.is_none() {
-            return Status::CardError;
+            return Status::NotAccepted;
         }
-        self.prints = prints;
+        prints_byte().set(prints.into());
         if !prints {
             // While the card is selected the sensor on the same lines cannot be read.
             self.blocks.settle();
@@ -120,15 +126,10 @@ impl Card {
         Status::Ok
     }
 
-    /// Whether lines are taken from the file.
-    pub fn prints(&self) -> bool {
-        self.prints
-    }
-
-    /// Moves to a byte of the file, M26.
+    /// Moves to a byte of the file, M26. [`Status::OutOfRange`]: the file is not that long.
     pub fn seek(&mut self, at: u32) -> Status {
         let Some(file) = self.file.as_mut().filter(|file| at <= file.found.entry.size) else {
-            return Status::CardError;
+            return Status::OutOfRange;
         };
         file.at = at;
         (self.skips, self.is_long, self.jumps) = (false, false, true);
@@ -153,14 +154,15 @@ impl Card {
         found.map(|found| found.map(|found| found.entry)).map_err(|_| Status::CardError)
     }
 
-    /// Returns the file with this name.
+    /// Returns the file with this name. [`Status::UnrecognizedName`]: there is none.
     #[inline(never)]
-    fn find(&mut self, name: &[u8]) -> Result<Found, Fault> {
+    fn find(&mut self, name: &[u8]) -> Result<Found, Status> {
         let found = self.search(|found| {
             let kept = found.entry.name.iter().position(|letter| *letter == 0).unwrap_or(NAME_MAX);
             found.entry.name.get(..kept).is_some_and(|kept| kept.eq_ignore_ascii_case(name))
-        })?;
-        found.filter(|found| !found.is_folder()).ok_or(Fault::Failed)
+        });
+        let found = found.map_err(|_| Status::CardError)?;
+        found.filter(|found| !found.is_folder()).ok_or(Status::UnrecognizedName)
     }
 
     /// Returns the first entry of the root directory for which `is_it` returns true.

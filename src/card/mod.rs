@@ -9,6 +9,8 @@
 //! ms in which the block is transferred. All other operations, which run while the machine is idle, wait for their
 //! blocks, at most 100 ms for each. A failure is [`CardError`](crate::status::Status::CardError), and ends a print.
 
+use crate::hal::byte::SharedByte;
+
 #[cfg(feature = "sd")]
 mod device;
 #[cfg(feature = "sd")]
@@ -18,6 +20,16 @@ mod files;
 
 #[cfg(feature = "sd")]
 pub use files::{Card, LINE_MAX, Line};
+
+machine_static! {
+    // Whether lines are taken from the file. Only thread mode uses it.
+    fn prints_byte() -> SharedByte = SharedByte::new(0);
+}
+
+/// Whether lines of the selected file are being taken. Thread mode, 10 cycles.
+pub fn prints() -> bool {
+    cfg!(feature = "sd") && prints_byte().get() != 0
+}
 
 /// The length of a short name in bytes, with its point.
 pub const NAME_MAX: usize = 12;

@@ -40,9 +40,9 @@ pub fn write(setting: Setting, machine: &mut impl Machine, out: &mut impl Out) {
 pub fn set(setting: Setting, text: &[u8], machine: &mut impl Machine) -> Result<Warning, Status> {
     match text {
         [b'0', b'x' | b'X', digits @ ..] if setting.is_data() => {
-            store(Some(setting), parse_hex(digits)?, machine)
+            store(setting, parse_hex(digits)?, machine)
         }
-        _ => put(Some(setting), parse(text)?, machine),
+        _ => put(setting, parse(text)?, machine),
     }
 }
 
@@ -66,13 +66,8 @@ pub fn parse(text: &[u8]) -> Result<Number, Status> {
 /// Checks a number and stores it.
 #[inline(never)]
 #[small]
-pub fn put(
-    setting: Option<Setting>,
-    to: Number,
-    machine: &mut impl Machine,
-) -> Result<Warning, Status> {
-    let found = setting.ok_or(Status::UnrecognizedName)?;
-    let value = machine.settings().check(found, to, false).map_err(|status| match status {
+pub fn put(setting: Setting, to: Number, machine: &mut impl Machine) -> Result<Warning, Status> {
+    let value = machine.settings().check(setting, to, false).map_err(|status| match status {
         // grbl's error 4 is for negative values only.
         Status::BelowMinimum => Status::OutOfRange,
         other => other,
@@ -80,20 +75,13 @@ pub fn put(
     store(setting, value, machine)
 }
 
-/// Stores a value that has the scale of the stored setting. A value that the setting has already is not written again.
+/// Stores a value that has the scale of the stored setting. A value that the setting has already is set, too: a profile
+/// is taken over anew, and what M92 has lent is stored. EEPROM is written only where it has another value.
 #[inline(never)]
 #[small]
-pub fn store(
-    setting: Option<Setting>,
-    value: i32,
-    machine: &mut impl Machine,
-) -> Result<Warning, Status> {
-    let setting = setting.ok_or(Status::UnrecognizedName)?;
+pub fn store(setting: Setting, value: i32, machine: &mut impl Machine) -> Result<Warning, Status> {
     if !setting.accepts(value) {
         return Err(Status::OutOfRange);
-    }
-    if machine.setting(setting) == value {
-        return Ok(Warning::None);
     }
     machine.set(setting, value)
 }

@@ -54,6 +54,11 @@ pub trait Dialect {
     /// Returns how ports are spoken to after a start.
     fn speech(settings: &Settings) -> Self::Speech;
 
+    /// Returns how lines of a file on the SD card are taken: they are in no order, and nobody waits for their answers.
+    fn in_file(settings: &Settings) -> Self::Speech {
+        Self::speech(settings)
+    }
+
     /// Starts to answer a line, which the sender counts as `length` bytes. `None` if there is nothing to answer. The
     /// line may change `speech`, and so how the port is spoken to from now on.
     fn begin(
@@ -159,10 +164,6 @@ pub trait Answers {
     /// Notes that the line has been dropped since its answer was begun, by an alarm or by a sender. May be called more
     /// than once.
     fn dropped(&mut self) {}
-
-    /// Drops all output except reports that the line itself asks for. For lines from a file, because no sender waits
-    /// for an answer.
-    fn silence(&mut self) {}
 
     /// Whether the answer is a list. The caller then keeps little output queued, so that a `?` is answered soon.
     fn is_list(&self) -> bool {
@@ -308,12 +309,12 @@ macro_rules! dialects {
                 has
             };
 
-            /// Returns this dialect in the state that it has after a start.
+            /// See [`Dialect::in_file`].
             #[cfg(feature = "sd")]
-            pub fn fresh(self, settings: &Settings) -> Self {
+            pub fn in_file(self, settings: &Settings) -> Self {
                 match self {
                     $(#[cfg(feature = $feature)]
-                    Self::$name(_) => Self::$name(<$dialect>::speech(settings)),)+
+                    Self::$name(_) => Self::$name(<$dialect>::in_file(settings)),)+
                 }
             }
 
@@ -498,14 +499,6 @@ macro_rules! dialects {
                 match self {
                     $(#[cfg(feature = $feature)]
                     Self::$name(request) => request.dropped(),)+
-                }
-            }
-
-            #[inline(always)]
-            fn silence(&mut self) {
-                match self {
-                    $(#[cfg(feature = $feature)]
-                    Self::$name(request) => request.silence(),)+
                 }
             }
 

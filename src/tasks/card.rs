@@ -2,7 +2,7 @@
 //!
 //! A line is taken when the planner is free and no answer is under way, after the lines that hosts have sent. While a
 //! line is under way, only G-code of hosts waits. A line is carried out as if the host that has chosen the file had
-//! sent it, but without its `ok`; messages of the line go to that host. If a line cannot be carried out, the host is
+//! sent it, but without its `ok`, and whatever its number is; messages of the line go to that host. If a line cannot be carried out, the host is
 //! told, and the next line is taken. An alarm or a flush ends the print; the file stays chosen.
 //!
 //! Cost: that of a line of the host, and 3,000 cycles for each 40 bytes. Each 512 bytes cost 25,000 more, of thread
@@ -14,7 +14,7 @@ use super::links::Links;
 use super::parser::{Line as Sender, is_free, run_block};
 use super::row;
 use super::view::View;
-use crate::card::{LINE_MAX, Line};
+use crate::card::{self, LINE_MAX, Line};
 use crate::machine;
 use crate::protocol::{Answers, Machine, Next, Request, Value};
 use crate::status::Status;
@@ -82,7 +82,7 @@ impl Feed {
             return self.go_on(links);
         }
         // The part of a line that has been read is kept, because M24 continues after it.
-        if !links.card.borrow().prints() {
+        if !card::prints() {
             return false;
         }
         if machine::is_alarmed() {
@@ -150,12 +150,9 @@ impl Feed {
 
     fn begin(&mut self, links: &Links) {
         let settings = links.settings.borrow();
-        let mut speech = links.told().speech.get().fresh(&settings);
+        let mut speech = links.told().speech.get().in_file(&settings);
         let length = self.line.len() as u16;
         self.request = Request::begin(&self.line, length, &mut speech, &settings);
-        if let Some(request) = &mut self.request {
-            request.silence();
-        }
     }
 
     fn go_on(&mut self, links: &'static Links) -> bool {

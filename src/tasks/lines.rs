@@ -481,7 +481,10 @@ impl LinePool {
         let most = REST_MAX.min(self.longest / 4);
         // Where lines are answered in their order, the answer depends on whether the dropped line was a jog or other
         // G-code.
-        let tells = status == Status::InputTooLong || self.in_order && status == Status::Terminated;
+        // What is too long is not dropped without a number, even if it looks like several lines.
+        let tells = status == Status::InputTooLong
+            || self.partial == self.longest
+            || self.in_order && status == Status::Terminated;
         let kept = if tells { self.partial.min(most) } else { 0 };
         self.pass(self.partial - kept);
         self.partial = kept;

@@ -504,13 +504,13 @@ impl Machine for View<'_> {
 
     #[cfg(feature = "sd")]
     fn card_prints(&mut self) -> bool {
-        self.links.card.borrow().prints()
+        crate::card::prints()
     }
 
     #[cfg(feature = "sd")]
     fn card_entry(&mut self, number: u8) -> Result<Option<Entry>, Status> {
         let mut card = self.links.card.borrow_mut();
-        if card.prints() { Err(Status::NotAccepted) } else { card.entry(number) }
+        if crate::card::prints() { Err(Status::NotAccepted) } else { card.entry(number) }
     }
 
     #[cfg(feature = "bed-plane")]
@@ -527,6 +527,11 @@ impl Machine for View<'_> {
     fn clear_shift(&mut self, axes: u8) {
         self.links.model.borrow_mut().clear_shift(axes);
         self.note_origin();
+    }
+
+    #[cfg(feature = "dialect-reprap")]
+    fn is_told(&self) -> bool {
+        self.port.number == self.links.told().number
     }
 
     #[cfg(feature = "dialect-reprap")]

@@ -270,6 +270,7 @@ fn set_report(bits: i32, kept: i32, machine: &mut impl Machine) -> Result<(), St
 #[inline(never)]
 #[small]
 fn put(machine: &mut impl Machine, setting: Option<Setting>, to: Number) -> Result<(), Status> {
+    let setting = setting.ok_or(Status::UnrecognizedName)?;
     let warning = by_name::put(setting, to, machine)?;
     note(machine, warning);
     Ok(())
@@ -283,6 +284,7 @@ fn put_value(
     setting: Option<Setting>,
     value: i32,
 ) -> Result<(), Status> {
+    let setting = setting.ok_or(Status::UnrecognizedName)?;
     let warning = by_name::store(setting, value, machine)?;
     note(machine, warning);
     Ok(())

@@ -5,6 +5,7 @@ use super::host::{self, Step};
 use super::write::{int, line_end, text};
 use crate::capability::Capability;
 use crate::card::{Entry, NAME_MAX, Op};
+use crate::progmem::Text;
 use crate::protocol::{Machine, Out};
 use crate::status::Status;
 use crate::text;
@@ -39,18 +40,26 @@ pub fn part(
         },
         22 => return done(machine.card(Op::Release)),
         23 | 32 => return open(number, at, block, machine, out),
+        24 | 26 if !has_file => text(out, text!("echo:no file selected; M23\n")),
         25 if machine.card_prints() => {
             text(out, text!("//action:paused\n"));
             return done(machine.card(Op::Print(false)));
         }
         24 | 25 => return done(machine.card(Op::Print(number == 24))),
         26 => {
-            let at = value(block, b'S', 0).unwrap_or(0).max(0);
-            return done(machine.card(Op::Seek(at.unsigned_abs())));
+            return match value(block, b'S', 0).and_then(|at| u32::try_from(at).ok()) {
+                Some(at) => done(machine.card(Op::Seek(at))),
+                None => Step::Refused(Status::OutOfRange),
+            };
         }
         27 => progress(machine, out),
         _ => match machine.card(Op::Delete(name(block))) {
-            Status::Ok => named(text!("File deleted:"), block, out),
+            Status::Ok => {
+                text(out, text!("File deleted:"));
+                named(block, out);
+                line_end(out);
+            }
+            Status::UnrecognizedName => missing(text!("Deletion"), block, out),
             status => return Step::Refused(status),
         },
     }
@@ -110,10 +119,17 @@ fn size(bytes: u32, out: &mut impl Out) {
 }
 
 #[small]
-fn named(what: crate::progmem::Text, block: &[u8], out: &mut impl Out) {
-    text(out, what);
+fn named(block: &[u8], out: &mut impl Out) {
     out.put_all(name(block).iter().copied().take(NAME_MAX));
-    line_end(out);
+}
+
+/// Reports that there is no file with the name of a block, in the words that hosts know.
+#[small]
+fn missing(what: Text, block: &[u8], out: &mut impl Out) {
+    text(out, what);
+    text(out, text!(" failed, File: "));
+    named(block, out);
+    text(out, text!(".\n"));
 }
 
 #[small]
@@ -122,11 +138,15 @@ fn open(number: u16, at: u8, block: &[u8], machine: &mut impl Machine, out: &mut
         return match machine.card(Op::Open(name(block))) {
             Status::Ok => {
                 text(out, text!("File opened: "));
-                out.put_all(name(block).iter().copied().take(NAME_MAX));
+                named(block, out);
                 text(out, text!(" Size: "));
                 size(machine.card_progress().map_or(0, |(_, size)| size), out);
                 line_end(out);
                 Step::At(1)
+            }
+            Status::UnrecognizedName => {
+                missing(text!("open"), block, out);
+                Step::Done
             }
             status => Step::Refused(status),
         };

@@ -1,6 +1,7 @@
 //! Recognizes the code of a line, and finds its words.
 
 use super::frame::{Frame, Sum, integer};
+use crate::card;
 use crate::config::Number;
 use crate::gcode::comment::Aside;
 use crate::machine::{self, Cycle};
@@ -29,7 +30,7 @@ pub fn code(block: &[u8]) -> Option<(u8, u16)> {
 /// Returns the M code of a line; `None` if the line has another code or a wrong checksum.
 fn whole(frame: &Frame, line: &[u8]) -> Option<u16> {
     match code(frame.block.of(line)) {
-        Some((b'M', number)) if frame.sum != Sum::Wrong => Some(number),
+        Some((b'M', number)) if matches!(frame.sum, Sum::None | Sum::Right) => Some(number),
         _ => None,
     }
 }
@@ -40,13 +41,15 @@ pub fn is_stop(frame: &Frame, line: &[u8]) -> bool {
     whole(frame, line) == Some(112)
 }
 
-/// Whether a line overtakes the lines that wait: now, because M24 does so at a program stop only.
+/// Whether a line overtakes the lines that wait: now, because M24 does so at a program stop only, and M25 while a file
+/// of the SD card prints.
 #[inline(never)]
 #[small]
 pub fn overtakes(frame: &Frame, line: &[u8]) -> bool {
     match whole(frame, line) {
         Some(108 | 112) => true,
         Some(24) => machine::cycle() == Cycle::Stopped,
+        Some(25) => card::prints(),
         Some(105 | 114) => frame.number.is_none(),
         _ => false,
     }
@@ -64,7 +67,51 @@ pub fn is_text(block: &[u8]) -> bool {
     matches!(code(block), Some((b'M', 117 | 118)))
 }
 
-/// Whether a block may move the machine: it has G0 to G3, or begins with the word of an axis.
+/// Whether the words of a line have more than its code carries out: another code, or the target of a move.
+#[inline(never)]
+#[small]
+pub fn says_more((letter, number): (u8, u16), block: &[u8]) -> bool {
+    let (is_text, takes_axes) = match (letter, number) {
+        // Names, texts, and a stop.
+        (b'$', _) | (b'M', 23 | 30 | 32 | 112 | 117 | 118) => return false,
+        (b'M', 0 | 1 | 25 | 226 | 600 | 601) => (true, true),
+        (b'G', 10) => (false, has(block, b'P') || has(block, b'L')),
+        (b'G', number) => (false, !matches!(number, 4 | 11)),
+        (_, 17 | 18 | 84 | 92 | 201..=208 | 420) => (false, true),
+        _ => (false, false),
+    };
+    let mut bytes = Bytes::of(words(block));
+    let mut before = b' ';
+    while let Some(byte) = bytes.next() {
+        let letter = byte.to_ascii_uppercase();
+        let code = integer(split_digits(bytes.rest).0);
+        let more = match letter {
+            _ if before.is_ascii_alphabetic() => false,
+            // A text for people may have the name of a screw.
+            b'G' if is_text => matches!(code, Some(0..=3)),
+            b'G' | b'M' => code.is_some() && !is_text,
+            b'X'..=b'Z' => !takes_axes,
+            _ => false,
+        };
+        if more {
+            return true;
+        }
+        before = letter;
+    }
+    false
+}
+
+/// Whether one of the numbers that the codes of [`host`](super::host) read cannot be read.
+#[inline(never)]
+#[small]
+pub fn has_bad_number(code: (u8, u16), block: &[u8]) -> bool {
+    let reads = matches!(code, (b'M', 26 | 92..=114 | 130..));
+    let decimals = if code.1 == 26 { 0 } else { 4 };
+    let is_bad = |letter| has(block, letter) && value(block, letter, decimals).is_none();
+    reads && b"SPFCU".iter().any(|letter| is_bad(*letter))
+}
+
+/// Whether a block may move the machine or its origin: it has G0 to G3 or G92, or begins with the word of an axis.
 #[inline(never)]
 #[small]
 pub fn may_move(block: &[u8]) -> bool {
@@ -78,7 +125,7 @@ pub fn may_move(block: &[u8]) -> bool {
         let letter = byte.to_ascii_uppercase();
         let code = integer(split_digits(bytes.rest).0);
         let moves = match letter {
-            b'G' => !before.is_ascii_alphabetic() && matches!(code, Some(0..=3)),
+            b'G' => !before.is_ascii_alphabetic() && matches!(code, Some(0..=3 | 92)),
             b'X'..=b'Z' => is_first,
             // Words of other languages begin with E, too.
             b'E' => is_first && !bytes.rest.first().is_some_and(u8::is_ascii_alphabetic),
@@ -134,6 +181,12 @@ pub struct Bytes<'a> {
 impl<'a> Bytes<'a> {
     pub fn of(text: &'a [u8]) -> Self {
         Self { rest: text, aside: Aside::NONE }
+    }
+
+    /// Whether no number comes next, but another word or the end.
+    pub fn is_bare(&self) -> bool {
+        let next = self.rest.trim_ascii_start().first();
+        next.is_none_or(|next| *next == b';' || next.is_ascii_alphabetic())
     }
 
     /// Takes the number that comes next; `None` if there is none.
@@ -220,6 +273,44 @@ mod tests {
         assert_eq!(value(b"M207 S-1.5", b'S', 4), Some(-15_000));
         assert_eq!(value(b"M207 S", b'S', 4), None);
         assert_eq!(words(b"M117 Hello  world "), b"Hello  world");
+    }
+
+    #[test]
+    fn what_says_more_than_its_code() {
+        let more = |line: &str| says_more(code(line.as_bytes()).unwrap(), line.as_bytes());
+        for line in [
+            "M400 G1 X5",
+            "M105 M104 S50",
+            "m27g1",
+            "M400 X5",
+            "T0 G1",
+            "G28 X0 G1",
+            "M0 then G1 X5",
+            "M2 y1",
+            "G4 P1 X1",
+            "G10 Z1",
+            "M84 X M104",
+        ] {
+            assert!(more(line), "{line}");
+        }
+        for line in [
+            "M400",
+            "M117 G1 X5",
+            "M23 G1.GCO",
+            "$xvm=5",
+            "M0 Use M3, G54 and X",
+            "M600 X5",
+            "M84 X E",
+            "M92 X1",
+            "M105 ; G1",
+            "M112 G1",
+            "M105 (G1 X1)",
+            "G28 X0",
+            "M105 T0",
+            "M115 U3.13 MG1",
+        ] {
+            assert!(!more(line), "{line}");
+        }
     }
 
     #[test]

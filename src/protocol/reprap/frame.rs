@@ -4,8 +4,11 @@
 //! in every line of a port that has received numbers and checksums. In other lines an asterisk is plain text. A port
 //! that has received numbers and checksums treats a line with only one of the two as damaged, because a transmission
 //! error may have changed the other. A line is also damaged if its number cannot be read, or if it has a byte 0,
-//! which does not change the checksum. A second asterisk in a numbered line is a lost line end: the checksums of several
-//! lines may match together. Only texts and comments may have one, if no line number is behind it.
+//! which does not change the checksum. A second asterisk in a numbered line may be a lost line end: the checksums of several
+//! lines may match together. In texts and comments it is one if a line number is behind it. Such a line is asked for
+//! again, but not for ever, because a text may look like that: after [`DOUBTS`] times it is taken as it is.
+//!
+//! In a file on the SD card numbers are ignored, and only a checksum of a line with a number is checked.
 
 use super::command::{self, Bytes, split_digits};
 use crate::gcode::comment::skip_mark;
@@ -22,7 +25,16 @@ pub struct Session {
     pub sums: bool,
     /// The number of lines begun, modulo 256.
     pub lines: u8,
+    /// How many times in a row the next line was asked for again, because it may be several lines.
+    doubts: u8,
+    /// Whether it was too long. Two kinds of doubts about a line are not added up: one of them may be a lost line end.
+    cut: bool,
+    /// Whether the lines are those of a file on the SD card.
+    pub in_file: bool,
 }
+
+/// How many times a line is asked for again that has the right checksum, but looks like several lines.
+const DOUBTS: u8 = 4;
 
 /// A tenth of the highest line number.
 const MOST: i32 = 99_999_999;
@@ -34,6 +46,10 @@ pub enum Sum {
     None,
     /// The checksum matches.
     Right,
+    /// The checksum matches, but the line may be several lines without their ends.
+    Doubtful,
+    /// The line is too long, so that its checksum has not been kept, and may be several lines.
+    Cut,
     /// The checksum does not match.
     Wrong,
 }
@@ -103,8 +119,8 @@ impl Frame {
         // A mark at the beginning of the file: some hosts number its first line like any other.
         let rest = skip_mark(rest.trim_ascii()).trim_ascii();
         let mut words = Bytes::of(if command::is_text(rest) { &[] } else { rest });
-        if numbered && (words.any(|byte| byte == b'*') || is_joined(text)) {
-            sum = Sum::Wrong;
+        if sum == Sum::Right && numbered && (words.any(|byte| byte == b'*') || is_joined(text)) {
+            sum = Sum::Doubtful;
         }
         let start = rest.as_ptr().addr().wrapping_sub(line.as_ptr().addr());
         let end = start.wrapping_add(rest.len());
@@ -147,27 +163,53 @@ pub fn integer(digits: &[u8]) -> Option<i32> {
 
 #[small]
 impl Session {
+    /// Returns the session of a line of a file on the SD card.
+    pub fn in_file() -> Self {
+        Self { in_file: true, ..Self::default() }
+    }
+
     /// Takes a line, or returns why it has to be sent again. `sets`: the number to continue from, by M110.
     /// `overtakes`: whether the line has come before lines that wait.
     #[inline(never)]
     pub fn take(&mut self, frame: &Frame, sets: Option<i32>, overtakes: bool) -> Result<(), Fault> {
         self.lines = self.lines.wrapping_add(1);
+        if self.in_file {
+            let wrong = frame.numbered && frame.sum == Sum::Wrong;
+            return if wrong { Err(Fault::Sum) } else { Ok(()) };
+        }
         let counts = frame.numbered || self.sums;
-        if counts && frame.sum == Sum::Wrong {
+        if counts && self.is_damaged(frame) {
             return Err(Fault::Sum);
         }
         if frame.number.is_some() && frame.sum == Sum::None && self.sums {
             return Err(Fault::NoSum);
         }
         if let Some(set) = sets {
-            (self.last, self.ahead) = (set, 0);
+            (self.last, self.ahead, self.doubts) = (set, 0, 0);
         } else if let Some(number) = frame.number {
             self.count(number, overtakes)?;
-        } else if frame.numbered || (counts && frame.sum == Sum::Right) {
+        } else if frame.numbered || (counts && frame.sum != Sum::None) {
             return Err(Fault::Number);
         }
-        self.sums |= frame.number.is_some() && frame.sum == Sum::Right;
+        self.sums |= frame.number.is_some() && frame.sum != Sum::None;
         Ok(())
+    }
+
+    /// Whether the checksum says that a line is damaged. Doubts about the next line are counted.
+    fn is_damaged(&mut self, frame: &Frame) -> bool {
+        if !matches!(frame.sum, Sum::Doubtful | Sum::Cut) {
+            return frame.sum == Sum::Wrong;
+        }
+        let cut = frame.sum == Sum::Cut;
+        if frame.number != Some(self.last.wrapping_add(1)) {
+            return true;
+        }
+        if self.cut != cut {
+            (self.cut, self.doubts) = (cut, 0);
+        }
+        let is_damaged = self.doubts < DOUBTS;
+        self.doubts += u8::from(is_damaged);
+        is_damaged
     }
 
     /// Counts the number of a line. A line that `overtakes` may have a later number than the next one.
@@ -181,6 +223,7 @@ impl Session {
             return Err(Fault::Number);
         }
         self.ahead |= bit;
+        self.doubts = 0;
         while self.ahead & 1 != 0 {
             self.last = self.last.wrapping_add(1);
             self.ahead >>= 1;
@@ -235,7 +278,7 @@ pub fn fast_path(line: &[u8], session: &mut Session) -> Option<Span> {
     if stated.is_empty() || says != u16::from(sum) || !ends || !is_next || session.ahead != 0 {
         return None;
     }
-    session.last = number as i32;
+    (session.last, session.doubts) = (number as i32, 0);
     session.sums = true;
     session.lines = session.lines.wrapping_add(1);
     Some(Span { start, end: end as u8 })
@@ -246,7 +289,7 @@ pub fn fast_path(line: &[u8], session: &mut Session) -> Option<Span> {
 #[small]
 pub fn is_own(line: &[u8]) -> bool {
     let frame = Frame::of(line);
-    if frame.sum == Sum::Wrong {
+    if !matches!(frame.sum, Sum::None | Sum::Right) {
         return false;
     }
     (frame.number.is_some() && frame.sum == Sum::Right)
@@ -281,11 +324,12 @@ mod tests {
         assert_eq!(parts("N1.5 M105"), (None, Sum::None, "N1.5 M105"));
         assert_eq!(parts("N2 G28\0*17").1, Sum::Wrong);
         // Three lines without their ends have the checksum of one.
-        assert_eq!(parts("N2 G28*17N2 G28*17N2 G28*17").1, Sum::Wrong);
+        assert_eq!(parts("N2 G28*17N2 G28*17N2 G28*17").1, Sum::Doubtful);
+        assert_eq!(parts("N2 G28*17N2 G28*17N2 G28*18").1, Sum::Wrong);
         assert_eq!(parts("N2 G28 (2*3) ;2*3*43"), (Some(2), Sum::Right, "G28 (2*3) ;2*3"));
         // By chance the second line with its checksum does not change that of the first.
         for joined in ["N2 G28 ;*43N3 G1*12", "N2 M117 *43?N3 G1*63"] {
-            assert_eq!(parts(joined).1, Sum::Wrong);
+            assert_eq!(parts(joined).1, Sum::Doubtful);
         }
         assert_eq!(parts("N2 M117 2*3*45"), (Some(2), Sum::Right, "M117 2*3"));
     }
@@ -310,6 +354,35 @@ mod tests {
         assert_eq!(session.take(&frame(2, Sum::Right), None, false), Ok(()));
         assert_eq!(session.take(&frame(3, Sum::Right), None, false), Err(Fault::Number));
         assert_eq!(session.take(&frame(4, Sum::Right), None, false), Ok(()));
+    }
+
+    #[test]
+    fn doubts_end() {
+        let mut session = Session::default();
+        let of = |number, sum| Frame {
+            number: Some(number),
+            numbered: true,
+            sum,
+            block: Span::default(),
+        };
+        let doubtful = |number| of(number, Sum::Doubtful);
+        for _ in 0..2 {
+            for _ in 0..DOUBTS {
+                let next = session.last + 1;
+                assert_eq!(session.take(&doubtful(next + 1), None, false), Err(Fault::Sum));
+                assert_eq!(session.take(&doubtful(next), None, false), Err(Fault::Sum));
+            }
+            let next = session.last + 1;
+            assert_eq!(session.take(&doubtful(next + 1), None, false), Err(Fault::Sum));
+            let mut cut = session;
+            assert_eq!(session.take(&doubtful(next), None, false), Ok(()));
+            assert_eq!(session.last, next);
+            // Lost line ends may make a line too long that was doubted before.
+            for _ in 0..DOUBTS {
+                assert_eq!(cut.take(&of(next, Sum::Cut), None, false), Err(Fault::Sum));
+            }
+            assert_eq!(cut.take(&of(next, Sum::Cut), None, false), Ok(()));
+        }
     }
 
     #[test]
@@ -373,7 +446,7 @@ mod tests {
         ];
         lines.extend(others.map(std::string::String::from));
         for (ahead, sums) in [(0, false), (0, true), (4, true)] {
-            let before = Session { last: 6, ahead, sums, lines: 255 };
+            let before = Session { last: 6, ahead, sums, lines: 255, ..Session::default() };
             let mut usual_ones = 0;
             for line in &lines {
                 let (mut fast, mut slow) = (before, before);

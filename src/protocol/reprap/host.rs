@@ -2,7 +2,7 @@
 
 use super::command::{has, value, words};
 use super::write::{cold, fixed, int, line_end, text};
-use super::{bed, card, names, report, settings, tuning};
+use super::{bed, card, names, report, settings, status, tuning};
 use crate::capability::Capability;
 use crate::config::Fixed;
 use crate::gcode::overrides::{Change, Override};
@@ -31,6 +31,8 @@ pub enum Step {
     Gcode,
     /// The code is refused.
     Refused(Status),
+    /// The code has failed. That is told besides, so here only if it has not been told yet.
+    Failed(Status),
 }
 
 /// The most bytes of a text that a step writes.
@@ -104,18 +106,20 @@ pub fn part(
         }
         112 => {
             machine.alarm(Alarm::Shutdown);
-            Step::Refused(Status::ShutDown)
+            Step::Failed(Status::ShutDown)
         }
         114 => listed(report::position(at, machine, out)),
         115 => listed(report::identity(at, out)),
         118 => echo(at, block, out),
         119 => listed(report::switches(at, machine, out)),
         130..=132 => tuning::set_teacup(number, at, block, machine, out),
-        155 => {
-            let seconds = value(block, b'S', 0).unwrap_or(0).clamp(0, 60);
-            machine.memory().reprap.interval_s = seconds as u8;
-            Step::Done
-        }
+        155 => match u32::try_from(value(block, b'S', 0).unwrap_or(0)) {
+            Ok(seconds) => {
+                machine.memory().reprap.interval_s = seconds.min(60) as u8;
+                Step::Done
+            }
+            Err(_) => Step::Refused(Status::OutOfRange),
+        },
         207 => set_retraction(block, machine),
         208 => {
             if let Some(length) = value(block, b'S', 4) {
@@ -256,7 +260,10 @@ fn home(at: u8, number: u16, block: &[u8], machine: &mut impl Machine) -> Step {
             return Step::Refused(Status::HomingSwitches);
         }
         return match machine.home(axes, false) {
-            Status::Ok => Step::Later(HOMES),
+            Status::Ok => {
+                status::forget(Status::HomingFailed, machine);
+                Step::Later(HOMES)
+            }
             status => Step::Refused(status),
         };
     }
@@ -266,7 +273,7 @@ fn home(at: u8, number: u16, block: &[u8], machine: &mut impl Machine) -> Step {
         homed |= u8::from(machine.value(Value::Homed(axis)) != 0) << axis;
     }
     machine.clear_shift(homed);
-    if homed == 0 { Step::Refused(Status::HomingFailed) } else { Step::Done }
+    if homed == 0 { Step::Failed(Status::HomingFailed) } else { Step::Done }
 }
 
 /// M84, M18: turns off the named motors, or all, once the machine rests. With S nothing is turned off: S is the time

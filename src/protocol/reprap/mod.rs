@@ -21,7 +21,7 @@
 //! | [`write`](mod@write) | numbers and texts |
 //!
 //! A line is answered in order, when the planner has taken its motion. M105 and M114 overtake if they have no line
-//! number; M108 and M112 always overtake, and M24 at a program stop. A damaged line is never carried out: the sender is asked to send it again.
+//! number; M108 and M112 always overtake, M24 at a program stop, and M25 during a print from the SD card. A damaged line is never carried out: the sender is asked to send it again.
 //! A step costs at most 15,000 cycles, or 3 ms with a setting that is in EEPROM. No buffer here can overflow. A plain
 //! move takes none of these steps: [`frame::fast_path`] checks its number and checksum, and the interpreter reads it
 //! untranslated.
@@ -70,11 +70,14 @@ pub struct Retraction {
     retracted: bool,
     /// M155 S: seconds from one report of temperatures to the next; 0 for none.
     interval_s: u8,
+    /// Failures that a line is answered with and that are told besides, as bits: one of the two messages has been
+    /// sent ([`status::is_second`]).
+    told: u8,
 }
 
 impl Remembers for Retraction {
     fn new() -> Self {
-        Self { length: 20_000, extra: 0, feed: 2_100, retracted: false, interval_s: 0 }
+        Self { length: 20_000, extra: 0, feed: 2_100, retracted: false, interval_s: 0, told: 0 }
     }
 
     fn restore(&mut self) {
@@ -95,6 +98,10 @@ impl Dialect for RepRap {
 
     fn speech(_settings: &Settings) -> Session {
         Session::default()
+    }
+
+    fn in_file(_settings: &Settings) -> Session {
+        Session::in_file()
     }
 
     fn is_chosen(settings: &Settings, port: u8) -> bool {

@@ -7,7 +7,8 @@
 use super::command;
 use super::frame::{Fault, Frame, Session, Sum};
 use super::host::{self, Code, Step};
-use super::status::{is_passed_over, is_unknown, reason};
+use super::status::{is_passed_over, is_second, is_unknown, reason};
+use super::translate;
 use super::write::{cold, int, line_end, text};
 use crate::progmem::Text;
 use crate::protocol::{Answers, Extruder, Machine, Next, Out, Span};
@@ -49,6 +50,10 @@ const PART: usize = 40;
 const WAITS: u8 = 1;
 /// M400.
 const FINISHED: Code = (b'M', 400);
+/// M105.
+const TEMPERATURES: Code = (b'M', 105);
+/// M118.
+const TEXT: Code = (b'M', 118);
 
 impl Request {
     /// Starts to answer a line.
@@ -61,32 +66,60 @@ impl Request {
         let what = match take(&frame, code, line, session) {
             Err(fault) => What::Resend(fault, session.last),
             Ok(()) if block.is_empty() => What::Nothing,
-            Ok(()) => host::of(code, block).map_or(What::Gcode, What::Host),
+            Ok(()) => of(code, block),
         };
-        let at = u8::from(matches!(what, What::Gcode) && command::waits(code));
-        Self { what, at, block: frame.text(line), begun: false, silent: false }
+        let silent = session.in_file;
+        let at = match what {
+            What::Gcode => command::waits(code).into(),
+            // Behind the `ok`.
+            What::Host(TEMPERATURES) => silent.into(),
+            _ => 0,
+        };
+        Self { what, at, block: frame.text(line), begun: false, silent }
     }
 
     /// Starts to answer a line that could not be kept, or was dropped.
     #[small]
     pub(super) fn refused(status: Status, line: &[u8], session: &mut Session) -> Self {
         let mut frame = Frame::of(line);
+        let is_long = frame.number.is_some();
         let taken = match status {
-            Status::InputTooLong if frame.number.is_some() => {
-                // The end of the line, with the checksum, has not been kept.
-                frame.sum = if session.sums { Sum::Right } else { Sum::None };
-                session.take(&frame, None, false)
+            // The end of the line, with the checksum, has not been kept.
+            Status::InputTooLong | Status::BufferFull if is_long => {
+                frame.sum = match session.sums {
+                    // The line looks like several.
+                    _ if status == Status::BufferFull => Sum::Cut,
+                    true => Sum::Right,
+                    false => Sum::None,
+                };
+                session.take(&frame, None, false).map(|()| Status::InputTooLong)
             }
             Status::InputTooLong | Status::BufferFull if session.sums => Err(Fault::Sum),
-            Status::InputTooLong | Status::BufferFull => Ok(()),
-            _ => take(&frame, command::code(frame.block.of(line)), line, session),
+            Status::InputTooLong | Status::BufferFull => Ok(status),
+            _ => take(&frame, command::code(frame.block.of(line)), line, session).map(|()| status),
         };
         let what = match taken {
             Err(fault) => What::Resend(fault, session.last),
-            Ok(()) => What::Refused(status),
+            Ok(status) => What::Refused(status),
         };
         Self { what, at: 0, block: frame.block, begun: false, silent: false }
     }
+}
+
+/// Returns how a line is carried out.
+#[small]
+fn of(code: Option<Code>, block: &[u8]) -> What {
+    let own = host::of(code, block);
+    match own.or(code.filter(|code| translate::leaves_out(*code))) {
+        Some(code) if command::says_more(code, block) => What::Refused(Status::AxisConflict),
+        Some(code) if command::has_bad_number(code, block) => What::Refused(Status::OutOfRange),
+        _ => own.map_or(What::Gcode, What::Host),
+    }
+}
+
+/// Whether the text of an M118 may not begin like an answer: it gets `echo:` then.
+fn is_plain_text(block: &[u8]) -> bool {
+    !matches!(command::words(block).first(), Some(b'/' | b'A' | b'E'))
 }
 
 /// Checks the line's number and checksum, and counts the line.
@@ -99,7 +132,8 @@ fn take(
 ) -> Result<(), Fault> {
     let block = frame.block.of(line);
     let sets = match code {
-        Some((b'M', 110)) => command::value(block, b'N', 0).or(frame.number),
+        Some((b'M', 110)) if command::has(block, b'N') => command::value(block, b'N', 0),
+        Some((b'M', 110)) => frame.number,
         _ => None,
     };
     session.take(frame, sets, command::overtakes(frame, line))
@@ -140,6 +174,10 @@ impl Answers for Request {
                 }
                 return Next::Done(Status::Ok);
             }
+            What::Host(TEXT) if self.silent && !self.begun && is_plain_text(block) => {
+                text(out, text!("echo:"));
+                self.begun = true;
+            }
             What::Host(code) => match host::part(code, self.at, block, machine, out) {
                 Step::At(at) => (self.at, self.begun) = (at, true),
                 Step::Later(at) => {
@@ -150,6 +188,10 @@ impl Answers for Request {
                 Step::Gcode => (self.what, self.at) = (What::Gcode, 0),
                 Step::Answered => return Next::Done(Status::Ok),
                 Step::Refused(status) => (self.what, self.at) = (What::Refused(status), 0),
+                Step::Failed(status) if machine.is_told() && is_second(status, machine) => {
+                    self.what = What::Nothing;
+                }
+                Step::Failed(status) => (self.what, self.at) = (What::Refused(status), 0),
             },
             What::Resend(fault, last) => {
                 self.begun = true;
@@ -175,10 +217,6 @@ impl Answers for Request {
         self.begun
     }
 
-    fn silence(&mut self) {
-        self.silent = true;
-    }
-
     #[inline(never)]
     #[small]
     fn awaits_rest(&self, line: &[u8]) -> bool {
@@ -191,7 +229,7 @@ impl Answers for Request {
 
 #[small]
 impl Request {
-    /// Writes `Error:checksum mismatch, Last Line: 3`, then `Resend: 4`.
+    /// Writes `Error:checksum mismatch, Last Line: 3`, then `Resend: 4`. A line of a file does not come again.
     fn resend(&mut self, fault: Fault, last: i32, out: &mut impl Out) {
         if self.at == 0 {
             self.at = 1;
@@ -201,8 +239,12 @@ impl Request {
                 Fault::Number => text!("Error:wrong line number"),
             };
             text(out, why);
-            text(out, text!(", Last Line: "));
-            int(out, last);
+            if self.silent {
+                self.what = What::Nothing;
+            } else {
+                text(out, text!(", Last Line: "));
+                int(out, last);
+            }
         } else {
             text(out, text!("Resend: "));
             int(out, last.wrapping_add(1));

@@ -1,11 +1,52 @@
 //! Texts for people: why a line was refused.
 
 use super::command;
+use crate::machine::Doing;
 use crate::progmem::Text;
+use crate::protocol::Machine;
 use crate::status::Status;
 use crate::text;
 
-/// Whether the status means that a block is unknown. A move that cannot be read is not: it is an error.
+/// The bits of failures that a line is answered with and that are told besides: M112, and G28.
+const STOPPED: u8 = 1;
+const NOT_HOMED: u8 = 2;
+
+/// Returns the bit of a failure, if it is told twice.
+#[small]
+fn bit(status: Status) -> u8 {
+    match status {
+        Status::ShutDown => STOPPED,
+        _ if status.names_axis() => NOT_HOMED,
+        _ => 0,
+    }
+}
+
+/// Whether a failure has been told already, by the answer of its line or by a notice, which come in any order. Called
+/// when one of the two is to be sent.
+#[inline(never)]
+#[small]
+pub fn is_second(status: Status, machine: &mut impl Machine) -> bool {
+    let (bit, told) = (bit(status), &mut machine.memory().reprap.told);
+    *told ^= bit;
+    bit != 0 && *told & bit == 0
+}
+
+/// Notes that a failure has not been told.
+#[small]
+pub fn forget(status: Status, machine: &mut impl Machine) {
+    machine.memory().reprap.told &= !bit(status);
+}
+
+/// Forgets that a stop has been told, once its alarm has ended.
+#[small]
+pub fn see_alarm_end(machine: &mut impl Machine) {
+    if !matches!(machine.doing(), Doing::Alarm(_)) {
+        forget(Status::ShutDown, machine);
+    }
+}
+
+/// Whether the status means that a block is unknown. A move that cannot be read is not: it is an error. Nor is the
+/// value of a setting.
 #[small]
 pub fn is_unknown(status: Status, block: &[u8]) -> bool {
     let unknown = matches!(
@@ -17,7 +58,8 @@ pub fn is_unknown(status: Status, block: &[u8]) -> bool {
             | Status::NotBuiltIn
             | Status::UnrecognizedName
     );
-    unknown && !command::may_move(block)
+    let is_value = status == Status::BadNumber && block.first() == Some(&b'$');
+    unknown && !is_value && !command::may_move(block)
 }
 
 /// Whether a print continues after the refusal of this line: the line is no move, no heater stays cold because of it,
@@ -32,7 +74,8 @@ pub fn is_passed_over(status: Status, block: &[u8]) -> bool {
         _ => block.is_empty() || command::may_move(block),
     };
     let of_words = Status::CardError as u8..=Status::WordConflict as u8;
-    !moves && of_words.contains(&(status as u8)) && status != Status::AboveMaximum
+    let stops = matches!(status, Status::AboveMaximum | Status::AxisConflict);
+    !moves && of_words.contains(&(status as u8)) && !stops
 }
 
 /// Returns the reason as text.
@@ -45,10 +88,22 @@ pub fn reason(status: Status) -> Text {
         Status::LimitHit => text!("limit switch hit; M999 goes on"),
         Status::Panicked => text!("internal fault; reset"),
         Status::SoftLimit => text!("beyond a soft limit, not carried out"),
-        Status::OutOfRange | Status::BelowMinimum | Status::AboveMaximum => {
+        Status::OutOfRange
+        | Status::BelowMinimum
+        | Status::AboveMaximum
+        | Status::SWordInvalid
+        | Status::PWordInvalid
+        | Status::PWordNegative
+        | Status::KWordInvalid
+        | Status::HWordInvalid
+        | Status::LWordInvalid
+        | Status::QWordInvalid
+        | Status::RWordInvalid => {
             text!("number out of range, not carried out")
         }
-        Status::MalformedCommand | Status::BadNumber => text!("malformed, not carried out"),
+        Status::MalformedCommand | Status::BadNumber | Status::GcodeGeneric => {
+            text!("malformed, not carried out")
+        }
         Status::HomingSwitches => text!("no homing switch"),
         Status::HomingFailed | Status::HomingClosed => text!("homing failed"),
         Status::NotAccepted => text!("not possible now"),
@@ -56,7 +111,12 @@ pub fn reason(status: Status) -> Text {
         Status::InputTooLong => text!("line too long"),
         Status::BufferFull => text!("bytes were lost"),
         Status::Muted => text!("another port prints"),
-        Status::WordUnused | Status::AxisNotAllowed => text!("a word belongs to no code"),
+        Status::WordUnused
+        | Status::WordRepeated
+        | Status::WordConflict
+        | Status::AxisNotAllowed
+        | Status::AxisInvalid
+        | Status::AxisDisabled => text!("a word belongs to no code"),
         Status::ToolInvalid | Status::TWordInvalid => text!("no such extruder"),
         Status::SensorOpen => text!("temperature sensor open"),
         Status::SensorShort => text!("temperature sensor shorted"),
@@ -66,7 +126,38 @@ pub fn reason(status: Status) -> Text {
         Status::TooCold => text!("too cold to extrude"),
         Status::HeatersLocked => text!("heaters are locked; M999 unlocks them"),
         Status::CardError => text!("SD card cannot be read"),
-        Status::ProbeFailed => text!("probing failed"),
+        Status::ProbeFailed | Status::ProbeTooShort => text!("probing failed"),
+        Status::AxisConflict | Status::ModalGroupViolation => {
+            text!("more than one code in the line")
+        }
+        Status::GcodeUnsupported | Status::McodeUnsupported | Status::NotBuiltIn => {
+            text!("unknown code")
+        }
+        Status::AxisWordMissing
+        | Status::AxisTargetMissing
+        | Status::FeedrateMissing
+        | Status::SWordMissing
+        | Status::ArcAxisMissing
+        | Status::ArcOffsetsMissing
+        | Status::PWordMissing
+        | Status::KWordMissing
+        | Status::HWordMissing
+        | Status::LWordMissing
+        | Status::QWordMissing
+        | Status::RWordMissing
+        | Status::TWordMissing => text!("a word is missing"),
+        Status::ArcSpecification | Status::ArcRadiusTolerance | Status::ArcEndpointIsStart => {
+            text!("impossible arc")
+        }
+        Status::MachineCoordinatesMotion
+        | Status::InverseTimeNotAllowed
+        | Status::RotaryNotAllowed
+        | Status::PlaneMissing
+        | Status::CutterCompensation => text!("not possible in this mode"),
+        Status::NoEncoder => text!("no spindle encoder"),
+        Status::SpindleMustTurn => text!("spindle must turn"),
+        Status::NotHomed => text!("not homed"),
+        Status::PersistenceError => text!("memory is full"),
         _ => text!("not carried out"),
     }
 }

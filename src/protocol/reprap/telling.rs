@@ -1,6 +1,6 @@
 //! Sends a notice: the greeting, exceptions, temperatures, and that a line takes long.
 
-use super::status::reason;
+use super::status::{is_second, reason, see_alarm_end};
 use super::write::{line_end, text};
 use super::{report, tuning};
 use crate::capability::Capability;
@@ -34,11 +34,15 @@ impl Telling {
                 machine.memory().reprap.retracted = false;
                 Self::Greeting
             }
+            Notice::Exception(status) if is_second(status, machine) => Self::Nothing,
             Notice::Exception(status) => Self::Exception(status),
             Notice::Busy => Self::Busy,
             Notice::Temperatures => Self::Temperatures(0),
             Notice::Tuning => Self::Tuning(0),
-            _ => Self::Nothing,
+            _ => {
+                see_alarm_end(machine);
+                Self::Nothing
+            }
         }
     }
 }

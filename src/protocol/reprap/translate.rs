@@ -6,6 +6,7 @@
 //! | G0 | G1: at F, as other printer firmware does |
 //! | G4 P in ms, S in s | G4 P in s |
 //! | G92 without words | G92 of X, Y, Z and E |
+//! | G92 X | G92 X0 |
 //! | M0, M1, with a text or without | M0; with P or S G4 |
 //! | M25, M226, M600, M601 | M0 |
 //! | G10 P0 S | M104 S |
@@ -25,16 +26,18 @@ use crate::status::Status;
 pub fn block<'a>(block: &[u8], out: &'a mut Rewritten) -> Result<&'a [u8], Status> {
     out.clear();
     match command::code(block) {
+        Some((b'G', 4)) if !are_times(block) => return Err(Status::OutOfRange),
         Some((b'G', 4)) => dwell(block, out)?,
         Some((b'M', 0 | 1)) if has_time(block) => dwell(block, out)?,
         Some((b'M', 0 | 1 | 25 | 226 | 600 | 601)) => put(out, b"M0")?,
         // M30 with a file name never comes here: `host` handles it.
         Some((b'M', 2 | 30)) => put(out, b"M2")?,
         Some((b'G', 92)) if !has_words(block) => put(out, b"G92X0Y0Z0A0")?,
+        Some((b'G', 92)) => copy(block, b"", true, out)?,
         Some((b'G', 0)) => words(b"G1 ", block, b"", out)?,
         Some((b'G', 2 | 3)) if is_point(block) => words(b"G1 ", block, b"IJKP", out)?,
         Some((b'G', 10)) => temperature(block, out)?,
-        _ => copy(block, b"", out)?,
+        _ => copy(block, b"", false, out)?,
     }
     Ok(out)
 }
@@ -44,7 +47,7 @@ pub fn block<'a>(block: &[u8], out: &'a mut Rewritten) -> Result<&'a [u8], Statu
 #[small]
 fn words(code: &[u8], block: &[u8], without: &[u8], out: &mut Rewritten) -> Result<(), Status> {
     put(out, code)?;
-    copy(command::words(block), without, out)
+    copy(command::words(block), without, false, out)
 }
 
 /// Whether the centre of an arc is its start.
@@ -69,8 +72,24 @@ fn temperature(block: &[u8], out: &mut Rewritten) -> Result<(), Status> {
     }
 }
 
+/// Whether words of a code are left out here, so that it is to have no others than its own.
+pub fn leaves_out(code: (u8, u16)) -> bool {
+    matches!(code, (b'G', 4 | 10) | (b'M', 0 | 1 | 2 | 226 | 600 | 601))
+}
+
+/// Whether M0 is a pause of some time. If the time is none, it waits for the user.
 fn has_time(block: &[u8]) -> bool {
-    time_ms(block).is_some()
+    time_ms(block).is_some_and(|ms| ms >= 0)
+}
+
+/// Whether the words S and P of G4 are times.
+#[small]
+fn are_times(block: &[u8]) -> bool {
+    let is_time = |letter, decimals| {
+        !command::has(block, letter)
+            || command::value(block, letter, decimals).is_some_and(|time| time >= 0)
+    };
+    is_time(b'S', 3) && is_time(b'P', 0)
 }
 
 /// Returns the time of a dwell in ms: S is in s, P in ms. `None` without either.
@@ -87,12 +106,7 @@ fn has_words(block: &[u8]) -> bool {
 #[inline(never)]
 #[small]
 fn dwell(block: &[u8], out: &mut Rewritten) -> Result<(), Status> {
-    let ms = match time_ms(block) {
-        None if command::has(block, b'S') || command::has(block, b'P') => {
-            return Err(Status::OutOfRange);
-        }
-        ms => ms.unwrap_or(0).max(0),
-    };
+    let ms = time_ms(block).unwrap_or(0);
     put(out, b"G4P")?;
     let (mut rest, mut divisor) = (ms as u32, 1_000_000_000u32);
     while divisor > 0 {
@@ -110,10 +124,11 @@ fn put(out: &mut Rewritten, text: &[u8]) -> Result<(), Status> {
     out.extend_from_slice(text).map_err(|_| Status::InputTooLong)
 }
 
-/// Copies words, but for the text of comments, F0, and the words `without` which it goes. Cost on AVR: 70 cycles a byte.
+/// Copies words, but for the text of comments, F0, and the words `without` which it goes. With `bare` an axis without a
+/// number has 0. Cost on AVR: 70 cycles a byte.
 #[inline(never)]
 #[small]
-fn copy(text: &[u8], without: &[u8], out: &mut Rewritten) -> Result<(), Status> {
+fn copy(text: &[u8], without: &[u8], bare: bool, out: &mut Rewritten) -> Result<(), Status> {
     let mut bytes = command::Bytes::of(text);
     while let Some(byte) = bytes.next() {
         let letter = byte.to_ascii_uppercase();
@@ -125,7 +140,10 @@ fn copy(text: &[u8], without: &[u8], out: &mut Rewritten) -> Result<(), Status> 
             continue;
         }
         let byte = if matches!(byte, b'E' | b'e') { b'A' } else { byte };
-        out.push(byte).map_err(|_| Status::InputTooLong)?;
+        put(out, &[byte])?;
+        if bare && matches!(letter, b'X'..=b'Z' | b'E') && bytes.is_bare() {
+            put(out, b"0")?;
+        }
     }
     Ok(())
 }
@@ -140,6 +158,8 @@ mod tests {
             ("G1 X10 E2.5 F3000 ; outline", "G1 X10 A2.5 F3000 "),
             ("g0 x1 f9000", "G1 x1 f9000"),
             ("G92 E0", "G92 A0"),
+            ("G92 X", "G92 X0"),
+            ("G92 X5 yE ; Z", "G92 X5 y0A0 "),
             ("G92", "G92X0Y0Z0A0"),
             ("G4 P500", "G4P0000000.500"),
             ("G4 S2", "G4P0000002.000"),
@@ -150,6 +170,8 @@ mod tests {
             ("G4 (S 1) P500", "G4P0000000.500"),
             ("M0 Turn the part", "M0"),
             ("M1 S3", "G4P0000003.000"),
+            ("M1 S-3", "M0"),
+            ("G4 S2 P500", "G4P0000002.000"),
             ("G90", "G90"),
             ("X1 E1", "X1 A1"),
             ("G1 F0", "G1 "),
@@ -174,6 +196,9 @@ mod tests {
         }
         for (refused, status) in [
             ("G10 P1 S205", Status::ToolInvalid),
+            ("G4 P-1", Status::OutOfRange),
+            ("G4 S3000000 P500", Status::OutOfRange),
+            ("G4 S", Status::OutOfRange),
             ("G10 P S205", Status::ToolInvalid),
             ("G10 L2 P1 X0", Status::WordUnused),
             ("G10 P0 Z0.2", Status::WordUnused),

@@ -3,7 +3,7 @@
 use kerf_macros::small;
 
 use super::View;
-use crate::card::Op;
+use crate::card::{Op, prints};
 use crate::machine;
 use crate::status::Status;
 
@@ -13,7 +13,7 @@ use crate::status::Status;
 pub(super) fn card(view: &mut View<'_>, what: Op<'_>) -> Status {
     let mut card = view.links.card.borrow_mut();
     let disturbs = matches!(what, Op::Begin | Op::Release | Op::Open(_) | Op::Delete(_));
-    if disturbs && card.prints() {
+    if disturbs && prints() {
         return Status::NotAccepted;
     }
     match what {

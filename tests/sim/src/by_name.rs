@@ -46,15 +46,26 @@ fn hear(machine: &mut Machine, most_ms: u64, last: impl Fn(&str) -> bool) -> Res
     }
 }
 
-/// Sets what `{xvm:1200}` or `{x:{vm:1200,fr:1200}}` sets in TinyG's dialect.
-pub fn set(machine: &mut Machine, settings: &str) -> Result<()> {
-    let mut group = "";
-    for part in settings.split(['{', ',', '}']).filter(|part| !part.is_empty()) {
+/// Returns the lines by name for what TinyG's dialect has as `{xvm:1200}`, `{x:{vm:1200,fr:1200}}` or `{xvm:n}`:
+/// `$xvm=1200`, or `$xvm`. An error if a part is no pair.
+pub fn lines(settings: &str) -> Result<Vec<String>> {
+    let (mut group, mut lines) = ("", Vec::new());
+    for part in settings.trim().split(['{', ',', '}']).filter(|part| !part.is_empty()) {
         let (name, value) = part.split_once(':').with_context(|| format!("no pair: {part}"))?;
+        let name = name.trim_matches('"');
         match value {
             "" => group = name,
-            _ => ask(machine, &format!("${group}{name}={value}")).map(drop)?,
+            "n" | "null" => lines.push(format!("${group}{name}")),
+            _ => lines.push(format!("${group}{name}={value}")),
         }
+    }
+    Ok(lines)
+}
+
+/// Sets what [`lines`] translates.
+pub fn set(machine: &mut Machine, settings: &str) -> Result<()> {
+    for line in lines(settings)? {
+        ask(machine, &line)?;
     }
     Ok(())
 }

@@ -2,6 +2,7 @@
 
 use serde_json::{Map, Number, Value};
 
+use crate::by_name;
 use crate::protocol::{Incoming, Response};
 
 /// The dialect that a sender speaks.
@@ -31,13 +32,10 @@ pub const LATE: &str = "[MSG:Steps came late]";
 
 /// Returns a line as grbl's dialect has it: `{spn:4}` is `$spn=4`, `{spn:n}` is `$spn`.
 pub fn translated(line: &str) -> String {
-    let inner = line.trim().strip_prefix('{').and_then(|rest| rest.strip_suffix('}'));
-    let Some((name, value)) = inner.and_then(|inner| inner.split_once(':')) else {
-        return line.to_string();
-    };
-    match (name.trim_matches('"'), value) {
-        (name, "n" | "null") => format!("${name}"),
-        (name, value) => format!("${name}={value}"),
+    let is_group = line.trim().starts_with('{');
+    match by_name::lines(line).as_deref() {
+        Ok([one]) if is_group => one.clone(),
+        _ => line.to_string(),
     }
 }
 
