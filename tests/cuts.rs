@@ -143,6 +143,33 @@ fn settings_in_eeprom_alone_are_reset_with_the_others() {
     assert_eq!(seen, BTreeSet::from([new, old]));
 }
 
+/// `$RST=*` restores settings and offsets, or neither.
+#[test]
+fn offsets_are_reset_with_the_settings() {
+    let before = &["{dia:3}", "$110=900", "G10L2P1X3Y4", "G10L2P6Z5", "$p1frq=200"];
+    let cuts = Cuts::of(before, &["$RST=*"], 5_000);
+    let images: Vec<_> = cuts.images().collect();
+    let mut seen = BTreeSet::new();
+    for image in images.iter().step_by(7).chain(images.last()) {
+        let is = with(image, |sender| {
+            let heard =
+                sender.ask("$I\n", 100) + &sender.ask("$#\n", 300) + &sender.ask("$$\n", 400);
+            sender.0.run_ms(2_000);
+            let later = sender.ask("$#\n", 300) + &sender.ask("$p1frq\n", 300);
+            let wanted = ["[G54:", "[G59:", "$110="];
+            let is = |line: &&str| wanted.iter().any(|name| line.starts_with(name));
+            let texts =
+                [&heard, &later].map(|text| text.lines().filter(is).collect::<Vec<_>>().join(" "));
+            let frequency =
+                later.lines().find(|line| line.starts_with("$p1frq") || line.contains("p1frq"));
+            let frequency = frequency.map(|line| line.contains("200"));
+            (texts[0].clone(), texts[1].clone(), frequency)
+        });
+        seen.insert(is);
+    }
+    assert_eq!(seen.len(), 2, "{seen:#?}");
+}
+
 #[test]
 fn a_setting_behind_a_change_of_machine_is_not_lost_with_it() {
     let cuts = Cuts::of(&["{mch:1}"], &["{mch:2}", "{xvm:777}"], 6_000);

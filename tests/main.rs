@@ -117,5 +117,6 @@ mod squaring;
 mod streams;
 mod told;
 mod transcripts;
+mod two_ports;
 mod usb_opens;
 mod wrap;

@@ -429,6 +429,7 @@ impl Exec {
                 self.dwell_ms = *ms;
                 self.halt(out);
                 out.running = true;
+                out.length = 0.0;
             }
             QueuedAction::SetPosition(steps) => {
                 out.target = *steps;

@@ -40,7 +40,7 @@ pub struct Snapshot {
     pub steps: [i16; MOTORS],
     /// The remaining distance of the block, mm.
     pub left: f32,
-    /// The length of the block, mm.
+    /// The length of the block, mm; 0 in a dwell.
     pub length: f32,
     /// Velocity along the path, mm/s.
     pub velocity: f32,

@@ -149,10 +149,12 @@ pub trait Machine {
     fn hold(&mut self) -> Hold;
     /// Returns the state of the program. Has a meaning only while the machine rests.
     fn rest(&mut self) -> Program;
-    /// Restores the defaults of all settings and of what dialects remember, or refuses to. Takes 10 ms on AVR.
-    fn restore(&mut self) -> Status;
-    /// Raises an alarm, unless one at least as severe is on.
-    fn alarm(&mut self, alarm: Alarm);
+    /// Restores the defaults of all settings and of what dialects remember, or refuses to. With `offsets`, those of all
+    /// coordinate systems are to be stored as 0 with the settings, or not at all. Takes 10 ms on AVR.
+    fn restore(&mut self, offsets: bool) -> Status;
+    /// Raises an alarm, unless one at least as severe is on. It is reported with `reason`, but for a dialect in order not
+    /// on the port itself.
+    fn alarm(&mut self, alarm: Alarm, reason: Status);
     /// Ends the alarm, if one is on, or refuses to. [`Status::Again`]: not yet possible.
     fn clear(&mut self) -> Status;
     /// Drops what is queued, or refuses to.

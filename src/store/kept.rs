@@ -64,6 +64,9 @@ pub const KEYS: u16 = Setting::KEPT + ROWS as u16 * AXES as u16 + 1;
 /// The key of a number without an item.
 const NO_KEY: u16 = u16::MAX;
 
+/// See [`Change`]. More than the number of a machine.
+const OFFSETS: i32 = 64;
+
 /// A change of many settings at once: to the profile of a machine, or to the defaults.
 ///
 /// Its record is written before the settings, and another one, [`Change::NONE`], behind them. A change that has no such
@@ -71,7 +74,8 @@ const NO_KEY: u16 = u16::MAX;
 /// values.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Change(
-    /// 0: none. Else the machine's number + 1; negative if all settings change.
+    /// 0: none. Else the machine's number + 1; negative if all settings change, with [`OFFSETS`] added before if the
+    /// coordinate systems change, too.
     i32,
 );
 
@@ -80,9 +84,10 @@ impl Change {
     /// No change, or its end.
     pub const NONE: Self = Self(0);
 
-    /// Returns the change to the profile of these settings; with `all`, of all other settings to their defaults, too.
-    pub fn to(settings: &Settings, all: bool) -> Self {
-        let machine = settings.get(Setting::MACHINE) + 1;
+    /// Returns the change to the profile of these settings; with `all`, of all other settings to their defaults, too;
+    /// with `offsets`, also of the coordinate systems to 0.
+    pub fn to(settings: &Settings, all: bool, offsets: bool) -> Self {
+        let machine = settings.get(Setting::MACHINE) + 1 + if offsets { OFFSETS } else { 0 };
         Self(if all { -machine } else { machine })
     }
 
@@ -96,12 +101,17 @@ impl Change {
         self.0 < 0
     }
 
+    /// Whether the coordinate systems change, too.
+    pub fn is_of_offsets(self) -> bool {
+        self.0 < -OFFSETS
+    }
+
     /// Makes the change.
     fn make(self, settings: &mut Settings) {
         if self.is_of_all() {
             settings.set_defaults();
         }
-        let machine = (self.0.unsigned_abs() as u8).wrapping_sub(1);
+        let machine = (self.0.unsigned_abs() as u8 & (OFFSETS - 1) as u8).wrapping_sub(1);
         if Setting::MACHINE.accepts(machine.into()) {
             settings.take_over(machine);
         }

@@ -18,6 +18,7 @@ use super::links::Links;
 use super::spindle;
 use super::switches;
 use crate::config::Settings;
+use crate::hal::serial::is_shared;
 use crate::hal::stepper;
 use crate::machine::{self, Alarm};
 use crate::status::Status;
@@ -29,9 +30,15 @@ pub fn raise(links: &Links, alarm: Alarm) {
 }
 
 /// Begins an alarm, unless one of equal or higher severity is on, and reports it with `reason` as its status.
-#[inline(never)]
 #[small]
 pub fn raise_for(links: &Links, alarm: Alarm, reason: Status) {
+    raise_by(links, alarm, reason, NO_PORT);
+}
+
+/// Begins an alarm as [`raise_for`] does. It is not reported on the port `by`, whose sender hears of it in an answer.
+#[inline(never)]
+#[small]
+pub fn raise_by(links: &Links, alarm: Alarm, reason: Status, by: u8) {
     let stop = || {
         if alarm.is_sudden() {
             stepper::stop();
@@ -44,7 +51,26 @@ pub fn raise_for(links: &Links, alarm: Alarm, reason: Status) {
     hold::abandon(links);
     spindle::stop(links.thread);
     heat::stop(links);
-    links.except_at_once(reason);
+    announce(links, reason, by);
+}
+
+/// The number of no port.
+pub const NO_PORT: u8 = u8::MAX;
+
+/// Reports the reason of an alarm on all ports but that with the number `by`. The reporter tells the port that gets
+/// reports. The parser tells the others, so that none of them waits for a sender that takes nothing.
+#[inline(never)]
+#[small]
+pub fn announce(links: &Links, reason: Status, by: u8) {
+    let told = links.told().number;
+    for port in &links.ports {
+        if port.number == told && told != by {
+            links.except_at_once(reason);
+        } else if port.number != by && !is_shared(port.number) {
+            port.news.set(Some(reason));
+        }
+    }
+    links.parser_wake.signal();
 }
 
 /// Starts the machine in an alarm and reports `reason`, so that the operator looks at it first: after an unexpected
@@ -72,6 +98,7 @@ pub fn clear(links: &Links, settings: &Settings) -> Status {
         return if alarm == Alarm::Panic { alarm.status() } else { Status::Again };
     }
     links.notices.limits_hit.set(0);
+    hold::refuse_others(links);
     // A limit that was hit meanwhile has stopped steps while nothing moved.
     stepper::release();
     links.reporter_wake.notify_now();

@@ -181,7 +181,7 @@ impl Feed {
                         self.waits = true;
                         break;
                     }
-                    match run_block(links, port, block, false) {
+                    match run_block(links, port, block, false, false) {
                         (Status::Again, _) => {
                             self.waits = true;
                             break;

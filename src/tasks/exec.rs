@@ -26,6 +26,7 @@ use crate::motion::thread::Thread;
 use crate::tasks::health::{self, Sign};
 use kerf_macros::small;
 
+use crate::boards::outputs;
 use crate::capability::Capability;
 use crate::motors::Motors;
 use crate::spindle::Spindle;
@@ -285,6 +286,9 @@ impl Runner<'_> {
             // dropped as well, but its program goes on.
             if machine::is_dropping() || machine::is_alarmed() {
                 out.outputs = if machine::is_killing() { 0 } else { spindle::on() };
+                if out.outputs & outputs::SPINDLE == 0 {
+                    out.speed = 0.0;
+                }
                 spindle.go_on();
                 spindle::switch(spindle, out, false);
             }

@@ -33,7 +33,9 @@
 //! comment.
 //!
 //! A dropped line still gets its response, because senders count responses: [`Status::Terminated`], or the status of
-//! the alarm if there is one. Only lines before a reset of their own sender get none ([`Class::Gone`]). Nothing here
+//! the alarm if there is one. Only lines before a reset of their own sender get none ([`Class::Gone`]). When a line ends
+//! an alarm, G-code that has come before is refused ([`Class::Late`]), but no other line: a line that is allowed in an
+//! alarm is never refused because of another port. Nothing here
 //! waits, and nothing can be full, because everything is kept as states.
 
 use super::jog;
@@ -42,7 +44,7 @@ use super::lines::Class;
 use super::lines::LinePool;
 use super::links::Links;
 use super::overrides;
-use super::ports::{self, GREETING, INTERRUPTED, OPENED, OTHERS, Port};
+use super::ports::{self, Cut, GREETING, INTERRUPTED, OPENED, OTHERS, Port};
 use super::view::View;
 use crate::gcode::overrides::{Change, FULL, Override};
 use crate::hal::event::Event;
@@ -79,21 +81,29 @@ pub fn abandon(links: &Links) {
     drop_queue(links);
 }
 
-/// Refuses G-code that came, on any port, before a control line that has just come in an alarm. This also holds if the
-/// control line ends the alarm. `pool` is the pool of that line. All bytes that wait behind a full pool of another
-/// port came before the line.
+/// Has G-code refused that has come on other ports in an alarm which a line has just ended. The pool of that line is in
+/// use. All bytes that wait behind a full pool came before the end of the alarm.
 #[cold]
 #[inline(never)]
 #[small]
-pub fn refuse_older(links: &Links, pool: &mut LinePool) {
-    pool.refuse(dropped());
+pub fn refuse_others(links: &Links) {
     for port in &links.ports {
         if let Ok(mut lines) = port.lines.try_borrow_mut() {
-            lines.refuse(dropped());
+            lines.refuse();
             if !lines.ready() {
-                cut_up_to(port, &mut lines, uart::newest(port.number));
+                refuse_up_to(port, uart::newest(port.number));
             }
         }
+    }
+}
+
+/// Has G-code in the stream of a port refused up to a slot of its receive ring, as [`LinePool::refuse`] does.
+pub fn refuse_up_to(port: &Port, slot: Option<u8>) {
+    if let Some(slot) = slot.filter(|_| !port.is_resetting()) {
+        port.cut.set(match port.cut.get() {
+            Cut::All(_) => Cut::All(slot),
+            _ => Cut::Gcode(slot),
+        });
     }
 }
 
@@ -109,7 +119,7 @@ pub fn cut_up_to(port: &Port, lines: &mut LinePool, slot: Option<u8>) {
 /// Cuts the stream of a port as [`cut_up_to`] does, on any port.
 fn cut_here(port: &Port, lines: &mut LinePool, slot: Option<u8>) {
     match slot {
-        Some(_) => port.cut.set(slot),
+        Some(slot) => port.cut.set(Cut::All(slot)),
         None if port.cut.get().is_none() => lines.terminate_partial(dropped()),
         None => {}
     }
@@ -121,6 +131,14 @@ pub fn dropped() -> Status {
     match machine::alarm() {
         Alarm::None => Status::Terminated,
         alarm => alarm.status(),
+    }
+}
+
+/// Returns the status with which G-code is refused that has come in an alarm, also if that has been ended.
+pub fn locked() -> Status {
+    match dropped() {
+        Status::Terminated => Status::Alarmed,
+        status => status,
     }
 }
 
@@ -371,14 +389,15 @@ fn drop_queue(links: &Links) {
     flags::set(Event::BlockDone);
 }
 
-/// Whether anything is being carried out. Not true for a hold at standstill, a program stop, check mode, or a built-in
-/// job without a line under way.
+/// Whether motors turn, or a cycle runs in which they may stand still for a moment. Not true for a hold at standstill,
+/// a dwell, a program stop, check mode, or a built-in job without a line under way.
 #[inline(never)]
 #[small]
 fn is_moving(links: &Links, port: &Port) -> bool {
     let mut view = View::of(links, port);
     // An axis between its switch and its zero is not where it says, also in a hold.
-    let held = view.hold() == Hold::Rests && machine::cycle() != machine::Cycle::Homing;
+    let homes = machine::cycle() == machine::Cycle::Homing;
+    let held = (view.hold() == Hold::Rests || view.dwells()) && !homes;
     !(held || machine::is_stopped() || machine::is_checking()) && view.carries_out()
 }
 

@@ -47,10 +47,20 @@ pub enum Class {
     Control,
     /// The line waits until the planner has room.
     Data,
+    /// The line came in an alarm and in time before its end, which came from elsewhere: its G-code is refused.
+    Late,
     /// The line could not be kept, and is answered with this status.
     Fault(Status),
     /// The line came before its sender reset the machine. It is never answered.
     Gone,
+}
+
+impl Class {
+    /// Whether the line is no control line, and has been kept whole.
+    #[inline(always)]
+    pub fn is_whole(self) -> bool {
+        matches!(self, Class::Data | Class::Late)
+    }
 }
 
 /// Names a line in the pool until it is removed.
@@ -545,30 +555,46 @@ impl LinePool {
 
     /// Drops data lines as [`terminate`](Self::terminate) does, but the `first` ones.
     pub fn terminate_from(&mut self, first: u8, status: Status) {
-        self.drop_data(first, status, false);
+        self.drop_data(first, Class::Fault(status));
     }
 
-    /// Drops data lines as [`terminate`](Self::terminate) does, in an alarm. Keeps the end of a program, if it ends the
-    /// alarm, and everything behind it.
-    pub fn refuse(&mut self, status: Status) {
-        self.drop_data(0, status, true);
+    /// Has the G-code of all data lines refused, because of an alarm that is on or has just been ended. Other lines
+    /// are carried out, and so is everything from a line on that ends an alarm.
+    pub fn refuse(&mut self) {
+        self.drop_data(0, Class::Late);
     }
 
     #[cold]
     #[inline(never)]
     #[small]
-    fn drop_data(&mut self, first: u8, status: Status, spares_end: bool) {
+    fn drop_data(&mut self, first: u8, class: Class) {
         for index in first..self.entries.len() as u8 {
             let id = LineId(index);
-            if self.class(id) != Class::Data {
+            if !self.class(id).is_whole() {
                 continue;
             }
-            if spares_end && !self.in_order && is_program_end(self.text(id)) {
+            if class == Class::Late && self.ends_alarm(self.text(id)) {
                 break;
             }
             if let Some(entry) = self.entries.get_mut(index.into()) {
-                entry.class = Class::Fault(status);
+                entry.class = class;
             }
+        }
+    }
+
+    /// Whether a data line ends an alarm: M2 or M30 alone, or in a pool that keeps the order `$X` and `$H`.
+    fn ends_alarm(&self, text: &[u8]) -> bool {
+        if !self.in_order {
+            return is_program_end(text);
+        }
+        let mut text = text.iter().filter(|byte| **byte != b' ').map(|byte| byte | b' ');
+        let first = [text.next(), text.next(), text.next(), text.next()];
+        match first {
+            [Some(b'$'), Some(b'x'), None, _] => true,
+            [Some(b'$'), Some(b'h'), axis, None] => {
+                axis.is_none_or(|axis| matches!(axis, b'a'..=b'c' | b'x'..=b'z'))
+            }
+            _ => false,
         }
     }
 
@@ -661,7 +687,7 @@ impl LinePool {
         let mut text = self.text(LineId(0)).iter().filter(|byte| **byte != b' ');
         text.next() == Some(&b'$')
             && !matches!(text.next(), Some(b'J' | b'j'))
-            && self.entries.first().is_some_and(|first| first.class == Class::Data)
+            && self.entries.first().is_some_and(|first| first.class.is_whole())
     }
 
     /// Returns the text of the oldest line, if it is next and a data line.

@@ -390,8 +390,9 @@ impl Parser {
                 && links.job.get().starts_up()
                 && links.told().number == port.number
         };
-        let waits = (flushes && class == Class::Data)
-            || (class != Class::Gone && (port.awaits_greeting() || starts()));
+        let waits = (flushes && class.is_whole())
+            || (class != Class::Gone && (port.awaits_greeting() || starts()))
+            || port.news.get().is_some();
         if !matches!(session, Session::Idle) || waits {
             return None;
         }
@@ -450,6 +451,10 @@ impl Parser {
                 }
                 let has_room = match session {
                     Session::Answer(answer) => answer.may_go_on(port),
+                    // News need all of the ring.
+                    _ if port.news.get().is_some() => {
+                        port.tx.try_lock().ok().map(|tx| tx.is_empty())
+                    }
                     _ if self.lacking & 1 << port.number != 0 => has_room(port),
                     _ => None,
                 };
@@ -469,15 +474,16 @@ impl Parser {
     }
 }
 
-/// Answers an enquiry (ENQ), or reports lost bytes. Returns false if that has to wait.
+/// Answers an enquiry (ENQ), or reports the port's news. Returns false if that has to wait.
 #[inline(never)]
 #[small]
 fn tell(links: &Links, port: &Port) -> bool {
-    let asked = port.enquiry.get();
-    let what = if asked { Notice::Enquiry } else { Notice::Exception(Status::BufferFull) };
-    let told = tell_at_once(links, port, what);
-    if told {
-        if asked { &port.enquiry } else { &port.lost }.set(false);
+    let news = port.news.get();
+    let told = tell_at_once(links, port, news.map_or(Notice::Enquiry, Notice::Exception));
+    if told && news.is_none() {
+        port.enquiry.set(false);
+    } else if told {
+        port.news.set(None);
     }
     told
 }
@@ -531,7 +537,7 @@ fn begin(
     if let Some(block) = gcode {
         let (status, commented) = match *deferred {
             Deferred::Answer if port.number == links.feeder.get() => (Status::Ok, false),
-            _ => run_block(links, port, block.of(line), declined),
+            _ => run_block(links, port, block.of(line), declined, class == Class::Late),
         };
         if status == Status::Again {
             // The line number counts only when the line is begun for good.

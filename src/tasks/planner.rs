@@ -32,6 +32,7 @@ use merge::nothing_follows;
 use parts::{ArcWalk, Ongoing, Parts};
 
 use super::Never;
+use super::alarm;
 use super::common;
 use super::links::{self, Changes, Links};
 use super::origin;
@@ -725,8 +726,14 @@ impl Planner {
         let (cycle, killed) = machine::dropped();
         match cycle {
             Cycle::Jog => links.notices.jogged.set(true),
-            // The motors of an axis may have moved apart, so positions in steps are computed again.
-            Cycle::Homing => links.changes.note(Changes::STEPS),
+            Cycle::Homing => {
+                // The motors of an axis may have moved apart, so positions in steps are computed again.
+                links.changes.note(Changes::STEPS);
+                // An alarm has already reported what ended the cycle, and a reset will be.
+                if !machine::is_alarmed() && links.interrupter().is_none() {
+                    links.except(Status::HomingFailed);
+                }
+            }
             Cycle::Probe => links.probe.abandon(),
             // Check mode was about to begin.
             Cycle::Check if !self.checks() => machine::carry_out(machine::Event::Done),
@@ -734,13 +741,17 @@ impl Planner {
         }
         // If a sender begins with a reset, nothing is reported, because there was no job.
         let ended = !links.ports.iter().any(|port| port.asked.get() & OTHERS != 0);
-        if killed && ended {
+        if killed && ended && cycle != Cycle::Homing {
             links.except(Status::KillJob);
         }
         links.notices.flushed.set(ended && !machine::is_alarmed());
-        if killed && links.is_interrupted() && !machine::is_alarmed() {
+        if killed
+            && let Some(by) = links.interrupter()
+            && !machine::is_alarmed()
+        {
             // Before any other line is begun: lines that have come since the reset are refused.
             machine::start_alarmed();
+            alarm::announce(links, Status::Alarmed, by);
         }
         links.reporter_wake.notify_now();
         killed

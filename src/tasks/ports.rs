@@ -77,6 +77,34 @@ pub enum Choice {
     Open = 3,
 }
 
+/// The lines in a receive ring that are dropped: those up to a slot.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Cut {
+    /// No line is dropped.
+    None,
+    /// All data lines are dropped: by a kill, a flush, or the beginning of an alarm.
+    All(u8),
+    /// G-code is refused: it has come in an alarm that has been ended since.
+    Gcode(u8),
+}
+
+impl Cut {
+    /// Returns the slot up to which lines are dropped.
+    #[inline(always)]
+    pub fn slot(self) -> Option<u8> {
+        match self {
+            Cut::None => None,
+            Cut::All(slot) | Cut::Gcode(slot) => Some(slot),
+        }
+    }
+
+    /// Whether no line is dropped.
+    #[inline(always)]
+    pub fn is_none(self) -> bool {
+        self == Cut::None
+    }
+}
+
 /// The state of one port.
 // In this order: AVR reaches a field within 63 bytes of the first in one instruction.
 #[repr(C)]
@@ -92,10 +120,10 @@ pub struct Port {
     pub asked: Cell<u8>,
     /// The sender has sent an enquiry (ENQ). Control sets this, and the parser answers.
     pub enquiry: Cell<bool>,
-    /// Bytes have been lost, which the parser is to report.
-    pub lost: Cell<bool>,
-    /// The slot of the receive ring up to which lines of G-code are dropped. A kill or a flush has set it.
-    pub cut: Cell<Option<u8>>,
+    /// What the parser is to report on this port alone: lost bytes, or the reason of an alarm, which comes first.
+    pub news: Cell<Option<Status>>,
+    /// The lines of the receive ring that are dropped.
+    pub cut: Cell<Cut>,
     /// The line that is being answered has begun its alarm when it arrived ([`stop`](super::stop)).
     pub has_stopped: Cell<bool>,
     /// The alarm that a line is to end once the machine has stopped.
@@ -132,8 +160,8 @@ impl Port {
             asked: Cell::new(0),
             choice: Cell::default(),
             seen: Cell::new(nothing_seen()),
-            lost: Cell::new(false),
-            cut: Cell::new(None),
+            news: Cell::new(None),
+            cut: Cell::new(Cut::None),
         }
     }
 
@@ -222,7 +250,7 @@ impl Port {
     /// Whether there is a message for this port alone, or a byte to answer that is no line.
     #[inline(always)]
     pub fn tells(&self) -> bool {
-        self.enquiry.get() || self.lost.get() || self.asks_report()
+        self.enquiry.get() || self.news.get().is_some() || self.asks_report()
     }
 
     /// Whether a byte has requested a status report.
@@ -340,10 +368,11 @@ impl Links {
         self.ports.iter().any(Port::is_resetting)
     }
 
-    /// Whether a sender on any port has reset the machine in motion.
-    pub fn is_interrupted(&self) -> bool {
-        let is_interrupted = |port: &Port| port.asked.get() & INTERRUPTED != 0;
-        Speech::HAS_QUESTION && self.ports.iter().any(is_interrupted)
+    /// Returns the number of a port whose sender has reset the machine in motion.
+    pub fn interrupter(&self) -> Option<u8> {
+        let is_interrupted = |port: &&Port| port.asked.get() & INTERRUPTED != 0;
+        let port = if Speech::HAS_QUESTION { self.ports.iter().find(is_interrupted) } else { None };
+        port.map(|port| port.number)
     }
 
     /// Reports an exception to the feeder. It replaces one that waits, except in an alarm, where the one that waits may

@@ -15,7 +15,7 @@ use super::jog;
 use super::lines::LinePool;
 use super::links::Links;
 use super::overtake::Scan;
-use super::ports::Port;
+use super::ports::{Cut, Port};
 use super::realtime;
 use crate::gcode::comment::Aside;
 use crate::hal::event::{Event, next, set_asked};
@@ -231,10 +231,12 @@ impl Intake {
                 _ => pool.put(byte),
             };
             if is_line {
-                if cuts && self.port.is_resetting() {
-                    pool.drop_unanswered();
-                } else if cuts {
-                    pool.terminate(hold::dropped());
+                match self.port.cut.get() {
+                    Cut::None => {}
+                    _ if !cuts => {}
+                    _ if self.port.is_resetting() => pool.drop_unanswered(),
+                    Cut::Gcode(_) => pool.refuse(),
+                    Cut::All(_) => pool.terminate(hold::dropped()),
                 }
                 self.ended(pool, looked, links);
             }
@@ -250,7 +252,8 @@ impl Intake {
             self.decide(pool, links);
         }
         if machine::is_alarmed() && pool.ends_with_control() {
-            hold::refuse_older(links, pool);
+            // They came before a line that may overtake them, and may end the alarm.
+            pool.refuse();
         }
         if pool.has_controls() {
             set_asked(true);
@@ -282,7 +285,7 @@ impl Intake {
     /// of text.
     #[inline(always)]
     fn cuts(&self, pool: &mut LinePool, links: &Links) -> bool {
-        self.port.cut.get().is_some_and(|last| self.cuts_up_to(last, pool, links))
+        self.port.cut.get().slot().is_some_and(|last| self.cuts_up_to(last, pool, links))
     }
 
     #[cold]
@@ -292,10 +295,10 @@ impl Intake {
         if !cuts {
             if self.port.is_resetting() {
                 pool.forget();
-            } else {
+            } else if matches!(self.port.cut.get(), Cut::All(_)) {
                 pool.terminate_partial(hold::dropped());
             }
-            self.port.cut.set(None);
+            self.port.cut.set(Cut::None);
             // A greeting may wait for the end of the cut.
             links.reporter_wake.notify_now();
         }
@@ -351,7 +354,7 @@ impl Intake {
         }
         // On a bus the sender is not told: the line is refused anyway.
         if (self.refused > 0 || mark & CLEAN == 0) && !is_shared(self.port.number) {
-            self.port.lost.set(true);
+            self.port.news.set(self.port.news.get().or(Some(Status::BufferFull)));
             links.parser_wake.signal();
         }
         is_line
@@ -397,11 +400,9 @@ fn look_ahead(links: &Links, port: &Port, scan: &mut Scan, ring: &mut Window<'_>
     if scan.run(links, &mut pool, ring, closes) {
         links.parser_wake.signal();
         if machine::is_alarmed() {
-            hold::refuse_older(links, &mut pool);
+            pool.refuse();
             // What has been looked through came before the control line, or is that line.
-            if let Some(last) = scan.looked.checked_sub(1) {
-                hold::cut_up_to(port, &mut pool, Some(ring.slot(last)));
-            }
+            hold::refuse_up_to(port, scan.looked.checked_sub(1).map(|last| ring.slot(last)));
         }
     }
     scan.look_for_stops(links, port, &mut pool, ring);
@@ -414,7 +415,7 @@ fn look_ahead(links: &Links, port: &Port, scan: &mut Scan, ring: &mut Window<'_>
 fn look_for_marks(links: &Links, port: &Port, ring: &Window<'_>) {
     let mut aside = port.lines.borrow().aside();
     // Marks before a cut have already taken effect.
-    let mut last = port.cut.get();
+    let mut last = port.cut.get().slot();
     for n in 0..ring.len() {
         let (byte, slot) = (ring.get(n), ring.slot(n));
         if byte < MARKS && aside == Aside::NONE && last.is_none() {

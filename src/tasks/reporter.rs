@@ -10,6 +10,7 @@ use embassy_futures::select::select;
 use embassy_futures::yield_now;
 use kerf_macros::small;
 
+use super::alarm;
 use super::health;
 #[cfg(feature = "dialect-reprap")]
 use super::heat;
@@ -63,6 +64,12 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
         tell(links, links.told(), notice).await;
         tell_others(links, notice).await;
         greeting = (occasion != Occasion::Ready).then_some(Occasion::Ready);
+    }
+    // The other ports have been greeted as well.
+    if machine::is_alarmed()
+        && let Some(reason) = links.notices.exception.get()
+    {
+        alarm::announce(links, reason, alarm::NO_PORT);
     }
     start_up(links);
     let mut told =
@@ -333,7 +340,7 @@ fn asked_on(port: &Port) -> Option<Notice> {
 #[inline(never)]
 #[small]
 fn is_over(port: &Port) -> bool {
-    let drops = || port.cut.get().is_some() || port.lines.borrow().has_gone();
+    let drops = || !port.cut.get().is_none() || port.lines.borrow().has_gone();
     port.is_resetting() && !machine::is_flushing() && !drops()
 }
 
@@ -388,12 +395,15 @@ fn greet_otherwise(links: &Links, port: &Port, tx: &mut Tx) {
 }
 
 /// Sends a short message on a port, if its transmitter is free and there is room: at most 64 bytes, or for a greeting
-/// and a program stop all of an empty ring. Returns false if it cannot be sent now.
+/// and an exception all of an empty ring. Returns false if it cannot be sent now.
 #[inline(never)]
 #[small]
 pub fn tell_at_once(links: &Links, port: &Port, notice: Notice) -> bool {
     let Ok(mut tx) = port.tx.try_lock() else { return false };
-    let is_long = matches!(notice, Notice::Greeting(_) | Notice::Exception(Status::ProgramStopped));
+    let is_long = match notice {
+        Notice::Exception(status) => status != Status::BufferFull,
+        _ => matches!(notice, Notice::Greeting(_)),
+    };
     let fits = if is_long { tx.is_empty() } else { tx.has_room() };
     if fits {
         let mut telling = begin(notice, links, port);

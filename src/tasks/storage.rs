@@ -19,7 +19,7 @@ use super::ports::COURTESY;
 use super::wake::Wake;
 use crate::capability::Capability;
 use crate::config::{Setting, Settings};
-use crate::gcode::tables::{Edit, TableRow, Tables};
+use crate::gcode::tables::{Edit, SYSTEMS, TableRow, Tables};
 use crate::hal::after_ms;
 use crate::hal::eeprom::Eeprom;
 use crate::machine;
@@ -29,7 +29,7 @@ use crate::store::kept::{self, Change, ITEMS, Item};
 use crate::store::log::Put;
 use crate::store::program::{self, Program, Stored};
 use crate::store::{Log, Memory, record, tables};
-use crate::units::{Length, PerAxis};
+use crate::units::{AXES, Length, PerAxis};
 
 /// How many keys have no record if every setting and every value of all 21 rows on six axes has been set: then a line
 /// is refused with status 34. The settings of drivers add 15 such keys. The program's area could give up the room.
@@ -45,14 +45,15 @@ const _: () = assert!(program::STARTUP_MAX as usize == STARTUP_MAX);
 pub struct Storage {
     log: Cell<Log>,
     /// The settings that may have changed: from this number to before `to`. If many change at once, `to` is
-    /// [`TO_MACHINE`] or [`TO_ALL`].
+    /// [`TO_MACHINE`], [`TO_ALL`] or [`TO_OFFSETS`].
     from: Cell<u8>,
     to: Cell<u8>,
     /// The row that is being saved.
     edit: Cell<Option<Edit>>,
     /// The setting in EEPROM alone that is being saved: its number and its value.
     cold: Cell<Option<(u8, i32)>>,
-    /// Settings in EEPROM alone are to have their defaults from this number on.
+    /// Settings in EEPROM alone are to have their defaults from this number on. From [`OFFSETS`] on, the rows of the
+    /// coordinate systems come first.
     forgotten: Cell<u8>,
     /// The program that is being stored, as far as it has come.
     program: Cell<Option<Program>>,
@@ -64,9 +65,13 @@ pub struct Storage {
 }
 
 /// The value of `to` while the settings of a machine's profile change: behind them is [`END`].
-const TO_MACHINE: u8 = END + 1;
+pub const TO_MACHINE: u8 = END + 1;
 /// The value of `to` while all settings change.
-const TO_ALL: u8 = END + 2;
+pub const TO_ALL: u8 = END + 2;
+/// The value of `to` while all settings and the coordinate systems change.
+pub const TO_OFFSETS: u8 = END + 3;
+/// In place of a setting's number: the first coordinate system.
+const OFFSETS: u8 = Setting::WARM - SYSTEMS;
 /// In place of a setting's number: the end of a change.
 const END: u8 = ITEMS;
 
@@ -124,9 +129,9 @@ impl Storage {
         self.grow(0, ITEMS);
     }
 
-    /// Notes that many settings change at once: those of the machine's profile, or all.
-    pub fn note_change(&self, all: bool) {
-        self.note(0, if all { TO_ALL } else { TO_MACHINE });
+    /// Notes that many settings change at once: [`TO_MACHINE`], [`TO_ALL`] or [`TO_OFFSETS`].
+    pub fn note_change(&self, to: u8) {
+        self.note(0, to);
     }
 
     /// Goes on with a change that was cut short. At start-up, before settings in EEPROM alone are read.
@@ -134,11 +139,18 @@ impl Storage {
         if change == Change::NONE {
             return;
         }
-        let all = change.is_of_all();
-        if all {
-            self.forgotten.set(Setting::WARM);
+        let offsets = change.is_of_offsets();
+        if change.is_of_all() {
+            self.forget(offsets);
         }
-        self.grow(0, if all { TO_ALL } else { TO_MACHINE });
+        self.grow(
+            0,
+            match change.is_of_all() {
+                false => TO_MACHINE,
+                true if offsets => TO_OFFSETS,
+                true => TO_ALL,
+            },
+        );
     }
 
     /// Whether many settings change, and the record that says so is to be written next.
@@ -150,7 +162,7 @@ impl Storage {
     fn change(&self, settings: &Settings) -> Change {
         match self.to.get() {
             ..=ITEMS => Change::NONE,
-            to => Change::to(settings, to == TO_ALL),
+            to => Change::to(settings, to >= TO_ALL, to == TO_OFFSETS),
         }
     }
 
@@ -200,7 +212,13 @@ impl Storage {
         if let Some(values) = self.lent.row().filter(|_| row == LENT) {
             return Some(values);
         }
-        self.edit.get().filter(|edit| edit.row == row).map(|edit| edit.values)
+        let edit = self.edit.get().filter(|edit| edit.row == row).map(|edit| edit.values);
+        edit.or(self.is_forgotten(row).then_some([Length::ZERO; AXES]))
+    }
+
+    /// Whether the values of a row are still to be stored as 0.
+    fn is_forgotten(&self, row: TableRow) -> bool {
+        row.number() < SYSTEMS && OFFSETS + row.number() >= self.forgotten.get()
     }
 
     /// Whether a line waits for a row to be saved. The parser is woken then.
@@ -249,16 +267,22 @@ impl Storage {
         Ok(())
     }
 
-    /// Gives all settings in EEPROM alone their defaults from now on.
-    pub fn forget_cold(&self) {
+    /// Gives all settings in EEPROM alone their defaults from now on, and with `offsets` the coordinate systems.
+    pub fn forget(&self, offsets: bool) {
         self.cold.set(None);
-        self.forgotten.set(Setting::WARM);
+        self.forgotten.set(if offsets { OFFSETS } else { Setting::WARM });
         self.wake.signal();
     }
 
     /// Returns the next setting in EEPROM alone that is to be saved.
     fn take_cold(&self) -> Option<Work> {
         let number = self.forgotten.get();
+        if number < Setting::WARM {
+            let row = TableRow::system(number - OFFSETS);
+            self.edit.set(Some(Edit { row, values: [Length::ZERO; AXES] }));
+            self.forgotten.set(number + 1);
+            return Some(Work::Edit);
+        }
         if self.cold.get().is_none() && number < Setting::COLD {
             let default = Setting::from_number(number).map_or(0, Setting::default_value);
             self.cold.set(Some((number, default)));
@@ -329,7 +353,7 @@ impl Tables for &Storage {
 
     fn takes(&self, row: TableRow) -> bool {
         // A row that is being saved only has to be written once more.
-        let takes = self.edit.get().is_none_or(|edit| edit.row == row);
+        let takes = !self.is_forgotten(row) && self.edit.get().is_none_or(|edit| edit.row == row);
         self.awaited.set(!takes);
         takes
     }

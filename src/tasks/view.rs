@@ -154,6 +154,14 @@ impl<'a> View<'a> {
         machine::is_held() || machine::is_checking() || self.has_work()
     }
 
+    /// Whether nothing moves because a dwell is under way, or because a line waits for something else than motion.
+    pub fn dwells(&self) -> bool {
+        with(self.links.thread, |state| match state.motion.running {
+            false => queue::used() == 0,
+            true => state.motion.length.to_bits() == 0,
+        })
+    }
+
     /// Whether the machine stood still when a report began, and no line has been taken since: another port may feed it.
     fn stands(&self) -> bool {
         let has_begun = || self.seen.get().is_some() && self.works_now();
@@ -396,15 +404,16 @@ impl Machine for View<'_> {
         self.motion().program
     }
 
-    fn restore(&mut self) -> Status {
-        settings::restore(self)
+    fn restore(&mut self, offsets: bool) -> Status {
+        settings::restore(self, offsets)
     }
 
-    fn alarm(&mut self, alarm: Alarm) {
+    fn alarm(&mut self, alarm: Alarm, reason: Status) {
         // An alarm that another port has ended since the line arrived does not begin again.
         let port = self.port;
         if !port.has_stopped.get() || self.links.cleared_by.get() == port.number {
-            alarm::raise(self.links, alarm);
+            let by = if port.speech.get().is_in_order() { port.number } else { alarm::NO_PORT };
+            alarm::raise_by(self.links, alarm, reason, by);
         }
     }
 

@@ -519,6 +519,8 @@ impl<S: Side> Model<S> {
         let wanted: &[u16] = match class {
             Homes if self.door => &[8, 9],
             Restores if self.door => &[8],
+            // The defaults would switch the stop's input off.
+            Restores if self.pressed => &[9],
             Unlocks | Homes if locked => &[9],
             // The other port may feed the machine as long as the door holds it.
             Refused(0) if self.door => &[8, 9],
@@ -552,6 +554,7 @@ impl<S: Side> Model<S> {
         let ends = matches!(self.alarm, Alarm::Alarm | Alarm::Limit);
         let is = &[is][..];
         let wanted: &[u16] = match class {
+            Restores if self.pressed && line == "{defa:1}" && !self.door => is,
             Restores if self.door => &[0, 15, 106],
             // Its answer begins like the greeting.
             Restores => &[0, 15],

@@ -267,7 +267,7 @@ impl Request {
     fn gcode_done(&mut self, line: &[u8], machine: &mut impl Machine, out: &mut impl Out) -> Step {
         let is_beyond = self.status == Status::SoftLimit && command::jog(line).is_none();
         if is_beyond && machine.value(Value::Check) == 0 {
-            machine.alarm(Alarm::Alarm);
+            machine.alarm(Alarm::Alarm, Status::SoftLimit);
             text(out, text!("ALARM:2\r\n"));
             message(out, text!("Reset to continue"));
             return Step::Error(LOCKED);
@@ -455,7 +455,7 @@ fn home(at: u8, axis: u8, machine: &mut impl Machine) -> Step {
             return Step::Later(at + 1);
         }
         // After a failed homing the position is unknown.
-        machine.alarm(Alarm::Alarm);
+        machine.alarm(Alarm::Alarm, Status::HomingFailed);
         return Step::Error(LOCKED);
     }
     let axes = if axis == ALL { ALL } else { 1 << axis };
@@ -516,7 +516,7 @@ fn sleep(machine: &mut impl Machine, out: &mut impl Out) -> Step {
     if machine.value(Value::Check) != 0 {
         return Step::Error(BUSY);
     }
-    machine.alarm(Alarm::Alarm);
+    machine.alarm(Alarm::Alarm, Status::Alarmed);
     if machine.energize(None, false) != Status::Ok {
         return Step::Later(0);
     }
@@ -541,7 +541,7 @@ fn restore(at: u8, letter: u8, machine: &mut impl Machine, out: &mut impl Out) -
             message(out, text!("Restoring defaults"));
             Step::At(TOLD)
         }
-        SETTINGS => match machine.restore() {
+        SETTINGS => match machine.restore(letter == b'*') {
             Status::Ok => Step::Later(if letter == b'*' { ROWS } else { STORES }),
             status => Step::Error(error_number(status)),
         },

@@ -1,5 +1,6 @@
 //! The numbers of errors and alarms.
 
+use crate::capability::Capability;
 use crate::progmem;
 use crate::status::Status;
 
@@ -29,8 +30,21 @@ pub fn error_number(status: Status) -> u8 {
 pub fn alarm_number(status: Status) -> Option<u8> {
     Some(match status {
         Status::LimitHit => 1,
-        // Steps were stopped abruptly, or the machine has restarted unexpectedly.
-        Status::ShutDown | Status::Panicked | Status::HardReset => 3,
+        // The sender of another port hears of these.
+        Status::SoftLimit => 2,
+        // Steps were stopped abruptly, the machine has restarted unexpectedly, or another port has begun an alarm.
+        Status::ShutDown | Status::Panicked | Status::HardReset | Status::Alarmed => 3,
+        // Faults of heaters.
+        Status::SensorOpen
+        | Status::SensorShort
+        | Status::HeatRunaway
+        | Status::HeatTooSlow
+        | Status::TooHot
+        | Status::TooCold
+            if Capability::Printer.is_built_in() =>
+        {
+            3
+        }
         Status::ProbeFailed => 5,
         // A reset has interrupted homing.
         Status::Terminated => 6,

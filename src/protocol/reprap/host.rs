@@ -105,7 +105,7 @@ pub fn part(
             Step::Refused(Status::OutOfRange)
         }
         112 => {
-            machine.alarm(Alarm::Shutdown);
+            machine.alarm(Alarm::Shutdown, Status::ShutDown);
             Step::Failed(Status::ShutDown)
         }
         114 => listed(report::position(at, machine, out)),
@@ -438,7 +438,7 @@ fn restore(at: u8, machine: &mut impl Machine) -> Step {
         return Step::Later(0);
     }
     if at == 0 {
-        return match machine.restore() {
+        return match machine.restore(false) {
             Status::Ok => Step::Later(1),
             status => Step::Refused(status),
         };

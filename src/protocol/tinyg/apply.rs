@@ -246,7 +246,7 @@ fn act<M: Machine, O>(
         Operation::Block => return Err(Status::UnsupportedType),
         Operation::Clear => return done(c.machine.clear()),
         Operation::Raise(alarm) => {
-            c.machine.alarm(alarm);
+            c.machine.alarm(alarm, alarm.status());
             return Ok(());
         }
         Operation::Test if pair.kind == Kind::Null => return Ok(()),

@@ -23,7 +23,7 @@ impl Request {
             return self.advise(Remark::AskDefaults);
         }
         // The answer is the identity of the firmware, so nothing may have been written before.
-        let status = if self.begun { Status::NotAccepted } else { c.machine.restore() };
+        let status = if self.begun { Status::NotAccepted } else { c.machine.restore(false) };
         if status != Status::Ok {
             return Err(status);
         }

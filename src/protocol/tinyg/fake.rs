@@ -210,7 +210,7 @@ impl Machine for Fake {
         self.rest
     }
 
-    fn restore(&mut self) -> Status {
+    fn restore(&mut self, _offsets: bool) -> Status {
         if self.doing == Doing::Runs {
             return Status::NotAccepted;
         }
@@ -220,7 +220,7 @@ impl Machine for Fake {
         Status::Ok
     }
 
-    fn alarm(&mut self, _alarm: Alarm) {}
+    fn alarm(&mut self, _alarm: Alarm, _reason: Status) {}
 
     fn clear(&mut self) -> Status {
         Status::Ok

@@ -258,7 +258,8 @@ fn ran(links: &Links, port: &Port, id: LineId, block: Span, request: &mut Reques
         return true;
     }
     let lines = port.lines.borrow();
-    if let Class::Fault(status) = lines.class(id) {
+    let class = lines.class(id);
+    if let Class::Fault(status) = class {
         // The line has been dropped since its answer was begun.
         request.ran(status, false);
         return true;
@@ -266,7 +267,8 @@ fn ran(links: &Links, port: &Port, id: LineId, block: Span, request: &mut Reques
     if links.may_feed(port) && !is_free(links) {
         return false;
     }
-    let (status, commented) = run_block(links, port, block.of(lines.text(id)), false);
+    let late = class == Class::Late;
+    let (status, commented) = run_block(links, port, block.of(lines.text(id)), false, late);
     if status == Status::Again {
         return false;
     }

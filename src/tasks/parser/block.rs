@@ -72,16 +72,26 @@ pub(super) fn job_line(links: &Links) {
 }
 
 /// Interprets a block that has come on a port, or refuses it if that port does not feed the machine. Returns also
-/// whether the block may have a comment.
+/// whether the block may have a comment. A block that is `late` is treated as if the alarm were on in which it has come.
 #[inline(never)]
-pub fn run_block(links: &Links, port: &Port, block: &[u8], declined: bool) -> (Status, bool) {
+pub fn run_block(
+    links: &Links,
+    port: &Port,
+    block: &[u8],
+    declined: bool,
+    late: bool,
+) -> (Status, bool) {
+    // Senders of a dialect in order end an alarm by other means than the end of a program.
+    let locked = match port.speech.get().is_in_order() {
+        true => late || machine::is_alarmed(),
+        false => late && !is_program_end(block),
+    };
     match links.may_feed(port) {
+        true if locked => {
+            (if jog(block).is_some() { Status::NotAccepted } else { hold::locked() }, true)
+        }
         #[cfg(feature = "dialect-reprap")]
         true if port.is_plain() => interpret_rewritten(links, port, block),
-        // Senders of a dialect in order end an alarm by other means than the end of a program.
-        true if port.speech.get().is_in_order() && machine::is_alarmed() => {
-            (if jog(block).is_some() { Status::NotAccepted } else { hold::dropped() }, true)
-        }
         true => interpret(links, block, declined),
         false => (Status::Muted, true),
     }

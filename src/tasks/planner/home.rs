@@ -32,7 +32,7 @@ use super::square::Second;
 use crate::capability::Capability;
 use crate::gcode::command::{Feed, Motion};
 use crate::hal::inputs;
-use crate::machine::{self, Event};
+use crate::machine::Event;
 use crate::motion::block::QueuedAction;
 use crate::status::Status;
 use crate::tasks::homing::{self, Homing};
@@ -375,8 +375,8 @@ impl Planner {
         }
         if let Some(status) = failure {
             model.blame(at.axis);
-            // An alarm has already reported what ended the cycle, and a reset will be.
-            if !machine::is_alarmed() && !links.is_interrupted() {
+            // What ended the cycle in a flush is reported when the flush is over.
+            if !self.is_flushed() {
                 links.except(status);
             }
         }

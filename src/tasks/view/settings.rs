@@ -13,6 +13,8 @@ use crate::tasks::heat;
 use crate::tasks::links::Changes;
 use crate::tasks::setup::limit_velocity;
 use crate::tasks::spindle;
+use crate::tasks::storage::{TO_ALL, TO_MACHINE, TO_OFFSETS};
+use crate::tasks::switches;
 use crate::tasks::turning;
 
 /// Changes a setting, and tells all parts that go by it. Returns a warning if the change has side effects.
@@ -45,6 +47,10 @@ pub(super) fn set(view: &mut View<'_>, setting: Setting, value: i32) -> Result<W
         spindle::set(view.links.thread, setting, value);
         return Ok(Warning::None);
     }
+    let is_machine = setting.is_machine();
+    if is_machine {
+        may_replace(view)?;
+    }
     if setting.needs_rest() {
         if view.is_busy() {
             return Err(Status::NotAccepted);
@@ -59,7 +65,6 @@ pub(super) fn set(view: &mut View<'_>, setting: Setting, value: i32) -> Result<W
         view.links.rate.set(baud::rate(value));
     }
     view.settings.store(setting, value);
-    let is_machine = setting.is_machine();
     if is_machine {
         view.settings.take_over(value as u8);
     }
@@ -68,7 +73,7 @@ pub(super) fn set(view: &mut View<'_>, setting: Setting, value: i32) -> Result<W
     match is_machine {
         true => {
             view.links.storage.own();
-            view.links.storage.note_change(false);
+            view.links.storage.note_change(TO_MACHINE);
         }
         false => view.note(setting, lowered),
     }
@@ -82,12 +87,21 @@ pub(super) fn set(view: &mut View<'_>, setting: Setting, value: i32) -> Result<W
     })
 }
 
-/// Sets all settings to their defaults.
+/// Whether many settings may change at once. They may not while the emergency stop is hit, because its input may be off
+/// then.
+fn may_replace(view: &View<'_>) -> Result<(), Status> {
+    if switches::is_stopped(&view.settings) { Err(Status::ShutDown) } else { Ok(()) }
+}
+
+/// Sets all settings to their defaults. With `offsets`, the coordinate systems are stored as 0 with them.
 #[small]
 #[inline(always)]
-pub(super) fn restore(view: &mut View<'_>) -> Status {
+pub(super) fn restore(view: &mut View<'_>, offsets: bool) -> Status {
     if view.is_busy() {
         return Status::NotAccepted;
+    }
+    if let Err(status) = may_replace(view) {
+        return status;
     }
     let rate = view.settings.baud();
     view.settings.set_defaults();
@@ -96,12 +110,12 @@ pub(super) fn restore(view: &mut View<'_>) -> Status {
     }
     view.report.restore();
     view.links.changes.note(Changes::STEPS | Changes::SETTINGS);
-    view.links.storage.forget_cold();
+    view.links.storage.forget(offsets);
     drivers::recall(&mut view.settings, view.links.storage);
     spindle::set_all(view.links.thread, view.links.storage);
     heat::set_all(&view.links.heat, &mut view.settings, view.links.storage);
     view.links.storage.own();
-    view.links.storage.note_change(true);
+    view.links.storage.note_change(if offsets { TO_OFFSETS } else { TO_ALL });
     set_hardware(view.links.thread, &view.settings);
     view.links.set_flow(&view.settings);
     Status::Ok
