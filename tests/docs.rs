@@ -133,10 +133,10 @@ fn no_page_tells_what_is_no_longer_so() {
 
 /// Names in pages that belong to no setting or value: groups, requests, keys of answers, words of G-code, signals,
 /// commands.
-const OTHER: [&str; 34] = [
+const OTHER: [&str; 35] = [
     "p1", "sq", "sys", "sr", "srs", "ax", "err", "ok", "xmin", "xmax", "ymin", "ymax", "zmin",
     "zmax", "amin", "amax", "g10", "z0", "z12", "dir1", "step1", "steps", "load", "save", "grbl",
-    "jobs", "help", "er", "st", "msg", "sw", "lathe", "sd", "dr",
+    "jobs", "help", "er", "st", "msg", "sw", "lathe", "sd", "dr", "text",
 ];
 /// Pages that are generated from tables as a whole.
 const MADE: [&str; 2] = ["docs/gcode.md", "docs/settings.md"];

@@ -246,11 +246,6 @@ pub trait Machine {
         Err(Status::NotBuiltIn)
     }
 
-    /// Whether the port of the line that is answered gets the notices, too.
-    fn is_told(&self) -> bool {
-        true
-    }
-
     /// Returns the points of the bed; `None` in an image without
     /// [`Capability::BedPlane`](crate::capability::Capability).
     fn bed(&mut self) -> Option<&mut Bed> {

@@ -731,7 +731,7 @@ impl Planner {
                 links.changes.note(Changes::STEPS);
                 // An alarm has already reported what ended the cycle, and a reset will be.
                 if !machine::is_alarmed() && links.interrupter().is_none() {
-                    links.except(Status::HomingFailed);
+                    alarm::announce(links, Status::HomingFailed, alarm::NO_PORT);
                 }
             }
             Cycle::Probe => links.probe.abandon(),

@@ -91,18 +91,8 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
             }
             links.parser_wake.signal();
         }
-        while let Some((number, notice)) = asked(links) {
-            let port = links.port(number);
-            let opened = uart::sees_opening() && port.take_asked(OPENED);
-            tell(links, port, notice).await;
-            // In one turn: no line comes between the greeting and the start-up lines.
-            if greets_anew() && port.take_asked(GREETS) && !opened {
-                // If it may feed the machine, start-up lines are reported there.
-                links.may_feed(port);
-                start_up(links);
-            }
-        }
-        // All of them in one turn: a probing is reported after the alarm that it has raised.
+        // All of them in one turn: a probing is reported after the alarm that it has raised. Before greetings, behind
+        // which another port may get the reports.
         while let Some(status) = links.notices.exception.take() {
             let notice = Notice::Exception(status);
             tell(links, links.told(), notice).await;
@@ -112,6 +102,17 @@ pub async fn run(links: &'static Links, occasion: Occasion) -> ! {
             }
             if !Speech::HAS_QUESTION {
                 break;
+            }
+        }
+        while let Some((number, notice)) = asked(links) {
+            let port = links.port(number);
+            let opened = uart::sees_opening() && port.take_asked(OPENED);
+            tell(links, port, notice).await;
+            // In one turn: no line comes between the greeting and the start-up lines.
+            if greets_anew() && port.take_asked(GREETS) && !opened {
+                // If it may feed the machine, start-up lines are reported there.
+                links.may_feed(port);
+                start_up(links);
             }
         }
         if links.probe.take_news() {

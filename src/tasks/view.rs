@@ -539,11 +539,6 @@ impl Machine for View<'_> {
     }
 
     #[cfg(feature = "dialect-reprap")]
-    fn is_told(&self) -> bool {
-        self.port.number == self.links.told().number
-    }
-
-    #[cfg(feature = "dialect-reprap")]
     fn lend(&mut self, on: bool) {
         self.links.storage.lend(on);
     }

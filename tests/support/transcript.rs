@@ -421,7 +421,8 @@ impl<S: Side> Player<'_, S> {
 
     fn may_come(&self, port: usize, line: &str) -> bool {
         let line = line.trim_start_matches('\r');
-        if port == 1 && matches(GREETING, line) {
+        // The second port hears of each alarm, whatever the first does.
+        if port == 1 && (matches(GREETING, line) || line.starts_with("{\"er\":")) {
             return true;
         }
         // Where no dialect is settled yet, each kind of sender gets its own greeting.

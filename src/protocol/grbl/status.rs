@@ -196,6 +196,7 @@ mod unit {
         assert_eq!(error_number(Status::GcodeUnsupported), 20);
         assert_eq!(error_number(Status::ProbeTooShort), 33);
         assert_eq!(alarm_number(Status::LimitHit), Some(1));
-        assert_eq!(alarm_number(Status::Alarmed), None);
+        assert_eq!(alarm_number(Status::Alarmed), Some(3));
+        assert_eq!(alarm_number(Status::NotHomed), None);
     }
 }

@@ -2,7 +2,7 @@
 
 use super::command::{has, value, words};
 use super::write::{cold, fixed, int, line_end, text};
-use super::{bed, card, names, report, settings, status, tuning};
+use super::{bed, card, names, report, settings, tuning};
 use crate::capability::Capability;
 use crate::config::Fixed;
 use crate::gcode::overrides::{Change, Override};
@@ -31,8 +31,6 @@ pub enum Step {
     Gcode,
     /// The code is refused.
     Refused(Status),
-    /// The code has failed. That is told besides, so here only if it has not been told yet.
-    Failed(Status),
 }
 
 /// The most bytes of a text that a step writes.
@@ -105,8 +103,9 @@ pub fn part(
             Step::Refused(Status::OutOfRange)
         }
         112 => {
+            // Each port is told of the alarm, this one too.
             machine.alarm(Alarm::Shutdown, Status::ShutDown);
-            Step::Failed(Status::ShutDown)
+            Step::Done
         }
         114 => listed(report::position(at, machine, out)),
         115 => listed(report::identity(at, out)),
@@ -261,7 +260,7 @@ fn home(at: u8, number: u16, block: &[u8], machine: &mut impl Machine) -> Step {
         }
         return match machine.home(axes, false) {
             Status::Ok => {
-                status::forget(Status::HomingFailed, machine);
+                machine.memory().reprap.homes = true;
                 Step::Later(HOMES)
             }
             status => Step::Refused(status),
@@ -273,7 +272,11 @@ fn home(at: u8, number: u16, block: &[u8], machine: &mut impl Machine) -> Step {
         homed |= u8::from(machine.value(Value::Homed(axis)) != 0) << axis;
     }
     machine.clear_shift(homed);
-    if homed == 0 { Step::Failed(Status::HomingFailed) } else { Step::Done }
+    if homed == 0 {
+        return Step::Refused(Status::HomingFailed);
+    }
+    machine.memory().reprap.homes = false;
+    Step::Done
 }
 
 /// M84, M18: turns off the named motors, or all, once the machine rests. With S nothing is turned off: S is the time

@@ -70,14 +70,20 @@ pub struct Retraction {
     retracted: bool,
     /// M155 S: seconds from one report of temperatures to the next; 0 for none.
     interval_s: u8,
-    /// Failures that a line is answered with and that are told besides, as bits: one of the two messages has been
-    /// sent ([`status::is_second`]).
-    told: u8,
+    /// Whether a line that homes is to be answered with a failure, of which the port is told as well.
+    homes: bool,
 }
 
 impl Remembers for Retraction {
     fn new() -> Self {
-        Self { length: 20_000, extra: 0, feed: 2_100, retracted: false, interval_s: 0, told: 0 }
+        Self {
+            length: 20_000,
+            extra: 0,
+            feed: 2_100,
+            retracted: false,
+            interval_s: 0,
+            homes: false,
+        }
     }
 
     fn restore(&mut self) {

@@ -7,7 +7,7 @@
 use super::command;
 use super::frame::{Fault, Frame, Session, Sum};
 use super::host::{self, Code, Step};
-use super::status::{is_passed_over, is_second, is_unknown, reason};
+use super::status::{is_passed_over, is_unknown, reason};
 use super::translate;
 use super::write::{cold, int, line_end, text};
 use crate::progmem::Text;
@@ -188,10 +188,6 @@ impl Answers for Request {
                 Step::Gcode => (self.what, self.at) = (What::Gcode, 0),
                 Step::Answered => return Next::Done(Status::Ok),
                 Step::Refused(status) => (self.what, self.at) = (What::Refused(status), 0),
-                Step::Failed(status) if machine.is_told() && is_second(status, machine) => {
-                    self.what = What::Nothing;
-                }
-                Step::Failed(status) => (self.what, self.at) = (What::Refused(status), 0),
             },
             What::Resend(fault, last) => {
                 self.begun = true;

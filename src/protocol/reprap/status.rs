@@ -1,49 +1,9 @@
 //! Texts for people: why a line was refused.
 
 use super::command;
-use crate::machine::Doing;
 use crate::progmem::Text;
-use crate::protocol::Machine;
 use crate::status::Status;
 use crate::text;
-
-/// The bits of failures that a line is answered with and that are told besides: M112, and G28.
-const STOPPED: u8 = 1;
-const NOT_HOMED: u8 = 2;
-
-/// Returns the bit of a failure, if it is told twice.
-#[small]
-fn bit(status: Status) -> u8 {
-    match status {
-        Status::ShutDown => STOPPED,
-        _ if status.names_axis() => NOT_HOMED,
-        _ => 0,
-    }
-}
-
-/// Whether a failure has been told already, by the answer of its line or by a notice, which come in any order. Called
-/// when one of the two is to be sent.
-#[inline(never)]
-#[small]
-pub fn is_second(status: Status, machine: &mut impl Machine) -> bool {
-    let (bit, told) = (bit(status), &mut machine.memory().reprap.told);
-    *told ^= bit;
-    bit != 0 && *told & bit == 0
-}
-
-/// Notes that a failure has not been told.
-#[small]
-pub fn forget(status: Status, machine: &mut impl Machine) {
-    machine.memory().reprap.told &= !bit(status);
-}
-
-/// Forgets that a stop has been told, once its alarm has ended.
-#[small]
-pub fn see_alarm_end(machine: &mut impl Machine) {
-    if !matches!(machine.doing(), Doing::Alarm(_)) {
-        forget(Status::ShutDown, machine);
-    }
-}
 
 /// Whether the status means that a block is unknown. A move that cannot be read is not: it is an error. Nor is the
 /// value of a setting.

@@ -1,6 +1,6 @@
 //! Sends a notice: the greeting, exceptions, temperatures, and that a line takes long.
 
-use super::status::{is_second, reason, see_alarm_end};
+use super::status::reason;
 use super::write::{line_end, text};
 use super::{report, tuning};
 use crate::capability::Capability;
@@ -34,15 +34,17 @@ impl Telling {
                 machine.memory().reprap.retracted = false;
                 Self::Greeting
             }
-            Notice::Exception(status) if is_second(status, machine) => Self::Nothing,
+            // The answer of the line that homes tells it.
+            Notice::Exception(status)
+                if status.names_axis() && core::mem::take(&mut machine.memory().reprap.homes) =>
+            {
+                Self::Nothing
+            }
             Notice::Exception(status) => Self::Exception(status),
             Notice::Busy => Self::Busy,
             Notice::Temperatures => Self::Temperatures(0),
             Notice::Tuning => Self::Tuning(0),
-            _ => {
-                see_alarm_end(machine);
-                Self::Nothing
-            }
+            _ => Self::Nothing,
         }
     }
 }

@@ -35,6 +35,7 @@ use crate::hal::inputs;
 use crate::machine::Event;
 use crate::motion::block::QueuedAction;
 use crate::status::Status;
+use crate::tasks::alarm;
 use crate::tasks::homing::{self, Homing};
 use crate::tasks::overrides;
 use crate::units::Length;
@@ -377,7 +378,7 @@ impl Planner {
             model.blame(at.axis);
             // What ended the cycle in a flush is reported when the flush is over.
             if !self.is_flushed() {
-                links.except(status);
+                alarm::announce(links, status, alarm::NO_PORT);
             }
         }
         drop(model);
