@@ -287,6 +287,7 @@ impl Answers for Request {
     fn step(&mut self, line: &[u8], machine: &mut impl Machine, out: &mut impl Out) -> Next {
         // Within a `txt` the line ends before the closing quote of that string.
         let end = match self.resume {
+            _ if !Capability::Text.is_built_in() => line.len(),
             0 => line.len(),
             resume => usize::from(resume - 1),
         };

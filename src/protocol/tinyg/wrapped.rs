@@ -36,14 +36,12 @@ impl Request {
         pair: &Pair,
         c: &mut Context<'_, M, O>,
     ) -> Result<(), Status> {
+        Capability::Text.check()?;
         let text = pair.value.of(c.line);
         let blanks = text.iter().take_while(|byte| matches!(byte, b' ' | b'\t')).count() as u8;
         let start = pair.value.start + blanks;
         match c.line.get(usize::from(start)) {
             Some(b'{') => return Err(Status::TextNested),
-            _ if !Capability::Text.is_built_in() && help::is_text_command(text) => {
-                return Err(Status::NotBuiltIn);
-            }
             Some(b'$') => {
                 self.at = start + 1;
                 self.phase = Phase::Command;
@@ -79,7 +77,7 @@ impl Request {
 
     /// Reports an empty `txt` after the block in a `txt` has run.
     pub(super) fn unwrap_block<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
-        if core::mem::take(&mut self.resume) != 0 {
+        if Capability::Text.is_built_in() && core::mem::take(&mut self.resume) != 0 {
             let mut writer = Writer::body(c.out, &mut self.format);
             writer.key_text(text!("txt"));
             writer.text(text!("\"\""));

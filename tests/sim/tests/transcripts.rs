@@ -34,8 +34,8 @@ const BOTH: [&str; 2] = ["grbl-thread", "grbl-lathe"];
 #[test]
 fn the_image_keeps_to_the_transcripts() {
     let mut all = transcript::read_all(Path::new("../../transcripts"));
-    // No image for this chip has drivers with UART, built-in jobs, or both printing hosts and a second port or TinyG's
-    // dialect. The emulated `skr-pico` has them.
+    // No image for this chip has drivers with UART, built-in jobs, help screens, or both printing hosts and a second
+    // port or TinyG's dialect. The emulated `skr-pico` has them.
     let elsewhere =
         ["actions", "corexy", "drivers", "heat", "job", "program.", "program-over", "reprap-ports"];
     all.retain(|one| !elsewhere.iter().any(|name| one.name.starts_with(name)));
