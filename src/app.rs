@@ -45,7 +45,8 @@ const LINES_AUX: usize = LINE_BYTES[1];
 const _: () = assert!(LINES_AUX >= 80 + AUX_RESERVE as usize);
 
 impl Links {
-    fn new(thread: Thread, ports: [Port; PORTS], storage: &'static Storage) -> Self {
+    fn new(thread: Thread, ports: [Port; PORTS], earlier: Earlier) -> Self {
+        let storage = earlier.storage;
         Self {
             thread,
             ports,
@@ -67,7 +68,7 @@ impl Links {
             cleared_by: Cell::new(USB),
             heat: Heaters::new(),
             #[cfg(feature = "sd")]
-            card: place_card(),
+            card: earlier.card,
             probe: Probe::default(),
             signs: Signs::default(),
             job: Cell::default(),
@@ -83,9 +84,27 @@ impl Links {
 /// Creates the links in their static place. Not inlined, so that its stack space is free again when it returns.
 #[inline(never)]
 #[small]
-fn place(thread: Thread, ports: [Port; PORTS]) -> &'static Links {
-    let storage: &'static Storage = place!(Storage, Storage::new(Log::open(&Eeprom::take())));
-    place!(Links, Links::new(thread, ports, storage))
+fn place(thread: Thread, ports: [Port; PORTS], earlier: Earlier) -> &'static Links {
+    place!(Links, Links::new(thread, ports, earlier))
+}
+
+/// What is created before the links, so that the stack holds only one of them at a time.
+struct Earlier {
+    storage: &'static Storage,
+    #[cfg(feature = "sd")]
+    card: &'static RefCell<crate::card::Card>,
+}
+
+impl Earlier {
+    #[inline(never)]
+    #[small]
+    fn place() -> Self {
+        Self {
+            storage: place!(Storage, Storage::new(Log::open(&Eeprom::take()))),
+            #[cfg(feature = "sd")]
+            card: place_card(),
+        }
+    }
 }
 
 /// Creates the card in its static place. Not inlined, because it takes much of the stack.
@@ -181,6 +200,7 @@ impl crate::hal::imp::Machine {
 #[inline(never)]
 #[small]
 fn connect(thread: Thread, rate: u32) -> Option<(&'static Links, Received, Option<Received>)> {
+    let earlier = Earlier::place();
     let AllEnds { usb: (received, outgoing), aux } = uart::start(rate)?;
     let mut ports = Vec::<Port, PORTS>::new();
     ports
@@ -194,7 +214,7 @@ fn connect(thread: Thread, rate: u32) -> Option<(&'static Links, Received, Optio
         }
         _ => None,
     };
-    Some((place(thread, ports.into_array().ok()?), received, aux))
+    Some((place(thread, ports.into_array().ok()?, earlier), received, aux))
 }
 
 /// Sets all settings to their defaults, then loads those that EEPROM holds. Returns `Occasion::Defaults` if the log in

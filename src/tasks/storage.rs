@@ -141,7 +141,8 @@ impl Storage {
         }
         let offsets = change.is_of_offsets();
         if change.is_of_all() {
-            self.forget(offsets);
+            // The task has not begun, so nothing has to be woken.
+            self.set_forgotten(offsets);
         }
         self.grow(
             0,
@@ -206,8 +207,17 @@ impl Storage {
         self.lent.put_row(None);
     }
 
+    /// Whether a row has other values in RAM than in EEPROM. Neither this nor [`Self::newer`] is inlined, because the
+    /// deepest stack goes through their callers.
+    #[inline(never)]
+    fn is_newer(&self, row: TableRow) -> bool {
+        (row == LENT && self.lent.row().is_some())
+            || self.edit.get().is_some_and(|edit| edit.row == row)
+            || self.is_forgotten(row)
+    }
+
     /// Returns the values that a row has in RAM: because it is lent, or because it is being saved.
-    #[inline(always)]
+    #[inline(never)]
     fn newer(&self, row: TableRow) -> Option<PerAxis<Length>> {
         if let Some(values) = self.lent.row().filter(|_| row == LENT) {
             return Some(values);
@@ -269,9 +279,13 @@ impl Storage {
 
     /// Gives all settings in EEPROM alone their defaults from now on, and with `offsets` the coordinate systems.
     pub fn forget(&self, offsets: bool) {
+        self.set_forgotten(offsets);
+        self.wake.signal();
+    }
+
+    fn set_forgotten(&self, offsets: bool) {
         self.cold.set(None);
         self.forgotten.set(if offsets { OFFSETS } else { Setting::WARM });
-        self.wake.signal();
     }
 
     /// Returns the next setting in EEPROM alone that is to be saved.
@@ -339,9 +353,9 @@ impl Storage {
 impl Tables for &Storage {
     #[inline(never)]
     fn row(&self, row: TableRow) -> PerAxis<Length> {
-        match self.newer(row) {
-            Some(values) => values,
-            None => tables::row(&self.log.get(), &Eeprom::take(), row),
+        match self.is_newer(row) {
+            true => self.newer(row).unwrap_or_default(),
+            false => tables::row(&self.log.get(), &Eeprom::take(), row),
         }
     }
 

@@ -8,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use check::Question;
-use kerf::boards::MEGA2560_GRBL;
+use kerf::boards::RAMPS14_CNC;
 use kerf_sim::job::{self, Options};
 use kerf_sim::report::Report;
 
@@ -18,7 +18,7 @@ use crate::common::firmware;
 const ROUTER: [&str; 2] = ["{mch:1}", "{gc:\"g28.3x0y0z0\"}"];
 
 fn run(path: &Path) -> Report {
-    let mut machine = firmware(&MEGA2560_GRBL);
+    let mut machine = firmware(&RAMPS14_CNC);
     let lines = job::read_lines(path).unwrap();
     let options = Options { settings: ROUTER.map(String::from).to_vec(), ..Options::default() };
     job::run(&mut machine, &lines, &options, |_| {}).unwrap()

@@ -167,7 +167,7 @@ fn a_card_is_listed_printed_and_told() {
         let place = printer.ask("M114");
         assert!(place.contains("X:60.000 Y:0.000") && place.contains("E:3.00"), "{place}");
         assert_eq!(printer.ask("M27"), "Not SD printing\n");
-        assert!(printer.ask("M23 none.gco").contains("cannot be read"));
+        assert!(printer.ask("M23 none.gco").contains("open failed, File: none.gco."));
         assert_eq!(printer.ask("M30 /ALONGN~1.GCO"), "File deleted:ALONGN~1.GCO\n");
         let names = names(printer.machine.card().unwrap().image());
         assert!(!names.contains(&"a long name.gcode".to_owned()), "{names:?}");
