@@ -9,7 +9,8 @@
 //! | [`shrink`] | makes the image smaller before it is linked |
 //! | [`elf`] | examines an image: sizes, stack, defects |
 //! | [`size`], [`caps`] | prints and limits what an image takes |
-//! | [`rp2040`] | boards with another chip: images, UF2, the emulator |
+//! | [`rp2040`] | boards with another chip: images, UF2 |
+//! | [`emulator`] | installs emulated chips: the RP2040, and AVR on its second simulator |
 //! | [`dist`] | writes the files of a release |
 //! | [`sim`] | runs the image on the simulated board |
 //! | [`settings`] | saves and loads the settings of a machine |
@@ -32,6 +33,7 @@ mod dist;
 #[cfg(test)]
 mod docs;
 mod elf;
+mod emulator;
 mod firmware;
 mod fuzz;
 mod jobs;

@@ -8,10 +8,10 @@ use anyhow::{Context, Result, ensure};
 use clap::Args;
 
 use crate::boards::Board;
+use crate::emulator;
 use crate::firmware;
 use crate::machines::Machine;
 use crate::process::{become_program, host_cargo, pass_through, root, run as run_child};
-use crate::rp2040::emulator;
 use crate::setup::{self, Scope};
 
 /// `cargo xtask sim`
@@ -127,7 +127,7 @@ pub fn bench(args: &BenchArgs) -> Result<ExitCode> {
 pub fn prepare(board: Board, machine: Machine) -> Result<PathBuf> {
     if board.is_rp2040() {
         setup::ensure(Scope::Emulator)?;
-        emulator::install()?;
+        emulator::RP2040.install()?;
     } else {
         setup::ensure(Scope::Simulator)?;
     }

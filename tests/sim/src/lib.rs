@@ -32,6 +32,7 @@ mod pulses;
 mod recorder;
 pub mod report;
 mod runs;
+pub mod second;
 mod speech;
 pub mod spi;
 mod stopwatch;

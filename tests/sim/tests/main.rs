@@ -75,6 +75,7 @@ mod random_jobs;
 mod rates;
 mod realtime;
 mod run;
+mod second;
 mod serial;
 mod serve;
 mod spindle;

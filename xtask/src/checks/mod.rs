@@ -13,10 +13,10 @@ use beside::Beside;
 use crate::boards::Board;
 use crate::caps;
 use crate::elf;
+use crate::emulator;
 use crate::firmware;
 use crate::machines::Machine;
 use crate::process::{host_cargo, probe, root, run as run_child, which};
-use crate::rp2040::emulator;
 use crate::senders;
 use crate::setup::{self, Scope};
 use crate::sim;
@@ -43,7 +43,8 @@ const WITH_IMAGES: &[Stage] = &[
     Stage { name: "an image without capabilities", run: without_capabilities },
     Stage { name: "what the profile of a machine adds", run: profile },
     Stage { name: "sizes and stack of every board", run: size_all },
-    Stage { name: "the emulator of the RP2040", run: emulator::test },
+    Stage { name: "the emulator of the RP2040", run: || emulator::RP2040.test() },
+    Stage { name: "the second simulator of AVR", run: || emulator::AVR.test() },
     Stage { name: "simulated and emulated boards", run: simulator_tests },
 ];
 
@@ -168,8 +169,8 @@ fn build_simulator_tests() -> Result<()> {
     run_child(tests(&BOARD_TARGETS).arg("--no-run"))
 }
 
-/// Runs the tests on boards, including those on the emulated chip, which are ignored by default because they need the
-/// emulator.
+/// Runs the tests on boards, including those on the emulated chip and on the second simulator of AVR, which are ignored
+/// by default because they need these programs.
 fn simulator_tests() -> Result<()> {
     run_child(tests(&BOARD_TARGETS).args(["--", "--include-ignored"]))
 }

@@ -1,6 +1,5 @@
-//! Boards with an RP2040: builds their images, converts them for the chip's boot loader, and installs the emulator.
+//! Boards with an RP2040: builds their images, and converts them for the chip's boot loader.
 
-pub mod emulator;
 pub mod uf2;
 
 use std::path::{Path, PathBuf};

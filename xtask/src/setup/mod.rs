@@ -9,6 +9,7 @@ mod wasm;
 
 use anyhow::{Result, bail};
 
+use crate::emulator;
 use crate::toolchain::Toolchain;
 use install::{Means, Step};
 use needs::Need;
@@ -40,9 +41,12 @@ fn ensure_programs(scope: Scope) -> Result<()> {
     Ok(())
 }
 
-/// `cargo xtask setup`: makes sure that the tools are there, and prints which ones are used.
+/// `cargo xtask setup`: makes sure that the tools are there, emulators of chips among them, and prints which ones are
+/// used.
 pub fn report() -> Result<()> {
     ensure(Scope::Everything)?;
+    emulator::RP2040.install()?;
+    emulator::AVR.install()?;
     if let Some(rust) = Toolchain::find() {
         println!("AVR builds: {} in {}", rust.name, rust.bin.display());
     }

@@ -6,7 +6,7 @@
 
 pub mod even;
 pub mod job;
-mod process;
+pub(crate) mod process;
 
 use std::path::{Path, PathBuf};
 
@@ -231,7 +231,7 @@ impl Emulated {
             bail!("the emulator fails: {fault}");
         }
         for (line, hex) in self.answer.heard.iter().enumerate().take(LINES) {
-            self.heard[line].extend(bytes(hex));
+            self.heard[line].extend(unpacked(hex));
         }
         Ok(())
     }
@@ -243,8 +243,7 @@ impl Emulated {
 
     /// Puts bytes on the line of a port.
     pub fn send_to(&mut self, port: usize, bytes: &[u8]) {
-        let hex = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
-        self.request.send.push((line(self.board, port), hex));
+        self.request.send.push((line(self.board, port), packed(bytes)));
     }
 
     /// Takes the bytes that the board has sent on a port.
@@ -431,8 +430,13 @@ impl Runs for Emulated {
     }
 }
 
+/// Encodes bytes as hexadecimal digits.
+pub(crate) fn packed(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
 /// Decodes hexadecimal digits to bytes.
-fn bytes(hex: &str) -> Vec<u8> {
+pub(crate) fn unpacked(hex: &str) -> Vec<u8> {
     let digits = |at: usize| u8::from_str_radix(hex.get(at..at + 2)?, 16).ok();
     (0..hex.len()).step_by(2).filter_map(digits).collect()
 }
@@ -443,8 +447,8 @@ mod tests {
 
     #[test]
     fn bytes_are_read() {
-        assert_eq!(bytes("00ff7b0a"), [0, 0xFF, 0x7B, 0x0A]);
-        assert_eq!(bytes(""), [0; 0]);
+        assert_eq!(unpacked("00ff7b0a"), [0, 0xFF, 0x7B, 0x0A]);
+        assert_eq!(unpacked(""), [0; 0]);
     }
 
     #[test]
