@@ -10,13 +10,13 @@ use crate::progmem;
 pub const DEFAULT: u32 = 115_200;
 /// The lowest and the highest rate that may be asked for by value.
 const LIMITS: core::ops::RangeInclusive<u32> = 9_600..=1_000_000;
-/// The clock has to produce a rate to 1 in 40, or 2.5 %. The sender adds its own error, and a receiver tolerates a
-/// difference of 4.5 % between the two.
+/// The clock has to produce a rate to 1 in 40, or 2.5 %. The sender adds its own error, and the receiver at double speed
+/// tolerates a sender that is up to 3.9 % faster or 4.0 % slower.
 const NEARNESS: u32 = 40;
 
 progmem! {
-    /// The rates of the codes 1 to 6. All six are accepted, although the clock produces 230,400 with an error of 3.5 %:
-    /// senders offer this rate, and it works with a sender whose own rate is exact.
+    /// The rates of the codes 1 to 6. All six are accepted, although the clock produces 230,400 with an error of 3.5 %, so
+    /// that the sender is 3.7 % faster: senders offer this rate. A sender whose own rate is more than 0.2 % high may fail.
     static CODES: [u32; 6] = [9_600, 19_200, 38_400, 57_600, 115_200, 230_400];
 }
 

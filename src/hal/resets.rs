@@ -12,7 +12,7 @@
 //! | watchdog | another | 3 |
 //! | external or nothing | starved | 3 |
 //! | external | another | 1 |
-//! | nothing, the loader has cleared them | running | 1: most likely a reset by the button or the port |
+//! | nothing, the loader has cleared them | running | 1: the button, the port, a brown-out, or a hang with interrupts off |
 //! | nothing | none | 0 |
 
 /// Why the machine has started. The numbers are those of `{rst:n}`.

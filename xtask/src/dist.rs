@@ -3,7 +3,7 @@
 //! For each board there is a `.hex` that avrdude takes, or the `.uf2` of a boot loader, made from the image that the
 //! tests run. Further files are the settings as a JSON schema, the licences, and checksums of all files.
 
-mod hex;
+pub mod hex;
 mod sha256;
 
 use std::fs;

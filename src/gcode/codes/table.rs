@@ -66,9 +66,10 @@ crate::progmem! {
     pub static G: [Code; G_ROWS] = G_TABLE;
     /// The M codes, by number.
     pub static M: [Code; M_ROWS] = M_TABLE;
-    /// For each whole number up to [`DENSE`], the first row of a G code of that number or a greater one.
+    /// For each whole number up to [`DENSE`], where the search for a G code of that number begins: its first row, or that
+    /// of the next code, or the row before: see [`starts`].
     pub static G_START: [u8; STARTS] = starts(&G_TABLE);
-    /// For each whole number up to [`DENSE`], the first row of an M code of that number or a greater one.
+    /// The same for the M codes.
     pub static M_START: [u8; STARTS] = starts(&M_TABLE);
     /// The words that the code of each motion mode takes.
     pub static MOTION: [u32; MotionMode::COUNT] = motions();
@@ -190,6 +191,11 @@ const fn heat(number: u16, code: HeatCode, takes: u32) -> Code {
     with(number, Action::NonModal(NonModal::Heat(code)), takes)
 }
 
+/// Boot loaders of 2011 take three of this byte, `!`, in a row in an image for a command, and cannot flash the image.
+const MARK: u8 = b'!';
+
+/// Returns where the search for each whole number begins. Where that would make three times [`MARK`] in a row, the third
+/// search begins one row earlier, which takes a little longer and finds the same.
 const fn starts<const N: usize>(rows: &[Code; N]) -> [u8; STARTS] {
     assert!(N <= u8::MAX as usize, "more rows than a byte can count: make the starts `u16`");
     let mut starts = [0; STARTS];
@@ -199,7 +205,11 @@ const fn starts<const N: usize>(rows: &[Code; N]) -> [u8; STARTS] {
         while row < N && rows[row].number < 10 * whole {
             row += 1;
         }
-        starts[whole as usize] = row as u8;
+        let at = whole as usize;
+        starts[at] = row as u8;
+        if at >= 2 && starts[at] == MARK && starts[at - 1] == MARK && starts[at - 2] == MARK {
+            starts[at] -= 1;
+        }
         whole += 1;
     }
     starts

@@ -62,6 +62,7 @@ pub(super) const fn item<T: Copy>(list: &[T], i: usize) -> Option<T> {
 /// Makes the board's output pins outputs: steps low, drivers off, hazards off, senders not held back, no bus driven.
 /// The level that switches the spindle off is not known yet, so its enable pin is not driven before [`set_low`].
 pub fn start() {
+    free_debug_pins();
     each_motor!(M => {
         low(ACTIVE.motors[M].step);
         output(ACTIVE.motors[M].step);
@@ -98,6 +99,14 @@ pub fn start() {
     if let Some(select) = ACTIVE.card {
         high(select);
         output(select);
+    }
+}
+
+/// Takes the pins F4 to F7 from JTAG, which a fuse may have switched on.
+fn free_debug_pins() {
+    // SAFETY: start-up, with interrupts off. JTD of MCUCR must be set twice within four cycles (data sheet, 28.3).
+    unsafe {
+        core::arch::asm!("out 0x35, {jtd}", "out 0x35, {jtd}", jtd = in(reg_upper) 0x80u8, options(nostack));
     }
 }
 

@@ -66,25 +66,38 @@ pub fn reset() -> ! {
 /// Starts the boot loader, if the board has one; else restarts the firmware.
 ///
 /// This is a jump, not a reset: after a reset by the watchdog the loaders of common boards start the firmware at once.
-/// The state that a loader reads is that after a reset by the button: no reset cause is set, interrupts are off, timers
-/// are stopped. Outputs are off as after a panic. The loader is in the last 8 KiB of flash, as the fuses of these
-/// boards select.
+/// The loader finds the chip as after a reset by the button: interrupts are off and all registers of peripherals have
+/// their values after a reset, so no interrupt comes when the loader allows them, and all pins float. No reset cause is
+/// set. The loader is in the last 8 KiB of flash, as the fuses of these boards select.
 pub fn boot() -> ! {
     avr_device::interrupt::disable();
     if !has_boot_loader() {
         reset();
     }
-    panic::make_safe();
     watchdog::off();
-    // SAFETY: nothing of the firmware runs after this; the loader sets up its own stack.
+    // SAFETY: nothing of the firmware runs after this; the loader sets up its own stack. The loop stores 0 to each
+    // register from 0x20 to 0x136, the stack pointer included, except OSCCAL (0x66), which a reset does not zero. It
+    // goes upwards: each USART and the SPI are off before 0 gets into their data registers. UCSR0C is 6 after a reset.
     unsafe {
-        uart::stop();
         core::arch::asm!(
+            "clr  r1",
             "ldi  r24, 1",
+            "ldi  r30, 0x20",
+            "clr  r31",
+            "1:",
+            "cpi  r30, 0x66",
+            "breq 2f",
+            "st   Z, r1",
+            "2:",
+            "adiw r30, 1",
+            "cpi  r30, 0x37",
+            "cpc  r31, r24",
+            "brne 1b",
+            "ldi  r30, 6",
+            "sts  0xC2, r30",
             "out  0x3C, r24",
             "ldi  r30, 0x00",
             "ldi  r31, 0xF0",
-            "clr  r1",
             "eijmp",
             options(noreturn),
         );

@@ -413,17 +413,6 @@ pub fn last_cut(port: u8) -> Option<u8> {
     last_mark(&ring)
 }
 
-/// Switches the ports off for good, so that the boot loader can use them.
-///
-/// # Safety
-/// Interrupts are off, and stay so.
-pub unsafe fn stop() {
-    for port in 0..PORTS as u8 {
-        // SAFETY: the caller's.
-        unsafe { register(port, 1).write_volatile(0) };
-    }
-}
-
 /// Whether a `!` has come, on any port, that has not been taken yet. Any level.
 #[inline(always)]
 pub fn asks_hold() -> bool {

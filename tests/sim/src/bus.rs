@@ -9,6 +9,7 @@ use simavr_ffi as ffi;
 use crate::chip::{Chip, MAX_VECTORS};
 use crate::cpu::Cpu;
 use crate::eeprom::Eeprom;
+use crate::flash::{Flash, SPMCSR};
 use crate::mechanics::Mechanics;
 use crate::pins::PinInterrupts;
 use crate::recorder::{Recorder, Sums};
@@ -26,6 +27,7 @@ enum Owner {
     Eeprom,
     Pins,
     Spi,
+    Flash,
 }
 
 /// First address after the I/O registers.
@@ -41,6 +43,8 @@ pub struct Bus {
     step_timer: Option<usize>,
     pub(crate) uarts: Vec<Uart>,
     pub(crate) eeprom: Eeprom,
+    /// Self-programming, on a machine with a boot loader.
+    flash: Option<Box<FlashPort>>,
     /// The serial lines of the board's ports, each with the index of the USART that it leads to.
     pub(crate) wires: Vec<(usize, Wire)>,
     pins: PinInterrupts,
@@ -83,6 +87,7 @@ impl Bus {
             step_timer,
             uarts: chip.usarts.iter().copied().map(Uart::new).collect(),
             eeprom: Eeprom::new(),
+            flash: None,
             wires,
             pins: PinInterrupts::new(&chip.pins),
             spi: Spi::new(),
@@ -114,11 +119,31 @@ impl Bus {
         bus
     }
 
+    /// Lets programs change the flash, as silicon does it. Called once, before the first instruction.
+    pub fn allow_programming(&mut self) {
+        let bus: *mut Bus = self;
+        // SAFETY: numbers and null pointers, for which 0 is a value.
+        let mut io: ffi::avr_io_t = unsafe { std::mem::zeroed() };
+        io.ioctl = Some(flash_access);
+        let port = self.flash.insert(Box::new(FlashPort { io, bus, state: Flash::new() }));
+        self.cpu.take_over_flash(&raw mut port.io);
+        self.owners[usize::from(SPMCSR)] = Owner::Flash;
+        self.cpu.hook(SPMCSR, Some(io_read), Some(io_write), bus.cast());
+    }
+
+    /// Self-programming, on a machine with a boot loader.
+    pub fn flash(&mut self) -> Option<&mut Flash> {
+        self.flash.as_mut().map(|flash| &mut flash.state)
+    }
+
     /// Puts all peripherals into their state after a reset; the world outside keeps its state.
     pub fn reset(&mut self) {
         self.timers = self.chip.timers.iter().map(Timer::new).collect();
         self.uarts = self.chip.usarts.iter().copied().map(Uart::new).collect();
         self.eeprom.reset();
+        if let Some(flash) = &mut self.flash {
+            flash.state.reset();
+        }
         self.spi.reset();
         self.pins = PinInterrupts::new(&self.chip.pins);
         self.recorder.pins_released();
@@ -150,6 +175,9 @@ impl Bus {
             if self.eeprom.due() <= now {
                 self.eeprom.advance(now);
                 self.update_eeprom(now);
+            }
+            if let Some(flash) = &mut self.flash {
+                flash.state.advance(now);
             }
             for (usart, wire) in &mut self.wires {
                 wire.listen(&mut self.uarts[*usart]);
@@ -219,7 +247,8 @@ impl Bus {
         let uarts = self.uarts.iter().map(Uart::due);
         let wires = self.wires.iter().map(|(_, wire)| wire.due());
         let mechanics = self.mechanics.as_ref().map_or(u64::MAX, |m| m.due());
-        let others = [self.eeprom.due(), mechanics, self.heat_due];
+        let flash = self.flash.as_ref().map_or(u64::MAX, |flash| flash.state.due());
+        let others = [self.eeprom.due(), flash, mechanics, self.heat_due];
         self.due = timers.chain(uarts).chain(wires).chain(others).min().unwrap_or(u64::MAX);
     }
 
@@ -281,6 +310,11 @@ impl Bus {
                 self.update_pins(now);
             }
             Owner::Spi => self.spi.write(addr, value, now, self.cpu),
+            Owner::Flash => {
+                if let Some(flash) = &mut self.flash {
+                    flash.state.write(value, now);
+                }
+            }
             Owner::Nobody => {}
         }
         self.refresh_due();
@@ -303,6 +337,7 @@ impl Bus {
             Owner::Eeprom => self.eeprom.read(addr, now),
             Owner::Pins => Some(self.pins.read(addr)),
             Owner::Spi => Some(self.spi.read(addr, now)),
+            Owner::Flash => self.flash.as_ref().map(|flash| flash.state.read(now)),
             Owner::Nobody => None,
         };
         self.refresh_due();
@@ -320,6 +355,42 @@ impl Bus {
         self.pins.write(register, 1 << bit);
         self.update_pins(self.cpu.write_cycle());
     }
+}
+
+/// Self-programming as simavr sees it: a part that it asks at each SPM and LPM.
+#[repr(C)]
+struct FlashPort {
+    /// simavr has a pointer to this field.
+    io: ffi::avr_io_t,
+    bus: *mut Bus,
+    state: Flash,
+}
+
+/// simavr's requests at an SPM and at an LPM.
+const SPM: u32 = u32::from_be_bytes(*b"fspm");
+/// See [`SPM`].
+const LPM: u32 = u32::from_be_bytes(*b"flpm");
+
+/// SPM is executed, or LPM reads a byte, which is at `value`.
+unsafe extern "C" fn flash_access(io: *mut ffi::avr_io_t, what: u32, value: *mut c_void) -> c_int {
+    // SAFETY: `io` is the first field of a `FlashPort`, which belongs to the bus; see `bus_of`.
+    let bus = unsafe { bus_of((*io.cast::<FlashPort>()).bus.cast()) };
+    let cpu = bus.cpu;
+    let Some(flash) = bus.flash() else { return -1 };
+    match what {
+        SPM => {
+            flash.program(cpu, cpu.z());
+            bus.refresh_due();
+        }
+        LPM => {
+            if let Some(byte) = flash.read_program(cpu.cycle(), cpu.z()) {
+                // SAFETY: simavr passes a byte that lives during the call.
+                unsafe { value.cast::<u8>().write(byte) };
+            }
+        }
+        _ => return -1,
+    }
+    0
 }
 
 fn owners(chip: &Chip) -> [Owner; IO_END] {

@@ -101,6 +101,11 @@ pub struct ServeArgs {
     /// Damage one in N numbered lines on their way to the board, chosen by a seed.
     #[arg(long, value_name = "ONE_IN:SEED", value_parser = damage)]
     pub damage: Option<(u64, u64)>,
+    /// Start in this boot loader after each reset, as a real board does; without HEX in that of Debian's package
+    /// `arduino-core-avr`. Opening the port resets the board, whose memory stays. Bytes that come early are not held
+    /// back.
+    #[arg(long, value_name = "HEX", num_args = 0..=1, default_missing_value = kerf_sim::loader::DEBIAN)]
+    pub boot_loader: Option<PathBuf>,
     /// Speed of the serial line at power-up. The line follows when the firmware changes its speed.
     #[arg(long, default_value_t = 115_200, value_parser = baud())]
     pub baud: u32,

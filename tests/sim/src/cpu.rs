@@ -16,6 +16,12 @@ use crate::image::Image;
 const SPL: usize = 0x5D;
 /// Sleep mode control register; bit 0 is the sleep enable.
 const SMCR: usize = 0x53;
+/// Which reset was the last.
+const MCUSR: usize = 0x54;
+/// The bit of MCUSR that tells of a reset by the button.
+const EXTERNAL: u8 = 1 << 1;
+/// The upper bits of addresses of bytes in flash.
+const RAMPZ: usize = 0x5B;
 /// Index of the I flag in simavr's unpacked status register.
 const FLAG_I: usize = 7;
 
@@ -86,6 +92,53 @@ impl Cpu {
 
     fn p(self) -> *mut ffi::avr_t {
         self.0.as_ptr()
+    }
+
+    /// Puts bytes into the flash. What lies beyond its end is ignored.
+    pub fn set_flash(self, addr: u32, bytes: &[u8]) {
+        // SAFETY: the end of the bytes is checked against the end of the flash.
+        unsafe {
+            if addr as usize + bytes.len() <= (*self.p()).flashend as usize + 1 {
+                let to = (*self.p()).flash.add(addr as usize);
+                std::ptr::copy_nonoverlapping(bytes.as_ptr(), to, bytes.len());
+            }
+        }
+    }
+
+    /// Sets the address at which the chip starts after a reset.
+    pub fn set_start(self, addr: u32) {
+        // SAFETY: the machine keeps the core alive; plain write.
+        unsafe { (*self.p()).reset_pc = addr }
+    }
+
+    /// Resets the chip as the button does, which sets the flag of an external reset. RAM keeps its contents, and cycles
+    /// are counted on.
+    pub fn reset(self) {
+        let now = self.cycle();
+        // SAFETY: the core is initialised, and executes no instruction now.
+        unsafe { ffi::avr_reset(self.p()) };
+        self.set_cycle(now);
+        self.set_data(MCUSR, self.data(MCUSR) | EXTERNAL);
+    }
+
+    /// Calls `io` for SPM and for each read of the flash by LPM, ahead of simavr's own self-programming.
+    pub fn take_over_flash(self, io: *mut ffi::avr_io_t) {
+        // SAFETY: the caller keeps `io` valid as long as the core; the list of parts ends with null.
+        unsafe {
+            (*io).avr = self.p();
+            (*io).next = (*self.p()).io_port;
+            (*self.p()).io_port = io;
+        }
+    }
+
+    /// The address of a byte of flash in the registers RAMPZ and Z.
+    pub fn z(self) -> u32 {
+        u32::from_le_bytes([self.data(30), self.data(31), self.data(RAMPZ), 0])
+    }
+
+    /// The word in r0 and r1, which SPM stores.
+    pub fn word_of_program(self) -> u16 {
+        u16::from_le_bytes([self.data(0), self.data(1)])
     }
 
     /// Cycles since power-up.

@@ -14,7 +14,9 @@ use crate::counts::Counts;
 use crate::cpu::{Cpu, Mode};
 use crate::eeprom;
 use crate::emulated::is_emulated;
+use crate::flash::{BOOT, Flash};
 use crate::image::Image;
+use crate::loader::Loader;
 use crate::mechanics::{Build, Mechanics};
 use crate::meters::{Meters, Window};
 use crate::recorder::{self, Probe, Recorder};
@@ -58,6 +60,11 @@ pub enum Fault {
     EndlessNesting,
     /// Bytes were written to a transmitter that had no room for them.
     LostByte,
+    /// An interrupt came while the flash with its handler was being erased or written.
+    UnreadableFlash {
+        /// Its name.
+        vector: &'static str,
+    },
 }
 
 impl fmt::Display for Fault {
@@ -69,6 +76,9 @@ impl fmt::Display for Fault {
                 write!(f, "the stack runs {bytes} bytes into static data in {place}")
             }
             Fault::EndlessNesting => f.write_str("interrupts nest without end"),
+            Fault::UnreadableFlash { vector } => {
+                write!(f, "the interrupt {vector} while the flash cannot be read")
+            }
             Fault::LostByte => f.write_str("a byte was written to a transmitter that had no room"),
         }
     }
@@ -139,14 +149,13 @@ impl Machine {
         let step_vector = step_timer.map(|n| chip.timers[n].vectors[COMPARE]);
         let meters = Meters::new(chip, step_vector);
         let counts = Counts::wanted();
-        let handler = |vector: u8| Some((vector, image.function(&format!("__vector_{vector}"))?));
-        Ok(Machine {
+        let mut machine = Machine {
             cpu,
             bus,
             probes: probes.into_iter().collect(),
             driven: [(0, 0); 12],
             meters,
-            step_handler: step_vector.and_then(handler),
+            step_handler: None,
             image,
             chip,
             clock_hz,
@@ -157,7 +166,66 @@ impl Machine {
             counts,
             stopwatches: Vec::new(),
             thermal: None,
-        })
+        };
+        machine.find_step_handler();
+        Ok(machine)
+    }
+
+    /// Finds the handler of the step interrupt by the jump at its vector. Without a jump, or with one to where other
+    /// vectors jump too, no handler is known.
+    fn find_step_handler(&mut self) {
+        let vectors = 0..self.chip.vectors.len() as u8;
+        let target = |vector: u8| {
+            jump(self.cpu.opcode(u32::from(vector) * 4), self.cpu.opcode(u32::from(vector) * 4 + 2))
+        };
+        let handler = self.board.and_then(|board| {
+            let vector = self.chip.timers[board.step_timer as usize].vectors[COMPARE];
+            let handler = target(vector)?;
+            let is_alone = vectors.filter(|other| target(*other) == Some(handler)).count() == 1;
+            is_alone.then_some((vector, handler))
+        });
+        self.step_handler = handler;
+    }
+
+    /// Puts a boot loader into the boot section, and lets it change the flash. The chip starts in it, now and after
+    /// each reset. It is called once, before the first instruction.
+    pub fn install(&mut self, loader: &Loader) {
+        for (at, bytes) in loader.parts() {
+            self.cpu.set_flash(*at, bytes);
+        }
+        self.bus_mut().allow_programming();
+        self.cpu.set_start(BOOT);
+        self.reset();
+    }
+
+    /// Replaces the content of the flash from address 0 on, as another program there would have left it.
+    pub fn fill_flash(&mut self, bytes: &[u8]) {
+        self.cpu.set_flash(0, bytes);
+        self.image = Image::default();
+        self.find_step_handler();
+    }
+
+    /// Resets the chip as the button does, or a sender by DTR. Memory and the world outside keep their state.
+    pub fn reset(&mut self) {
+        self.cpu.reset();
+        self.was_reset();
+    }
+
+    /// Whether flash holds an image. If so, its symbols are used from now on.
+    pub fn recognises(&mut self, image: &Image) -> bool {
+        let is_same = (0..).zip(&image.flash).all(|(at, byte)| self.flash(at) == *byte);
+        if is_same {
+            self.image = image.clone();
+        }
+        is_same
+    }
+
+    /// Takes note that a program has changed the flash: the symbols of the image are those of another program.
+    fn follow_flash(&mut self) {
+        if self.bus_mut().flash().is_some_and(Flash::take_changed) {
+            self.image = Image::default();
+            self.find_step_handler();
+        }
     }
 
     /// A machine with the ELF file at `path` in its flash.
@@ -211,8 +279,10 @@ impl Machine {
             self.bus_mut().run(cpu.cycle());
             self.drive_changed();
             self.pass_heat();
+            self.follow_flash();
         }
         if cpu.cycle() >= cpu.native_due() && cpu.run_native() {
+            self.resets += 1;
             self.was_reset();
         }
         if cpu.take_shadow() {
@@ -333,6 +403,9 @@ impl Machine {
         let own = (pending != 0).then(|| pending.trailing_zeros() as u8);
         let native = if cpu.native_pending() { cpu.native_vector() } else { None };
         let Some(vector) = own.into_iter().chain(native).min() else { return Ok(()) };
+        if self.bus_mut().flash().is_some_and(|flash| flash.is_unreadable()) {
+            return Err(Fault::UnreadableFlash { vector: self.chip.vector_name(vector) });
+        }
         let at = cpu.cycle();
         let raised = (own == Some(vector)).then(|| self.bus().raised_at(vector));
         let asleep = woken || cpu.mode() == Mode::Sleeping;
@@ -360,7 +433,6 @@ impl Machine {
     }
 
     fn was_reset(&mut self) {
-        self.resets += 1;
         self.bus_mut().reset();
         self.meters.reset();
         self.drive_again();
@@ -729,6 +801,12 @@ impl Machine {
         let (from, to) = (self.place(window.from_pc), self.place(window.to_pc));
         if from == to { from } else { format!("{from} .. {to}") }
     }
+}
+
+/// Returns the byte address to which the instruction with these words jumps; `None` if it is no jump.
+fn jump(first: u16, second: u16) -> Option<u32> {
+    let upper = u32::from(first >> 3 & 0x3E | first & 1);
+    (first & 0xFE0E == 0x940C).then_some((upper << 16 | u32::from(second)) * 2)
 }
 
 impl Drop for Machine {

@@ -5,7 +5,6 @@ mod cli;
 mod damage;
 mod gdb;
 mod measure;
-mod pty;
 mod run;
 mod serve;
 

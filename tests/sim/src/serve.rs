@@ -12,13 +12,13 @@ use kerf::boards::Board;
 use kerf_sim::emulated::is_emulated;
 use kerf_sim::job::{read_setup, read_travels};
 use kerf_sim::mechanics::Build;
-use kerf_sim::{Host, Image, Machine, Speech};
+use kerf_sim::pty::{Peer, Pty};
+use kerf_sim::{Host, Image, Loader, Machine, Speech};
 
 use crate::arrival::Arrival;
 use crate::cli::{ServeArgs, Speed};
 use crate::damage::Damage;
 use crate::gdb::Gdb;
-use crate::pty::{Peer, Pty};
 use crate::run::board;
 
 /// Time between two checks of the two sides.
@@ -31,8 +31,7 @@ const REST: Duration = Duration::from_micros(100);
 /// Cycles that are added to each slice until the firmware listens. If slices took whole milliseconds, each of them
 /// might end within the tick's interrupt, in which the firmware does not listen.
 const STRIDE: u64 = 1_009;
-/// Time from opening the port to the reset, as on a board that DTR resets. Senders flush their input during this
-/// time.
+/// Time from opening the port to the reset, without a boot loader. Senders flush their input during this time.
 const RESET_DELAY: Duration = Duration::from_millis(100);
 /// Greatest lag behind real time. A machine that is further behind does not catch up.
 const MAX_LAG: Duration = Duration::from_millis(200);
@@ -54,6 +53,8 @@ struct Server {
     image: Image,
     /// What is around the board.
     build: Build,
+    /// Whether the board starts in a boot loader. Its machine is then never replaced.
+    has_loader: bool,
     baud: u32,
     pty: Pty,
     gdb: Option<Gdb>,
@@ -160,6 +161,9 @@ impl Server {
         let board = board(&args.target.board)?;
         let mut machine = Machine::new(image.clone(), board)?;
         let build = around(&image, board, None);
+        if let Some(path) = &args.boot_loader {
+            machine.install(&Loader::read(path)?);
+        }
         machine.build(&build);
         machine.build_heaters();
         machine.set_baud(args.baud);
@@ -173,6 +177,7 @@ impl Server {
             machine,
             image,
             build,
+            has_loader: args.boot_loader.is_some(),
             baud: args.baud,
             gdb: args.gdb.map(Gdb::listen).transpose()?,
             pty,
@@ -193,7 +198,8 @@ impl Server {
         self.rests = self.machine.wire().backlog() == 0;
         if peer != self.peer {
             self.peer = peer;
-            self.reset_at = (peer == Peer::Open).then(|| Instant::now() + RESET_DELAY);
+            let delay = if self.has_loader { Duration::ZERO } else { RESET_DELAY };
+            self.reset_at = (peer == Peer::Open).then(|| Instant::now() + delay);
         }
         if self.reset_at.is_some_and(|at| at <= Instant::now()) {
             self.reset_at = None;
@@ -220,14 +226,19 @@ impl Server {
     }
 
     /// Whether bytes go to the machine. Before the reset, and after it until the firmware listens, they wait in the
-    /// pseudo-terminal; a real board would lose them.
+    /// pseudo-terminal; a real board would lose them, or give them to its boot loader.
     fn takes_bytes(&mut self) -> bool {
-        self.listens = self.listens || self.machine.is_listening();
+        self.listens = self.listens || self.has_loader || self.machine.is_listening();
         self.listens && self.reset_at.is_none() && self.machine.wire().backlog() < BACKLOG
     }
 
     fn reset(&mut self) -> Result<()> {
         eprintln!("{OPENED}");
+        self.boots += 1;
+        if self.has_loader {
+            self.machine.reset();
+            return Ok(());
+        }
         if self.machine.eeprom_writes() > 0 {
             self.build = around(&self.image, self.machine.board(), Some(&self.machine));
         }
@@ -236,7 +247,6 @@ impl Server {
         self.machine = fresh;
         self.anchor = (Instant::now(), 0);
         self.listens = false;
-        self.boots += 1;
         Ok(())
     }
 

@@ -7,6 +7,7 @@
 //! software interrupt out of a transmitter that is never written to.
 
 use std::collections::VecDeque;
+use std::ops::RangeInclusive;
 
 const NEVER: u64 = u64::MAX;
 
@@ -24,9 +25,6 @@ const TXEN: u8 = 1 << 3;
 // UCSRnC
 const PARITY: u8 = 1 << 5;
 const TWO_STOPS: u8 = 1 << 3;
-
-/// Relative mismatch of bit times from which on a receiver fails.
-const TOLERANCE: f64 = 0.045;
 
 // Register offsets from UCSRnA.
 const UCSRB: u16 = 1;
@@ -153,6 +151,14 @@ impl Uart {
         1 + data + parity + stops
     }
 
+    /// Whether the receiver reads frames of a sender with `bit_cycles` cycles per bit.
+    fn understands(&self, bit_cycles: f64) -> bool {
+        let stops = if self.format & TWO_STOPS != 0 { 2 } else { 1 };
+        let data = (self.frame_bits() - 1 - stops) as f64;
+        let limits = if self.status & U2X != 0 { limits(data, 8.0) } else { limits(data, 16.0) };
+        limits.contains(&(self.bit_cycles() as f64 / bit_cycles))
+    }
+
     /// A sender with `bit_cycles` cycles per bit begins a start bit at cycle `now`.
     pub fn start_bit(&mut self, byte: u8, bit_cycles: f64, now: u64) {
         self.advance(now);
@@ -162,8 +168,7 @@ impl Uart {
         // The next byte that gets into the FIFO carries DOR.
         let lost = self.waiting.take().is_some();
         self.overruns += u64::from(lost);
-        let own = self.bit_cycles() as f64;
-        let broken = (own - bit_cycles).abs() > bit_cycles * TOLERANCE;
+        let broken = !self.understands(bit_cycles);
         self.misframed += u64::from(broken);
         let byte = if broken { !byte } else { byte };
         // The frame is complete in the middle of its stop bit.
@@ -268,6 +273,16 @@ impl Uart {
             self.overwritten += 1;
         }
     }
+}
+
+/// Returns the slowest and the fastest sender, as a share of the receiver's own speed, that a receiver understands (data
+/// sheet, 22.8.3). `data` is the number of data and parity bits of a frame, and `samples` that of samples in a bit: 8 at
+/// double speed, else 16. The first of the three samples that decide has the number 4 or 8.
+pub fn limits(data: f64, samples: f64) -> RangeInclusive<f64> {
+    let (first, middle) = (samples / 2.0, samples / 2.0 + 1.0);
+    let slowest = (data + 1.0) * samples / (samples - 1.0 + data * samples + first);
+    let fastest = (data + 2.0) * samples / ((data + 1.0) * samples + middle);
+    slowest..=fastest
 }
 
 #[cfg(test)]

@@ -3,14 +3,14 @@
 use std::collections::VecDeque;
 
 use crate::mechanics::Random;
-use crate::uart::Uart;
+use crate::uart::{Uart, limits};
 
 const NEVER: u64 = u64::MAX;
 
 /// Bits of a frame as the host sends it: start, eight data, stop.
 const FRAME_BITS: f64 = 10.0;
-/// Relative mismatch of speeds from which on the host's receiver fails.
-const TOLERANCE: f64 = 0.045;
+/// Samples that the host's receiver takes in a bit, as most do.
+const SAMPLES: f64 = 16.0;
 
 /// Both directions of the line.
 pub struct Wire {
@@ -64,7 +64,7 @@ impl Wire {
     }
 
     fn understands(&self, own: f64) -> bool {
-        (own - self.bit_cycles).abs() <= self.bit_cycles * TOLERANCE
+        limits(FRAME_BITS - 2.0, SAMPLES).contains(&(self.bit_cycles / own))
     }
 
     /// Cycle of the next start bit towards the machine.

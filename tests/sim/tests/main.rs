@@ -14,6 +14,8 @@ mod crowd;
 mod grbl_ops;
 #[path = "../../support/grbl_session.rs"]
 mod grbl_session;
+#[path = "../../../xtask/src/dist/hex.rs"]
+mod hex;
 #[path = "../../support/ops.rs"]
 mod ops;
 #[path = "../../support/pages.rs"]
@@ -57,6 +59,7 @@ mod interpreter;
 mod jobs;
 mod judged;
 mod lathe;
+mod loader;
 mod machines;
 mod mechanics;
 mod models;

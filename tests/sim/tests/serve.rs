@@ -103,6 +103,16 @@ fn what_is_sent_before_the_firmware_listens_is_kept() {
 }
 
 #[test]
+fn behind_a_boot_loader_what_is_sent_early_is_lost() {
+    let (_server, mut port) = serve(&["--boot-loader", "--speed", "max"]);
+    port.write_all(b"{fb:n}\n").unwrap();
+    let mut lines = BufReader::new(port.try_clone().unwrap()).lines();
+    assert!(next(&mut lines).contains("SYSTEM READY"));
+    port.write_all(b"{fv:n}\n").unwrap();
+    assert!(next(&mut lines).starts_with(r#"{"r":{"fv":0.970}"#));
+}
+
+#[test]
 fn a_sender_opens_the_port_and_moves_the_machine() {
     let (_server, mut port) = serve(&[]);
     let mut lines = BufReader::new(port.try_clone().unwrap()).lines();

@@ -57,7 +57,7 @@ const BOARD_TARGETS: [&str; 2] = ["--test", "chip"];
 
 /// Runs all checks; stops at the first that fails.
 pub fn run() -> Result<()> {
-    stage("tools", || setup::ensure(Scope::Emulator))?;
+    stage("tools", || setup::ensure(Scope::Tests))?;
     let images = Beside::start(&["build", "--all"])?;
     WITHOUT_IMAGES.iter().try_for_each(|one| stage(one.name, one.run))?;
     stage("the images", || images.wait())?;

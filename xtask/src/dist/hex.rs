@@ -10,7 +10,7 @@ const FLASH_END: u64 = 0x4_0000;
 const RECORD: usize = 16;
 
 /// Returns the parts of an image that are written to flash, each with its address.
-fn parts(elf: &[u8]) -> Result<Vec<(u64, Vec<u8>)>> {
+pub fn parts(elf: &[u8]) -> Result<Vec<(u64, Vec<u8>)>> {
     let file = ElfFile32::<Endianness>::parse(elf).context("not an ELF of 32 bits")?;
     let endian = file.endian();
     let mut parts = Vec::new();
@@ -41,7 +41,8 @@ pub fn of_elf(elf: &[u8]) -> Result<String> {
     Ok(of_parts(&parts(elf)?))
 }
 
-fn of_parts(parts: &[(u64, Vec<u8>)]) -> String {
+/// Converts parts of the flash, each with its address, to Intel HEX.
+pub fn of_parts(parts: &[(u64, Vec<u8>)]) -> String {
     let (mut text, mut upper) = (String::new(), 0);
     for (start, bytes) in parts {
         let mut at = 0;

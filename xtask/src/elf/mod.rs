@@ -3,6 +3,7 @@
 mod arithmetic;
 mod disasm;
 mod flow;
+mod marks;
 pub mod places;
 mod pointer;
 mod scratch;
@@ -20,6 +21,7 @@ use disasm::Code;
 
 use crate::caps;
 use crate::chips::Chip;
+use crate::dist::hex;
 
 /// From this address up, avr-gcc's addresses mean RAM; below it, flash.
 const RAM_BASE: u64 = 0x80_0000;
@@ -87,6 +89,7 @@ pub fn check(path: &Path) -> Result<()> {
         "{shown} takes {flash} bytes of flash, more than {}",
         caps::FLASH
     );
+    marks::check(&image, &hex::parts(&std::fs::read(path)?)?)?;
     arithmetic::check(&image)?;
     tables::check(&image)
 }

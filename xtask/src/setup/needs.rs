@@ -17,6 +17,8 @@ pub enum Scope {
     Arm,
     /// Running the RP2040's emulator, beside the simulator.
     Emulator,
+    /// Running all tests on simulated and emulated boards.
+    Tests,
     /// Building the fuzzers, and nothing else.
     Fuzzers,
     /// Running senders at the simulator.
@@ -39,6 +41,7 @@ impl Scope {
             Scope::Emulator => {
                 matches!(need, Scope::Arm | Scope::Senders) || Scope::Simulator.covers(need)
             }
+            Scope::Tests => need == Scope::Tests || Scope::Emulator.covers(need),
             Scope::Fuzzers => need == Scope::Fuzzers,
             Scope::Senders => {
                 matches!(need, Scope::Senders | Scope::Python) || Scope::Simulator.covers(need)
@@ -66,7 +69,7 @@ pub struct Need {
 }
 
 /// All tools, in the order in which they are reported.
-pub static NEEDS: [Need; 12] = [
+pub static NEEDS: [Need; 14] = [
     Need {
         what: "Rust with its library sources (rustup nightly with rust-src, or Debian's)",
         packages: &["rustc-web", "cargo-web", "rust-web-src"],
@@ -87,6 +90,10 @@ pub static NEEDS: [Need; 12] = [
         let libraries = ["--exists", "libelf", "zlib", "libzstd"];
         probe(Command::new("pkg-config").args(libraries)).is_some()
     }),
+    tool("avrdude, which flashes simulated boards", &["avrdude"], Scope::Tests, || has("avrdude")),
+    tool("the boot loader of the Arduino Mega", &["arduino-core-avr"], Scope::Tests, || {
+        Path::new(BOOT_LOADER).exists()
+    }),
     tool("LLD, which links the firmware of the RP2040", &["lld"], Scope::Arm, || has("ld.lld")),
     tool("a C++ compiler, for libFuzzer", &["g++"], Scope::Fuzzers, || has("c++")),
     tool(
@@ -105,6 +112,9 @@ pub static NEEDS: [Need; 12] = [
 ];
 
 const SIM: Scope = Scope::Simulator;
+/// Where Debian's package has it. `tests/sim/src/loader.rs` reads this file.
+const BOOT_LOADER: &str =
+    "/usr/share/arduino/hardware/arduino/avr/bootloaders/stk500v2/stk500boot_v2_mega2560.hex";
 const ELF_PACKAGES: &[&str] = &["pkg-config", "libelf-dev", "zlib1g-dev", "libzstd-dev"];
 
 const fn tool(
@@ -172,6 +182,7 @@ mod tests {
         assert_eq!(needs(Scope::Simulator), 7);
         assert_eq!(needs(Scope::Arm), 5);
         assert_eq!(needs(Scope::Emulator), 9);
+        assert_eq!(needs(Scope::Tests), 11);
         assert_eq!(needs(Scope::Fuzzers), 1);
         assert_eq!(needs(Scope::Senders), 9);
         assert_eq!(needs(Scope::Web), 1);

@@ -17,7 +17,7 @@ use kerf_sim::{Runs, USB};
 use super::{MAX_LAG, SLICE_MS, TICK, wait, with_plate};
 use crate::arrival::Arrival;
 use crate::cli::{ServeArgs, Speed};
-use crate::pty::{Peer, Pty};
+use kerf_sim::pty::{Peer, Pty};
 
 /// Bytes that may wait in the computer.
 const BACKLOG: usize = 256;
@@ -37,7 +37,11 @@ struct Server {
 
 /// As [`super::serve`], until `stop`.
 pub fn serve(args: &ServeArgs, board: &'static Board, stop: &AtomicBool) -> Result<bool> {
-    job::check(&[("--gdb", args.gdb.is_some()), ("--damage", args.damage.is_some())])?;
+    job::check(&[
+        ("--gdb", args.gdb.is_some()),
+        ("--damage", args.damage.is_some()),
+        ("--boot-loader", args.boot_loader.is_some()),
+    ])?;
     let mut server = Server::new(args, board)?;
     println!("{}", server.pty.path().display());
     while !stop.load(Ordering::Relaxed) {

@@ -106,3 +106,26 @@ fn a_receiver_at_another_speed_reads_rubbish() {
     assert_eq!(u.misframed(), 1);
     assert_ne!(u.read(BASE + UDR, BYTE), Some(b'a'));
 }
+
+/// The limits of the data sheet, tables 22-2 and 22-3: 96.00 and 103.90 % at double speed, else 95.36 and 104.58 %.
+#[test]
+fn a_receiver_understands_senders_within_the_limits_of_the_data_sheet() {
+    for (mode, slowest, fastest) in [(U2X, 0.9600, 1.0390), (0, 0.9536, 1.0458)] {
+        let mut u = uart();
+        u.write(BASE, mode, 0);
+        let mut reads = |speed: f64| {
+            let before = u.misframed();
+            u.start_bit(b'a', u.bit_cycles() as f64 / speed, 0);
+            u.receiving = None;
+            u.misframed() == before
+        };
+        for (speed, is_read) in [
+            (slowest - 0.0002, false),
+            (slowest + 0.0002, true),
+            (fastest - 0.0002, true),
+            (fastest + 0.0002, false),
+        ] {
+            assert_eq!(reads(speed), is_read, "mode {mode}, {speed}");
+        }
+    }
+}
