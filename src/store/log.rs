@@ -72,30 +72,40 @@ impl Log {
     }
 
     /// Returns the value of an item; `None` if it was never stored.
+    #[inline(never)]
     pub fn newest<M: Memory>(&self, memory: &M, key: u16) -> Option<i32> {
-        let [value] = self.find(memory, &[key]);
-        value
+        let mut newest = None;
+        self.search(memory, &[key], |_, value| newest = Some(value));
+        newest
     }
 
-    /// Returns the values of several items in one search; `None` for an item that was never stored.
-    pub fn find<M: Memory, const N: usize>(&self, memory: &M, keys: &[u16; N]) -> [Option<i32>; N] {
-        let mut values = [None; N];
-        let mut missing = N;
+    /// Gives the values of several items, eight at most, in one search to `each`, with their indices: those that were
+    /// ever stored, each once. Returns which they are, as bits.
+    #[inline(always)]
+    pub fn search<M: Memory, const N: usize>(
+        &self,
+        memory: &M,
+        keys: &[u16; N],
+        mut each: impl FnMut(usize, i32),
+    ) -> u8 {
+        const { assert!(N <= 8) };
+        let (mut found, all) = (0, (0xFFu16 >> (8 - N)) as u8);
         let mut back = Backwards { at: self.gap * SIZE, left: self.used, end: self.used * SIZE };
         let common = Common::of(keys);
         while let Some((at, key)) = back.next(memory, common) {
-            let sought = keys.iter().zip(&mut values).find(|(sought, _)| **sought == key);
-            if let Some((_, value @ None)) = sought
+            let sought = keys.iter().position(|sought| *sought == key);
+            if let Some(i) = sought
+                && found & 1 << i == 0
                 && let Some(record) = read(memory, at / SIZE)
             {
-                *value = Some(record.value);
-                missing -= 1;
-                if missing == 0 {
+                each(i, record.value);
+                found |= 1 << i;
+                if found == all {
                     break;
                 }
             }
         }
-        values
+        found
     }
 
     /// Whether nothing was ever stored.

@@ -5,7 +5,7 @@
 //! G10, G28.1          -> Storage (the row on its way)      -> storage task
 //!     -> kept, tables (key, value) -> Log (which slot next) -> Memory, a byte each 3.4 ms
 //! reset -> Log::open -> kept::load -> Settings
-//! a line that asks for a row -> Storage, else tables::row -> Log::find
+//! a line that asks for a row -> Storage, else tables::row -> Log::search
 //! ```
 //! Most settings are in RAM as well. The others (PWM, user data) and the tables of the interpreter are in EEPROM
 //! only.

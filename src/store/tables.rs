@@ -6,21 +6,35 @@ use crate::config::rows::value_name;
 use crate::gcode::tables::TableRow;
 use crate::units::{AXES, Length, PerAxis};
 
-/// Returns the values of a row; 0 for one that was never stored. Cost on AVR: see [`Log::find`].
+/// Returns the values of a row; 0 for one that was never stored. Cost on AVR: see [`Log::search`].
 #[inline(never)]
 #[small]
 pub fn row<M: Memory>(log: &Log, memory: &M, row: TableRow) -> PerAxis<Length> {
-    find(log, memory, row).map(|value| Length(value.unwrap_or(0)))
+    let mut values = PerAxis::default();
+    find(log, memory, row, &mut values);
+    values
 }
 
+/// Sets those of the values that were ever stored. Returns which, as bits.
 #[inline(never)]
 #[small]
-fn find<M: Memory>(log: &Log, memory: &M, row: TableRow) -> [Option<i32>; AXES] {
+fn find<M: Memory>(log: &Log, memory: &M, row: TableRow, values: &mut PerAxis<Length>) -> u8 {
     let mut keys = [0; AXES];
-    for (axis, key) in (0..).zip(&mut keys) {
+    set_keys(row, &mut keys);
+    log.search(memory, &keys, |axis, value| {
+        if let Some(kept) = values.get_mut(axis) {
+            *kept = Length(value);
+        }
+    })
+}
+
+/// Not inlined, because the deepest stack goes through it.
+#[inline(never)]
+#[small]
+fn set_keys(row: TableRow, keys: &mut [u16; AXES]) {
+    for (axis, key) in (0..).zip(keys) {
         *key = self::key(row, axis);
     }
-    log.find(memory, &keys)
 }
 
 /// Returns one value of a row; 0 if it was never stored.
@@ -34,7 +48,7 @@ pub fn value<M: Memory>(log: &Log, memory: &M, row: TableRow, axis: u8) -> Lengt
 #[inline(never)]
 #[small]
 pub fn is_stored<M: Memory>(log: &Log, memory: &M, row: TableRow) -> bool {
-    find(log, memory, row).iter().any(Option::is_some)
+    find(log, memory, row, &mut PerAxis::default()) != 0
 }
 
 /// Returns the key of one value of a row.
