@@ -226,7 +226,7 @@ fn a_stored_program_is_the_old_one_or_the_new() {
 #[test]
 fn unreadable_settings_are_an_alarm_until_it_is_cleared() {
     for clear in ["{clear:n}\n", "{xvm:900}\n{clear:n}\n"] {
-        with(&[0x55; 4_096], move |sender| {
+        with([0x55; 4_096], move |sender| {
             assert_eq!(sender.value("stat"), "2");
             assert!(sender.ask("g1 f500 x1\n", 100).contains(",203,"), "nothing moves");
             assert!(sender.ask("{mch:1}\n", 100).contains("\"f\":[1,0,"), "settings can be loaded");

@@ -699,20 +699,19 @@ fn each_line_is_answered_whatever_both_ports_do() {
             }
             [Y_MIN, STOP, X_MIN].iter().for_each(|input| two.machine.set_input(*input, false));
             two.run(100);
-            for port in 0..2 {
+            for (port, sent) in sent.iter_mut().enumerate() {
                 two.bytes(port, b"~");
                 two.run(300);
                 let end = two.tongues[port].ends()[0];
                 two.send(port, end);
-                sent[port] += 1;
+                *sent += 1;
                 two.run(5_000);
             }
-            for port in 0..2 {
+            for (port, sent) in sent.into_iter().enumerate() {
                 let (answers, _) = two.take(port);
-                if answers.len() != sent[port] {
+                if answers.len() != sent {
                     let count = answers.len();
-                    return two
-                        .fails(&format!("{count} answers to {} lines on port {port}", sent[port]));
+                    return two.fails(&format!("{count} answers to {sent} lines on port {port}"));
                 }
             }
             for port in 0..2 {

@@ -87,7 +87,7 @@ impl Flash {
     /// Reads SPMCSR.
     pub fn read(&self, now: u64) -> u8 {
         let enabled = self.busy_until != NEVER || now <= self.armed_until;
-        (u8::from(self.is_unreadable) * UNREADABLE) | u8::from(enabled) * ENABLE
+        (u8::from(self.is_unreadable) * UNREADABLE) | (u8::from(enabled) * ENABLE)
     }
 
     /// Stores to SPMCSR, from cycle `now` on.
