@@ -67,6 +67,9 @@ pub struct ServeArgs {
     /// Let avr-gdb connect to this TCP port
     #[arg(long, value_name = "PORT")]
     gdb: Option<u16>,
+    /// Start in the boot loader of the Arduino Mega after each reset, as a real board does
+    #[arg(long)]
+    boot_loader: bool,
 }
 
 /// `cargo xtask bench`
@@ -104,6 +107,9 @@ pub fn run(args: &RunArgs) -> Result<ExitCode> {
 /// its process number is the one that was started.
 pub fn serve(args: &ServeArgs) -> Result<ExitCode> {
     let elf = prepare(args.board, args.machine)?;
+    if args.boot_loader {
+        setup::ensure(Scope::Tests)?;
+    }
     become_program(&mut serve_command(args, &elf))
 }
 
@@ -173,6 +179,9 @@ fn serve_command(args: &ServeArgs, elf: &Path) -> Command {
     option(&mut command, "--speed", args.speed.as_ref());
     option(&mut command, "--link", args.link.as_ref());
     option(&mut command, "--gdb", args.gdb.map(|port| port.to_string()));
+    if args.boot_loader {
+        command.arg("--boot-loader");
+    }
     command
 }
 
@@ -279,8 +288,10 @@ mod tests {
             speed: None,
             link: None,
             gdb: Some(2345),
+            boot_loader: true,
         };
         let command = serve_command(&args, Path::new("k.elf"));
-        assert_eq!(arguments(&command), "serve --elf k.elf --board mega2560-grbl --gdb 2345");
+        let wanted = "serve --elf k.elf --board mega2560-grbl --gdb 2345 --boot-loader";
+        assert_eq!(arguments(&command), wanted);
     }
 }

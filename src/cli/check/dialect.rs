@@ -2,9 +2,8 @@
 //! machine's lines mean.
 
 use kerf::canon::{by_number, of_alarm, of_error, text as text_of};
-use kerf::protocol::dialect::Dialect as _;
-use kerf::protocol::grbl::Grbl;
-use kerf::protocol::tinyg::Tinyg;
+use kerf::config::Settings;
+use kerf::protocol::Speech;
 use kerf::realtime::{self, Asked};
 use kerf::status::Status;
 
@@ -85,7 +84,8 @@ impl Dialect {
             if is_of_a_print(&line) {
                 return Some((Self::RepRap, format!("line {number} heats or extrudes")));
             }
-            if Tinyg::is_decided_by(as_written.as_bytes()) {
+            let device = Speech::decided_by(as_written.as_bytes(), &Settings::blank());
+            if device.is_some_and(|speech| !speech.is_plain() && !speech.is_in_order()) {
                 return Some((Self::TinyG, format!("line {number} is a command of TinyG's")));
             }
             is_of_grbl(as_written)
@@ -186,7 +186,8 @@ fn is_of_grbl(line: &str) -> bool {
     let is_homing = named.strip_prefix('H').is_some_and(|axis| axis.len() <= 1);
     let (number, sets) = named.split_once('=').map_or(("", false), |(number, _)| (number, true));
     let is_setting = sets && !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit());
-    Grbl::is_decided_by(code.as_bytes()) || is_homing || named == "X" || is_setting
+    let device = Speech::decided_by(code.as_bytes(), &Settings::blank());
+    device.is_some_and(Speech::is_in_order) || is_homing || named == "X" || is_setting
 }
 
 /// Whether a line, in capitals, is a comment that slicers write. CAM programs write other comments with the same words,
