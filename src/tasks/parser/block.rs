@@ -87,6 +87,8 @@ pub fn run_block(
         false => late && !is_program_end(block),
     };
     match links.may_feed(port) {
+        // An empty line asks for nothing.
+        true if locked && block.trim_ascii().is_empty() => (Status::Ok, true),
         true if locked => {
             (if jog(block).is_some() { Status::NotAccepted } else { hold::locked() }, true)
         }

@@ -12,7 +12,7 @@ const TURNING: [&str; 3] = ["encoder.", "thread", "lathe-"];
 /// Transcripts that only the image of a printer can play.
 const PRINTING: [&str; 2] = ["bed", "reprap"];
 /// Transcripts with canned cycles, which the image for the grbl-style shield has no room for.
-const DRILLING: [&str; 9] = [
+const DRILLING: [&str; 10] = [
     "check-mode",
     "cycles-",
     "feed-modes",
@@ -22,6 +22,7 @@ const DRILLING: [&str; 9] = [
     "planes",
     "program-end",
     "steps",
+    "words",
 ];
 /// Transcripts that also need grbl's dialect.
 const BOTH: [&str; 2] = ["grbl-thread", "grbl-lathe"];
