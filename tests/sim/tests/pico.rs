@@ -381,9 +381,10 @@ fn settings_may_change_often() {
 /// Transcripts that do not hold here, by the beginnings of their names. More rates of the line are possible (`baud`),
 /// steps may come faster (`rates`, `settings-motor`, `grbl-settings`), no port has RTS and CTS (`ports-pins`), the
 /// sensors of a spindle have pins of their own (`encoder`) and no second sensor tells the direction
-/// (`thread-direction`, `lathe-tap-fails`, `grbl-lathe-cycles`), settings are stored sooner (`stored`), and the boot
+/// (`thread-direction`, `lathe-tap-fails`, `grbl-lathe-cycles`), the emulated spindle begins anew when it gets other
+/// marks (`thread-half`), settings are stored sooner (`stored`), and the boot
 /// loader, which is in ROM, is not emulated (`boot-loader`).
-const DIFFERS: [&str; 11] = [
+const DIFFERS: [&str; 12] = [
     "baud",
     "boot-loader",
     "encoder",
@@ -395,6 +396,7 @@ const DIFFERS: [&str; 11] = [
     "settings-motor",
     "stored",
     "thread-direction",
+    "thread-half",
 ];
 /// Transcripts in which motors go far, which takes the emulator minutes. The simulated board plays them, and nothing
 /// in them depends on the chip.
