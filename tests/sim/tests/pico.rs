@@ -380,15 +380,15 @@ fn settings_may_change_often() {
 
 /// Transcripts that do not hold here, by the beginnings of their names. More rates of the line are possible (`baud`),
 /// steps may come faster (`rates`, `settings-motor`, `grbl-settings`), no port has RTS and CTS (`ports-pins`), the
-/// sensors of a spindle have pins of their own (`encoder`) and no second sensor tells the direction
-/// (`thread-direction`, `lathe-tap-fails`, `grbl-lathe-cycles`), the emulated spindle begins anew when it gets other
-/// marks (`thread-half`), settings are stored sooner (`stored`), and the boot
+/// sensors of a spindle have pins of their own (`encoder`, `grbl-lathe-probe`) and no second sensor tells the direction
+/// (`thread-direction`, `lathe-tap-fails`, `grbl-lathe-cycles`), settings are stored sooner (`stored`), and the boot
 /// loader, which is in ROM, is not emulated (`boot-loader`).
 const DIFFERS: [&str; 12] = [
     "baud",
     "boot-loader",
     "encoder",
     "grbl-lathe-cycles",
+    "grbl-lathe-probe",
     "grbl-settings",
     "lathe-tap-fails",
     "ports-pins",
@@ -396,7 +396,6 @@ const DIFFERS: [&str; 12] = [
     "settings-motor",
     "stored",
     "thread-direction",
-    "thread-half",
 ];
 /// Transcripts in which motors go far, which takes the emulator minutes. The simulated board plays them, and nothing
 /// in them depends on the chip.
