@@ -315,6 +315,9 @@ fn without_version(line: &str) -> String {
     line.replace(&format!("\"kerf\":\"{VERSION}\","), "")
 }
 
+/// How lines begin that tell of an alarm.
+const ALARMS: [&str; 4] =
+    ["{\"er\":", "ALARM:", "[MSG:Reset to continue]", "[MSG:'$H'|'$X' to unlock]"];
 /// The greeting on the second port. Transcripts that do not use the port ignore it.
 const GREETING: &str = "{\"r\":{\"fv\":*\"SYSTEM READY\"},\"f\":[1,0,0]}";
 
@@ -422,7 +425,9 @@ impl<S: Side> Player<'_, S> {
     fn may_come(&self, port: usize, line: &str) -> bool {
         let line = line.trim_start_matches('\r');
         // The second port hears of each alarm, whatever the first does.
-        if port == 1 && (matches(GREETING, line) || line.starts_with("{\"er\":")) {
+        if port == 1
+            && (matches(GREETING, line) || ALARMS.iter().any(|alarm| line.starts_with(alarm)))
+        {
             return true;
         }
         // Where no dialect is settled yet, each kind of sender gets its own greeting.
