@@ -300,7 +300,7 @@ impl Printer {
 /// What only the answer to a line of the host may begin with.
 const ANSWERS: [&str; 5] = ["ok", "Resend", "rs", "start", "wait"];
 
-/// Lines of a file are not the host's: none is counted by it.
+/// A line number of a file on the card has no effect on the line numbers of the host.
 #[test]
 fn a_file_answers_nothing() {
     let mut printer = Printer::boot();

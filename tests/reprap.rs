@@ -371,7 +371,7 @@ fn lines_without_ends_are_asked_for_again() {
     host.ask("G91");
     let again = "Error:checksum mismatch, Last Line: 0\nResend: 1\nok\n";
     for x in 0..600 {
-        // The same line is not doubted for ever.
+        // A line that comes again and again is taken in the end.
         assert_eq!(host.ask(&line(0, "M110 N0")), "ok\n");
         let one = line(1, &format!("G1 X{x}"));
         assert_eq!(host.ask(&format!("{one}{one}{one}")), again);

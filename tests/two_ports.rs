@@ -612,7 +612,7 @@ fn what_is_dropped_leaves_its_words() {
                     return two.fails(&format!("sps is not {wanted}"));
                 }
             }
-            // The same lines without a drop.
+            // The same lines, of which none is dropped.
             let program = lines[..answers.min(lines.len())].to_vec();
             let rest = |words: Vec<String>| -> Vec<_> {
                 words.into_iter().filter(|word| !is_output(word)).collect()

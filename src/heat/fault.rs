@@ -133,7 +133,7 @@ pub struct Watch {
     /// Harmless power beyond [`HARMLESS`], and the fan's speed when it was measured.
     known: i16,
     fan: u8,
-    /// Steps left for the answer of a sensor; 0 while none is asked.
+    /// Steps that are left until a sensor that is asked must have answered; 0 while no sensor is asked.
     asks: u16,
     /// Steps left until a fault; 0 at start-up and after that fault.
     left: u16,

@@ -211,9 +211,7 @@ impl Storage {
     /// deepest stack goes through their callers.
     #[inline(never)]
     fn is_newer(&self, row: TableRow) -> bool {
-        (row == LENT && self.lent.row().is_some())
-            || self.edit.get().is_some_and(|edit| edit.row == row)
-            || self.is_forgotten(row)
+        self.newer(row).is_some()
     }
 
     /// Returns the values that a row has in RAM: because it is lent, or because it is being saved.

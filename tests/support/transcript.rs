@@ -318,6 +318,7 @@ fn without_version(line: &str) -> String {
 /// How lines begin that tell of an alarm.
 const ALARMS: [&str; 4] =
     ["{\"er\":", "ALARM:", "[MSG:Reset to continue]", "[MSG:'$H'|'$X' to unlock]"];
+
 /// The greeting on the second port. Transcripts that do not use the port ignore it.
 const GREETING: &str = "{\"r\":{\"fv\":*\"SYSTEM READY\"},\"f\":[1,0,0]}";
 

@@ -69,7 +69,7 @@ crate::progmem! {
     /// For each whole number up to [`DENSE`], where the search for a G code of that number begins: its first row, or that
     /// of the next code, or the row before: see [`starts`].
     pub static G_START: [u8; STARTS] = starts(&G_TABLE);
-    /// The same for the M codes.
+    /// For each whole number up to [`DENSE`], where the search for an M code of that number begins, as for the G codes.
     pub static M_START: [u8; STARTS] = starts(&M_TABLE);
     /// The words that the code of each motion mode takes.
     pub static MOTION: [u32; MotionMode::COUNT] = motions();

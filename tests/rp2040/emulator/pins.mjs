@@ -97,14 +97,25 @@ const INDEX_WIDTH = 0.02;
 const WIDTH = 0.3;
 
 export class Spindle {
-  // Edges of a turn: at which angle, in turns, a pin goes where.
   constructor(machine, { index, sync, pulses }) {
+    [this.machine, this.index, this.sync] = [machine, index, sync];
+    // Turns up to a cycle, and turns a cycle from there on.
+    [this.angle, this.since, this.speed] = [0, machine.cycle, 0];
+    this.setMarks(pulses);
+  }
+  // It has so many sync marks from now on.
+  setMarks(pulses) {
+    if (pulses === this.pulses) return;
+    this.pulses = pulses;
     const mark = (gpio, at, width) => [{ at, gpio, high: false }, { at: at + width, gpio, high: true }];
-    const marks = Array.from({ length: pulses > 1 ? pulses : 0 }, (_, n) => mark(sync, (n + 0.5) / pulses, WIDTH / pulses));
-    this.edges = [mark(index, 0, INDEX_WIDTH), ...marks].flat().sort((a, b) => a.at - b.at);
-    this.machine = machine;
-    // Turns up to a cycle, turns a cycle from there on, and the edge that comes next.
-    [this.angle, this.since, this.speed, this.next] = [0, machine.cycle, 0, 0];
+    const marks = Array.from({ length: pulses > 1 ? pulses : 0 }, (_, n) => mark(this.sync, (n + 0.5) / pulses, WIDTH / pulses));
+    // Edges of a turn: at which angle, in turns, a pin goes where.
+    this.edges = [mark(this.index, 0, INDEX_WIDTH), ...marks].flat().sort((a, b) => a.at - b.at);
+    // The edge that comes next.
+    const angle = this.angle + (this.machine.cycle - this.since) * this.speed;
+    const turns = Math.floor(angle);
+    const ahead = this.edges.findIndex(({ at }) => at >= angle - turns);
+    this.next = turns * this.edges.length + (ahead < 0 ? this.edges.length : ahead);
     this.plan();
   }
   // It turns so fast from now on, turns a minute, to either side alike.

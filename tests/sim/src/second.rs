@@ -8,11 +8,11 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
 use kerf::boards::{Board, MOTORS, Pin};
 use serde::{Deserialize, Serialize};
 
-use crate::emulated::process::Process;
+use crate::emulated::process::{Answers, Lent};
 use crate::emulated::{is_emulated, packed, unpacked};
 use crate::runs::Runs;
 
@@ -103,11 +103,16 @@ struct Answer {
     cells: Option<String>,
 }
 
+impl Answers for Answer {
+    fn fault(&self) -> Option<&str> {
+        self.fault.as_deref()
+    }
+}
+
 /// A board on the second simulator.
 pub struct Second {
     board: &'static Board,
-    /// The process; `None` only while the board is dropped.
-    process: Option<Process>,
+    process: Lent,
     request: Request,
     answer: Answer,
     heard: [Vec<u8>; LINES],
@@ -140,7 +145,7 @@ impl Second {
         let inputs = board.inputs.iter().flatten();
         let mut board = Second {
             board,
-            process: Some(Process::take(program)?),
+            process: Lent::take(program)?,
             request: Request {
                 board: Some(power_up),
                 cells: cells.map(|cells| packed(cells)),
@@ -157,12 +162,7 @@ impl Second {
     /// Sends the request that was collected, and takes the answer.
     fn run(&mut self, until: u64, line: bool) -> Result<()> {
         (self.request.until, self.request.line) = (until, line);
-        let request = serde_json::to_string(&std::mem::take(&mut self.request))?;
-        let answer = self.process.as_mut().context("no simulator")?.ask(&request)?;
-        self.answer = serde_json::from_str(&answer)?;
-        if let Some(fault) = &self.answer.fault {
-            bail!("the second simulator fails: {fault}");
-        }
+        self.answer = self.process.ask(&std::mem::take(&mut self.request))?;
         for (heard, hex) in self.heard.iter_mut().zip(&self.answer.heard) {
             heard.extend(unpacked(hex));
         }
@@ -238,15 +238,6 @@ impl Second {
     /// Number of resets by the watchdog.
     pub fn resets(&self) -> u64 {
         self.answer.resets
-    }
-}
-
-impl Drop for Second {
-    fn drop(&mut self) {
-        // The process of a board that has failed is not kept for another board.
-        if let Some(process) = self.process.take().filter(|_| self.answer.fault.is_none()) {
-            process.keep();
-        }
     }
 }
 

@@ -78,7 +78,10 @@ impl Side for Emulated {
         }
     }
 
-    fn turn_spindle(&mut self, rpm: f64, _pulses: u32) {
+    fn turn_spindle(&mut self, rpm: f64, pulses: u32) {
+        if pulses > 0 {
+            self.set_marks(pulses);
+        }
         Emulated::turn_spindle(self, rpm);
     }
 

@@ -16,9 +16,9 @@ use crate::side::Side;
 
 /// The longest difference between the times of a step on the two simulators, cycles. None has been measured.
 const APART: u64 = 4;
-/// The same in threads, 0.1 ms. The edges of the spindle's sensors are rounded differently, and where one of them falls
-/// into the next clock of the timer that measures them, its time differs by 4 us, and the axes follow another speed. One
-/// cycle has been measured with one image, 794 with the next.
+/// The longest difference between the times of a step in a thread, cycles: 0.1 ms. The edges of the spindle's sensors are
+/// rounded differently. Where one of them falls into the next clock of the timer that measures them, its time differs by
+/// 4 us, and the axes follow another speed. One cycle has been measured with one image, 794 with the next.
 const APART_IN_THREADS: u64 = 1_600;
 /// Cycles in a microsecond.
 const US: u64 = 16;

@@ -10,9 +10,9 @@ pub(crate) mod process;
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
 use kerf::boards::{Board, Encoder, MOTORS, Pin, Port, Usart};
-use process::Process;
+use process::{Answers, Lent};
 use serde::{Deserialize, Serialize};
 
 use crate::runs::Runs;
@@ -43,6 +43,8 @@ struct Request {
     drivers: Option<Vec<Driver>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     spindle: Option<Sensors>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    marks: Option<u32>,
     #[serde(skip_serializing_if = "Option::is_none")]
     turn: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -161,6 +163,12 @@ struct Answer {
     recorded: Option<Recorded>,
 }
 
+impl Answers for Answer {
+    fn fault(&self) -> Option<&str> {
+        self.fault.as_deref()
+    }
+}
+
 /// Recorded edges of steps.
 #[derive(Deserialize, Clone, Default, Debug)]
 pub struct Recorded {
@@ -175,8 +183,7 @@ pub struct Recorded {
 /// An emulated board.
 pub struct Emulated {
     board: &'static Board,
-    /// The emulator process; `None` only while the board is dropped.
-    process: Option<Process>,
+    process: Lent,
     request: Request,
     answer: Answer,
     heard: [Vec<u8>; LINES],
@@ -207,7 +214,7 @@ impl Emulated {
         let power_up = PowerUp { elf: elf.to_owned(), motors: pins.collect() };
         let mut board = Emulated {
             board,
-            process: Some(Process::take(program)?),
+            process: Lent::take(program)?,
             request: Request { board: Some(power_up), ..Request::default() },
             answer: Answer::default(),
             heard: Default::default(),
@@ -224,12 +231,7 @@ impl Emulated {
     /// Sends the request that was collected, and takes the answer.
     fn run(&mut self, until: u64, line: bool) -> Result<()> {
         (self.request.until, self.request.line) = (until, line);
-        let request = serde_json::to_string(&std::mem::take(&mut self.request))?;
-        let answer = self.process.as_mut().context("no emulator")?.ask(&request)?;
-        self.answer = serde_json::from_str(&answer)?;
-        if let Some(fault) = &self.answer.fault {
-            bail!("the emulator fails: {fault}");
-        }
+        self.answer = self.process.ask(&std::mem::take(&mut self.request))?;
         for (line, hex) in self.answer.heard.iter().enumerate().take(LINES) {
             self.heard[line].extend(unpacked(hex));
         }
@@ -315,6 +317,11 @@ impl Emulated {
         Ok(())
     }
 
+    /// Gives the spindle this many sync marks from now on.
+    pub fn set_marks(&mut self, pulses: u32) {
+        self.request.marks = Some(pulses);
+    }
+
     /// Sets the speed of the spindle, turns a minute.
     pub fn turn_spindle(&mut self, rpm: f64) {
         self.request.turn = Some(rpm);
@@ -380,15 +387,6 @@ impl Emulated {
     /// Number of resets by the watchdog.
     pub fn resets(&self) -> u64 {
         self.answer.resets
-    }
-}
-
-impl Drop for Emulated {
-    fn drop(&mut self) {
-        // The process of a board that has failed is not kept for another board.
-        if let Some(process) = self.process.take().filter(|_| self.answer.fault.is_none()) {
-            process.keep();
-        }
     }
 }
 

@@ -8,7 +8,9 @@ use std::path::PathBuf;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::sync::{Mutex, PoisonError};
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 
 /// Processes that have no board. They end with this program, because that closes their input.
 static IDLE: Mutex<Vec<Process>> = Mutex::new(Vec::new());
@@ -21,6 +23,47 @@ pub struct Process {
     output: BufReader<ChildStdout>,
     /// Whether the last request has been answered.
     is_sound: bool,
+}
+
+/// A process that serves a board until the board is dropped.
+pub struct Lent {
+    /// `None` only while the board is dropped.
+    process: Option<Process>,
+    /// Whether the program has told of a fault.
+    has_failed: bool,
+}
+
+/// The answer to a request.
+pub trait Answers: DeserializeOwned {
+    /// Why the program cannot go on, if it cannot.
+    fn fault(&self) -> Option<&str>;
+}
+
+impl Lent {
+    /// Returns a process that runs this program: see [`Process::take`].
+    pub fn take(program: PathBuf) -> Result<Self> {
+        Ok(Self { process: Some(Process::take(program)?), has_failed: false })
+    }
+
+    /// Sends a request and returns its answer. The error is the program's fault, or why there is no answer.
+    pub fn ask<A: Answers>(&mut self, request: &impl Serialize) -> Result<A> {
+        let process = self.process.as_mut().context("no process")?;
+        let answer: A = serde_json::from_str(&process.ask(&serde_json::to_string(request)?)?)?;
+        if let Some(fault) = answer.fault() {
+            self.has_failed = true;
+            bail!("{} fails: {fault}", process.program.display());
+        }
+        Ok(answer)
+    }
+}
+
+impl Drop for Lent {
+    fn drop(&mut self) {
+        // The process of a board that has failed is not kept for another board.
+        if let Some(process) = self.process.take().filter(|_| !self.has_failed) {
+            process.keep();
+        }
+    }
 }
 
 impl Process {

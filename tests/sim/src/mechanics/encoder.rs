@@ -76,6 +76,17 @@ impl Encoder {
         Encoder { build, lines }
     }
 
+    /// Gives the sync sensors this many marks a turn from now on, the index mark half way between two of them. Edges
+    /// that are planned already still come.
+    pub fn set_marks(&mut self, per_turn: u32) {
+        let phase = 0.5 / f64::from(per_turn);
+        self.build = Sensors { per_turn, phase, ..self.build };
+        let fresh = Encoder::new(self.build).lines;
+        for (line, fresh) in self.lines.iter_mut().zip(fresh).skip(1) {
+            (line.marks, line.first, line.width) = (fresh.marks, fresh.first, fresh.width);
+        }
+    }
+
     /// Leaves out one pulse after `after` further pulses: of the index sensor if `index`, else of the sync sensor.
     pub fn miss(&mut self, index: bool, after: u64) {
         if let Some(line) = self.lines.get_mut(usize::from(!index)) {

@@ -88,8 +88,13 @@ impl Side for Machine {
         self.build(&build);
     }
 
-    fn turn_spindle(&mut self, rpm: f64, _: u32) {
-        self.tamper(|mechanics, now| mechanics.force_spindle(rpm, now));
+    fn turn_spindle(&mut self, rpm: f64, pulses: u32) {
+        self.tamper(|mechanics, now| {
+            if let Some(encoder) = mechanics.encoder().filter(|_| pulses > 0) {
+                encoder.set_marks(pulses);
+            }
+            mechanics.force_spindle(rpm, now);
+        });
     }
 
     fn steps(&self) -> [i64; 4] {
