@@ -239,7 +239,7 @@ fn keep_examples(
 /// The examples of `avr-embassy`.
 const EXAMPLES: [&str; 4] = ["blink", "echo", "preempt", "costs"];
 /// The programs of `tests/chip` that are built as images.
-const PARTS: [&str; 1] = ["arithmetic"];
+const PARTS: [&str; 2] = ["arithmetic", "verify"];
 
 /// `cargo xtask flash`
 #[derive(Args)]

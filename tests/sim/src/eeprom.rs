@@ -1,5 +1,7 @@
 //! The EEPROM: a write takes 3.4 ms and EE_READY is a level.
 
+use crate::stuck::Stuck;
+
 const NEVER: u64 = u64::MAX;
 
 /// Size of the EEPROM, bytes.
@@ -31,6 +33,8 @@ pub struct Eeprom {
     master_until: u64,
     busy_until: u64,
     writes: u64,
+    /// Cells with bits that do not change.
+    stuck: Vec<Stuck>,
 }
 
 impl Eeprom {
@@ -47,6 +51,20 @@ impl Eeprom {
             master_until: 0,
             busy_until: 0,
             writes: 0,
+            stuck: Vec::new(),
+        }
+    }
+
+    /// From now on the bits of `stuck` do not change.
+    pub fn stick(&mut self, stuck: Stuck) {
+        self.stuck.push(stuck);
+        self.hold_stuck();
+    }
+
+    fn hold_stuck(&mut self) {
+        for stuck in &self.stuck {
+            let cell = &mut self.cells[usize::from(stuck.address)];
+            *cell = stuck.of(*cell);
         }
     }
 
@@ -58,6 +76,7 @@ impl Eeprom {
     /// Replaces the contents.
     pub fn set_cells(&mut self, cells: &[u8; SIZE]) {
         *self.cells = *cells;
+        self.hold_stuck();
     }
 
     /// Bytes written so far.
@@ -142,6 +161,7 @@ impl Eeprom {
             2 => *cell & self.data,
             _ => self.data,
         };
+        self.hold_stuck();
         self.master_until = 0;
         self.busy_until = now + WRITE_CYCLES[mode];
         self.writes += 1;

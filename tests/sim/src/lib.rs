@@ -39,6 +39,7 @@ pub mod second;
 mod speech;
 pub mod spi;
 mod stopwatch;
+mod stuck;
 mod summary;
 pub mod thermal;
 pub mod threads;

@@ -22,6 +22,7 @@ use crate::meters::{Meters, Window};
 use crate::recorder::{self, Probe, Recorder};
 use crate::spi::Max6675;
 use crate::stopwatch::Stopwatch;
+use crate::stuck::Stuck;
 use crate::thermal::{EVERY_MS, Thermal};
 use crate::timer::COMPARE;
 use crate::trace::Trace;
@@ -107,8 +108,10 @@ pub struct Machine {
     /// How often each word of flash ran, if the environment asks for it.
     counts: Option<Counts>,
     stopwatches: Vec<Stopwatch>,
-    /// Whether there is a profile, counts or a stopwatch. One flag, so that the loop has only one check for each
-    /// instruction.
+    /// Bytes of RAM with bits that do not change.
+    stuck: Vec<Stuck>,
+    /// Whether there is a profile, counts, a stopwatch or a stuck byte. One flag, so that the loop has only one check
+    /// for each instruction.
     is_watched: bool,
     thermal: Option<Box<Thermal>>,
 }
@@ -165,6 +168,7 @@ impl Machine {
             is_watched: counts.is_some(),
             counts,
             stopwatches: Vec::new(),
+            stuck: Vec::new(),
             thermal: None,
         };
         machine.find_step_handler();
@@ -295,7 +299,7 @@ impl Machine {
     }
 
     /// Tells the profile, the counts and the stopwatches that the instruction at `pc`, begun at `began`, was
-    /// executed.
+    /// executed. Puts stuck bits back that it has changed.
     #[cold]
     fn watch(&mut self, pc: u32, began: u64) {
         if let Some(spent) = self.profile.as_mut().and_then(|p| p.get_mut(pc as usize / 2)) {
@@ -306,6 +310,10 @@ impl Machine {
         }
         if !self.stopwatches.is_empty() {
             self.time(pc, began);
+        }
+        for stuck in &self.stuck {
+            let at = usize::from(stuck.address);
+            self.cpu.set_data(at, stuck.of(self.cpu.data(at)));
         }
     }
 
@@ -733,6 +741,24 @@ impl Machine {
     /// Replaces the EEPROM's contents. It is best called before the first instruction.
     pub fn set_eeprom(&mut self, cells: &[u8; eeprom::SIZE]) {
         self.bus_mut().eeprom.set_cells(cells);
+    }
+
+    /// A fault: from now on the bits of `mask` in a cell of the EEPROM stay as in `value`, whatever is written.
+    pub fn stick_cell(&mut self, address: u16, mask: u8, value: u8) {
+        self.bus_mut().eeprom.stick(Stuck { address, mask, value });
+    }
+
+    /// A fault: from now on the bits of `mask` in a byte of RAM stay as in `value`, whatever is stored. Each instruction
+    /// then costs more time.
+    pub fn stick_ram(&mut self, address: u16, mask: u8, value: u8) {
+        self.stuck.push(Stuck { address, mask, value });
+        self.is_watched = true;
+    }
+
+    /// A fault: from now on a timer counts at this share of its right rate, rounded to whole cycles a count; 0: it
+    /// stands still, 1: it is right again. The fault outlasts a reset.
+    pub fn set_pace(&mut self, timer: usize, pace: f64) {
+        self.bus_mut().set_pace(timer, pace);
     }
 
     /// Sets the speed of the host's side of the serial line.

@@ -65,6 +65,8 @@ pub struct Timer {
     due: u64,
     last_event: u64,
     missed: u64,
+    /// A fault: the rate at which it counts, as a share of the right rate.
+    pace: f64,
 }
 
 impl Timer {
@@ -93,7 +95,22 @@ impl Timer {
             due: NEVER,
             last_event: 0,
             missed: 0,
+            pace: 1.0,
         }
+    }
+
+    /// Puts it into its state after reset. A fault stays.
+    pub fn reset(&mut self) {
+        *self = Timer { pace: self.pace, ..Timer::new(self.layout) };
+    }
+
+    /// A fault: from now on it counts at this share of the right rate, rounded to whole cycles a count; 0: it stands
+    /// still, 1: it is right.
+    pub fn set_pace(&mut self, pace: f64, now: u64) {
+        self.sync(now);
+        self.pace = pace;
+        self.find_prescale(now);
+        self.plan();
     }
 
     /// Cycle of the next flag.
@@ -224,7 +241,8 @@ impl Timer {
     }
 
     fn find_prescale(&mut self, now: u64) {
-        let prescale = self.layout.prescale[usize::from(self.control_b & 7)];
+        let right = self.layout.prescale[usize::from(self.control_b & 7)];
+        let prescale = if self.pace == 1.0 { right } else { paced(right, self.pace) };
         if prescale != self.prescale {
             self.prescale = prescale;
             self.tick = now.checked_div(prescale).unwrap_or(0);
@@ -338,6 +356,12 @@ impl Timer {
         let first = self.next.into_iter().min().unwrap_or(NEVER);
         self.due = first.saturating_mul(self.prescale);
     }
+}
+
+/// Returns the cycles per count of a timer that counts at a share of the right rate; 0 when it stands still.
+fn paced(prescale: u64, pace: f64) -> u64 {
+    let cycles = (prescale as f64 / pace).round();
+    if prescale == 0 || !cycles.is_finite() { 0 } else { (cycles as u64).max(1) }
 }
 
 /// Waveform generation modes of timers 0 and 2.

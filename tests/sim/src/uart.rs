@@ -132,6 +132,11 @@ impl Uart {
         self.misframed
     }
 
+    /// Whether there are bytes for [`Uart::take_sent`].
+    pub fn has_sent(&self) -> bool {
+        !self.sent.is_empty()
+    }
+
     /// Bytes sent, each with the cycle at which its last stop bit ended.
     pub fn take_sent(&mut self) -> Option<(u64, u8)> {
         self.sent.pop_front()

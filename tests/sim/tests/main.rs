@@ -97,5 +97,6 @@ mod turning_alarms;
 mod turning_faults;
 mod turning_holds;
 mod turning_strays;
+mod verify_chip;
 mod watchdog;
 mod wrap;
