@@ -15,6 +15,7 @@ const { asLines, load: settingsLoad, read, requests, save } = await load('settin
 const { choices } = await load('settings-choices.js');
 const { pathOf } = await load('path.js');
 const { runJob } = await load('job-run.js');
+const { check } = await load('verify.js');
 const module = new WebAssembly.Module(readFileSync(path.join(folder, 'kerf.wasm')));
 
 const OK = '{"r":{},"f":[1,0,7]}';
@@ -167,4 +168,109 @@ test('a dry run has the settings that it is given', async () => {
   const [slow, fast] = [await run([]), await run(['{xvm:1600}'])];
   assert.ok(fast.ms < slow.ms * 0.65, `${slow.ms} ms, ${fast.ms} ms`);
   await assert.rejects(run(['{xvm:-1}']), /refused with status 108/);
+});
+
+/// A board at a port, as `verify.js` wants one, in simulated time. From `silentMs` on nothing comes from it. `pace` is
+/// its clock, compared with the computer's.
+class BoardLink {
+  broken = '';
+  #heard = '';
+  #ms = 0;
+  #board;
+
+  constructor({ dialect = 'tinyg', silentMs = Infinity, pace = 1 } = {}) {
+    Object.assign(this, { silentMs, pace });
+    this.#start(new Uint8Array());
+    if (dialect === 'tinyg') return;
+    this.#board.run(100);
+    this.#board.send('{dia:3}\n');
+    this.#board.run(2_000);
+    this.#start(this.#board.eeprom());
+  }
+
+  #start(eeprom, asked = false) {
+    this.#board = new Firmware(module);
+    this.#board.boot(eeprom, asked);
+  }
+
+  now() {
+    return this.#ms;
+  }
+
+  take() {
+    const heard = this.#heard;
+    this.#heard = '';
+    return heard;
+  }
+
+  wait(until) {
+    while (this.#ms < until && this.#heard === '') this.#pass();
+  }
+
+  /// Lets 5 ms of the computer's clock pass.
+  #pass() {
+    this.#ms += 5;
+    this.#board.run(Math.round(this.#ms * this.pace) - Math.round((this.#ms - 5) * this.pace));
+    if (this.#ms < this.silentMs) this.#heard += this.#board.heard();
+    if (this.#board.state().reset) this.#start(this.#board.eeprom(), true);
+  }
+
+  send(bytes) {
+    this.#board.send(bytes);
+  }
+
+  reset() {
+    this.#start(this.#board.eeprom());
+    this.take();
+  }
+
+  /// Returns what the board says to a request in half a second.
+  answer(request) {
+    this.take();
+    this.#board.send(request);
+    for (let n = 0; n < 100; n++) this.#pass();
+    return this.take();
+  }
+}
+
+async function checked(link, dialect = 'tinyg') {
+  const lines = [];
+  const { isSound, verdict, file } = await check(new Firmware(module), link, { dialect, seed: 7, tell: (line) => lines.push(line) });
+  return { isSound, verdict, file, lines, seconds: link.now() / 1_000 };
+}
+
+test('a sound board is found sound in both dialects, and keeps its settings', async (context) => {
+  for (const dialect of ['tinyg', 'grbl']) {
+    const link = new BoardLink({ dialect });
+    link.answer('');
+    const asked = dialect === 'grbl' ? '$$\n' : '{uda:n}\n{udd:n}\n{1:n}\n';
+    const settings = () => [...link.answer(asked).matchAll(/\$\d+=.*|\{"r":\{"(?:ud.|1)":\{.*?\}\}/g)].join('\n');
+    const before = settings();
+    const { isSound, verdict, file, lines, seconds } = await checked(link, dialect);
+    context.diagnostic(`${dialect}: ${verdict} ${seconds} s of the board`);
+    assert.ok(isSound, file);
+    assert.match(file, /clock of Kerf \| ok/);
+    assert.match(file, /Only Kerf itself was checked.*cargo xtask verify/);
+    assert.ok(lines.some((line) => line.includes('job with the drivers off: ')), lines.join('\n'));
+    assert.ok(seconds < 60, `${seconds} s`);
+    assert.ok(before.includes(dialect === 'grbl' ? '$123=' : '{"1":'), before);
+    assert.equal(settings(), before);
+  }
+});
+
+test('a board that falls silent, and one whose clock is wrong, have findings', async () => {
+  const silent = await checked(new BoardLink({ silentMs: 12_000 }));
+  assert.ok(!silent.isSound && silent.seconds < 60, silent.file);
+  assert.match(silent.file, /FAILED \| .*no answer within/);
+  const fast = await checked(new BoardLink({ pace: 1.03 }));
+  assert.match(fast.verdict, /^1 of /);
+  assert.match(fast.file, /clock of Kerf \| FAILED/);
+});
+
+test('a port that fails ends the checks', async () => {
+  const link = new BoardLink();
+  link.send = () => (link.broken = 'unplugged');
+  const { isSound, file, seconds } = await checked(link);
+  assert.ok(!isSound && seconds < 5, file);
+  assert.match(file, /FAILED \| unplugged/);
 });

@@ -37,14 +37,17 @@ browser.setDefaultTimeout(PATIENCE);
 const page = browser.pages()[0] ?? (await browser.newPage());
 // What the driver of the software renderer says of its own speed is no message of the page.
 const isOurs = (text) => !/GPU stall due to ReadPixels|GL Driver Message/.test(text);
-page.on('console', (message) => {
-  if (['error', 'warning'].includes(message.type()) && isOurs(message.text())) messages.push(`${message.type()}: ${message.text()}`);
-});
-page.on('pageerror', (error) => messages.push(`exception: ${error.message}`));
-page.on('requestfailed', (request) => messages.push(`not loaded: ${request.url()}`));
-page.on('response', (response) => {
-  if (response.status() >= 400) messages.push(`${response.status()}: ${response.url()}`);
-});
+function watch(page) {
+  page.on('console', (message) => {
+    if (['error', 'warning'].includes(message.type()) && isOurs(message.text())) messages.push(`${message.type()}: ${message.text()}`);
+  });
+  page.on('pageerror', (error) => messages.push(`exception: ${error.message}`));
+  page.on('requestfailed', (request) => messages.push(`not loaded: ${request.url()}`));
+  page.on('response', (response) => {
+    if (response.status() >= 400) messages.push(`${response.status()}: ${response.url()}`);
+  });
+}
+watch(page);
 
 async function step(name, act) {
   const began = performance.now();
@@ -355,29 +358,103 @@ await step('a profile changes the machine', async () => {
 });
 
 /// A serial port with the firmware behind it, in the place of the browser's, ten times as fast as a board.
-function fakeSerial() {
+///
+/// With `isClock` time in the page is that of the board, which runs as fast as the computer can: a timer of the page ends
+/// when the board's time has come (or in its own time, which is later). From `silentMs` behind the first reset on nothing
+/// comes from the board.
+function fakeSerial({ isClock = false, silentMs = Infinity } = {}) {
+  let ms = 0;
+  let silentFrom = Infinity;
+  let isDriven = true;
+  const timers = new Map();
+  const later = window.setTimeout.bind(window);
+  const end = (id) => {
+    const act = timers.get(id)?.act;
+    timers.delete(id);
+    act?.();
+  };
+  if (isClock) {
+    performance.now = () => ms;
+    window.clearTimeout = (id) => timers.delete(id);
+    window.setTimeout = (act, after = 0, ...rest) => {
+      const id = later(() => end(id), after);
+      timers.set(id, { until: ms + after, act: () => act(...rest) });
+      return id;
+    };
+  }
+  const start = (eeprom, asked) => {
+    window.board = new window.Firmware(window.module);
+    window.board.boot(eeprom, asked);
+  };
+  /// Lets time pass, and gives what the board has sent to the page.
+  const pass = (by, controller) => {
+    ms += by;
+    window.board.run(by);
+    const heard = window.board.heard();
+    if (heard && ms < silentFrom) controller.enqueue(Uint8Array.from(heard, (c) => c.charCodeAt(0)));
+    if (window.board.state().reset) start(window.board.eeprom(), true);
+    for (const [id, { until }] of timers) if (until <= ms) end(id);
+  };
+  /// Calls `act` again and again, and leaves time for the page's own work. Returns what ends that.
+  const repeat = (act) => {
+    if (!isClock) {
+      const timer = setInterval(() => act(100), 10);
+      return () => clearInterval(timer);
+    }
+    const { port1, port2 } = new MessageChannel();
+    port2.onmessage = () => {
+      port1.postMessage('');
+      act(5);
+    };
+    port1.postMessage('');
+    return () => port2.close();
+  };
   const port = {
     async open() {
       const [{ Firmware }, module] = await Promise.all([import('/firmware.js'), WebAssembly.compileStreaming(fetch('/kerf.wasm'))]);
-      const board = new Firmware(module);
-      board.boot();
-      window.board = board;
-      let timer;
+      Object.assign(window, { Firmware, module });
+      start();
+      let cancel;
       this.readable = new ReadableStream({
-        start(controller) {
-          timer = setInterval(() => {
-            board.run(100);
-            const heard = board.heard();
-            if (heard) controller.enqueue(Uint8Array.from(heard, (c) => c.charCodeAt(0)));
-          }, 10);
-        },
-        cancel: () => clearInterval(timer),
+        start: (controller) => (cancel = repeat((by) => pass(by, controller))),
+        cancel: () => cancel(),
       });
-      this.writable = new WritableStream({ write: (bytes) => board.send(bytes) });
+      this.writable = new WritableStream({ write: (bytes) => window.board.send(bytes) });
     },
+    /// A board resets when its reset line is driven.
+    async setSignals({ dataTerminalReady }) {
+      if (dataTerminalReady && !isDriven) {
+        silentFrom = Math.min(silentFrom, ms + silentMs);
+        start(window.board.eeprom());
+      }
+      isDriven = dataTerminalReady;
+    },
+    getInfo: () => ({ usbVendorId: 0x2341 }),
     async close() {},
   };
   Object.defineProperty(navigator, 'serial', { value: { requestPort: async () => port }, configurable: true });
+}
+
+/// Opens the page once more with a board that is its clock, checks the board, and returns the new page.
+async function checkedPage(options) {
+  const other = await browser.newPage();
+  watch(other);
+  await other.addInitScript(fakeSerial, { ...options, isClock: true });
+  await other.goto(address);
+  await other.waitForSelector('html[data-ready]');
+  assert.ok(await other.isHidden('#check'), 'a simulated board is not checked');
+  await other.click('#connect');
+  await other.click('#check');
+  assert.match(await other.textContent('#checking'), /Switch the motors’ supply off/);
+  await other.click('#check-start');
+  await other.waitForSelector('#check-save');
+  return other;
+}
+
+async function report(other) {
+  const [download] = await Promise.all([other.waitForEvent('download'), other.click('#check-save')]);
+  assert.equal(download.suggestedFilename(), 'kerf-verify.md');
+  return readFileSync(await download.path(), 'utf8');
 }
 
 await step('a board behind Web Serial: terminal, settings, a job', async () => {
@@ -398,6 +475,53 @@ await step('a board behind Web Serial: terminal, settings, a job', async () => {
   await page.waitForFunction(() => document.getElementById('set-yvm')?.value === '700');
   await page.click('#connect');
   await shows('#link-state', '^Simulated: ready');
+});
+
+await step('a real board is checked and found sound', async () => {
+  const other = await checkedPage();
+  const verdict = await other.textContent('#check-verdict');
+  assert.match(verdict, /checks passed/);
+  assert.match(await other.textContent('#check-limits'), /Only Kerf itself.*cargo xtask verify/);
+  const file = await report(other);
+  assert.match(file, /settings through a reset \| ok/);
+  assert.match(file, /clock of Kerf \| ok/);
+  assert.match(file, /job with the drivers off \| ok/);
+  assert.match(file, /RAM \| not tried/);
+  await other.addScriptTag({ path: require.resolve('axe-core/axe.min.js') });
+  const { violations } = await other.evaluate(() => window.axe.run());
+  assert.deepEqual(violations.map(({ id, nodes }) => `${id}: ${nodes.map(({ target }) => target)}`), []);
+  await other.screenshot({ path: 'checked.png' });
+  // The board is the terminal's again.
+  await other.click('#check-close');
+  await other.fill('#line', '{fv:n}');
+  await other.press('#line', 'Enter');
+  await other.waitForSelector('#log >> text="fv":');
+  await other.close();
+  return verdict;
+});
+
+await step('a board that falls silent in a check has a finding', async () => {
+  const other = await checkedPage({ silentMs: 12_000 });
+  const verdict = await other.textContent('#check-verdict');
+  assert.match(verdict, /^1 of .* FAILED/);
+  assert.match(await report(other), /FAILED \| .*no answer within/);
+  await other.close();
+  return verdict;
+});
+
+await step('a check that is stopped ends at once', async () => {
+  const other = await browser.newPage();
+  watch(other);
+  await other.addInitScript(fakeSerial);
+  await other.goto(address);
+  await other.waitForSelector('html[data-ready]');
+  await other.click('#connect');
+  await other.click('#check');
+  await other.click('#check-start');
+  await other.click('#check-stop');
+  await other.waitForSelector('#check-save', { timeout: 2_000 });
+  assert.match(await report(other), /FAILED \| stopped by the person/);
+  await other.close();
 });
 
 await step('a keyboard reaches everything, and axe finds nothing', async () => {

@@ -14,6 +14,8 @@
 import { Lines, answerStatus, isText, nameIn, parse } from './protocol.js';
 import { Sender, linesOf } from './sender.js';
 
+/// Time for which a board's reset line is released, so that it resets when the line is driven again, ms.
+const PULSE_MS = 50;
 /// Longest wait for an answer, ms of the computer's time.
 const ANSWER_MS = 4_000;
 
@@ -66,6 +68,7 @@ class Board extends EventTarget {
   ask(line) {
     const answer = new Promise((resolve, reject) => {
       if (this.streaming) return reject(new Error('a job is being sent'));
+      if (this.isLent) return reject(new Error('the board is being checked'));
       const late = setTimeout(() => {
         this.#asked = [];
         reject(new Error(`no answer to ${line}`));
@@ -179,6 +182,9 @@ export class SerialBoard extends Board {
   #writer;
   #reader;
   #sender;
+  #borrower;
+  /// The dialect of the last greeting: `tinyg` or `grbl`. A port whose dialect is open greets in both, TinyG's last.
+  greeted;
 
   /// Asks the user for a port and opens it. A board resets when its port is opened.
   static async open(baudRate = 115_200) {
@@ -209,16 +215,20 @@ export class SerialBoard extends Board {
     this.#reader = undefined;
     this.#port = undefined;
     this.streaming = false;
+    this.#borrower?.lost();
     this.tell('closed');
   }
 
   #jobLines = new Lines();
 
   #heard(text) {
+    if (this.#borrower) return this.#borrower.hear(text);
     this.hear(text);
     const sender = this.#sender;
     const lines = this.#jobLines.add(text);
+    if (lines.some((line) => line.startsWith('Grbl '))) this.greeted = 'grbl';
     if (lines.some((line) => parse(line)?.r?.msg === 'SYSTEM READY')) {
+      this.greeted = 'tinyg';
       this.#end('the machine has started anew');
       this.forget();
       this.tell('booted');
@@ -243,8 +253,39 @@ export class SerialBoard extends Board {
     this.tell('streamed', { answered, refused, notes, why });
   }
 
+  /// Nothing is sent while the port is lent.
   send(text) {
-    this.#writer?.write(Uint8Array.from(text, (character) => character.charCodeAt(0))).catch(() => {});
+    if (!this.isLent) this.write(text);
+  }
+
+  /// Sends text or bytes, also while the port is lent.
+  write(data) {
+    const bytes = typeof data === 'string' ? Uint8Array.from(data, (character) => character.charCodeAt(0)) : data;
+    this.#writer?.write(bytes).catch(() => {});
+  }
+
+  get isLent() {
+    return Boolean(this.#borrower);
+  }
+
+  /// Lends the port to `{ hear(text), lost() }`: only `write` sends, and only the borrower hears. `undefined` ends that.
+  lend(borrower) {
+    this.#borrower = borrower;
+    this.#jobLines = new Lines();
+    this.forget();
+  }
+
+  /// Resets the board by its reset line. `act` is called right before.
+  async pulse(act) {
+    await this.#port.setSignals({ dataTerminalReady: false });
+    await new Promise((resolve) => setTimeout(resolve, PULSE_MS));
+    act();
+    await this.#port.setSignals({ dataTerminalReady: true });
+  }
+
+  /// The number of the vendor of the board's USB; `undefined` if the port is no USB port.
+  get vendor() {
+    return this.#port?.getInfo?.().usbVendorId;
   }
 
   sendLine(line) {

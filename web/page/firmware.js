@@ -10,6 +10,19 @@ const decoder = new TextDecoder('latin1');
 /// The number and the names of the inputs of a board, in the order of `boards::inputs`.
 export const INPUTS = ['xmin', 'xmax', 'ymin', 'ymax', 'zmin', 'zmax', 'amin', 'amax', 'probe', 'door', 'stop'];
 
+const textOf = (bytes) => new TextDecoder().decode(bytes);
+/// What the checks of a board want, in the order of `Want` in web/src/verify.rs: a name, and how the contents are read.
+const WANTS = [
+  ['wait', (bytes) => ({ until: new Float64Array(bytes)[0] })],
+  ['send', (bytes) => ({ bytes: new Uint8Array(bytes) })],
+  ['reset', () => ({})],
+  ['tell', (bytes) => ({ line: textOf(bytes) })],
+  ['done', (bytes) => {
+    const [verdict, ...file] = textOf(bytes.slice(1)).split('\n');
+    return { isSound: new Uint8Array(bytes)[0] === 1, verdict, file: file.join('\n') };
+  }],
+];
+
 export class Firmware {
   /// `module` is a compiled WebAssembly.Module.
   constructor(module) {
@@ -111,6 +124,23 @@ export class Firmware {
   /// Returns profiles and codes.
   tables() {
     return JSON.parse(new TextDecoder().decode(this.#take(this.wasm.tables())));
+  }
+
+  /// Prepares the checks of a real board, in this dialect. No machine is needed for them.
+  verifyBegin(dialect, seed) {
+    this.wasm.verify_begin(dialect === 'grbl' ? 1 : 0, seed);
+  }
+
+  /// Goes on with the checks. Returns what they want next: see `WANTS`.
+  verifyStep(ms, heard) {
+    const bytes = this.#take(this.wasm.verify_step(ms, this.#give(bytesOf(heard))));
+    const [kind, read] = WANTS[new Uint8Array(bytes)[0]];
+    return { kind, ...read(bytes.slice(1)) };
+  }
+
+  /// Tells the checks why the port does not work any more.
+  verifyFail(why) {
+    this.wasm.verify_fail(this.#give(encoder.encode(why)));
   }
 
   /// Returns the bytes of memory that the machine and its samples take.

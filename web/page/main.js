@@ -5,6 +5,7 @@
 // | `boards.js` | the connected machine, simulated or real |
 // | `job-panel.js` | a job and its dry run in `job-worker.js` |
 // | `machine-panel.js` | controls and terminal |
+// | `verify-panel.js`, `verify.js` | the checks of a real board |
 // | `settings-panel.js`, `settings-file.js` | settings as a form and as a file |
 // | `view.js`, `charts.js` | path and curves |
 // | `firmware.js`, `sender.js`, `protocol.js`, `path.js`, `job-run.js` | run in Workers, and in Node for tests |
@@ -19,6 +20,7 @@ import { STATES } from './protocol.js';
 import { requests, save } from './settings-file.js';
 import { SettingsPanel } from './settings-panel.js';
 import { startTheme } from './theme.js';
+import { VerifyPanel } from './verify-panel.js';
 import { View } from './view.js';
 
 const page = { board: undefined, result: undefined, ms: 0, playing: false, scale: undefined };
@@ -174,6 +176,17 @@ function use(board, machinePanel) {
   settings.use(board);
 }
 
+/// Asks a real board for its state and settings. A board that does not answer can be checked, too.
+async function greet(board) {
+  try {
+    await board.ask('{sr:n}');
+    await settings.show();
+  } catch {
+    if (page.board === board) showLink('No answer', 'bad');
+  }
+  byId('check').hidden = page.board !== board;
+}
+
 /// Replaces the simulated board by a real one, or the other way round.
 async function connect(machinePanel, module) {
   if (!page.board.simulated) {
@@ -189,11 +202,12 @@ async function connect(machinePanel, module) {
     showTab('machine');
     board.on('closed', () => {
       byId('connect').textContent = 'Connect a board';
+      byId('check').hidden = true;
       say('The port is closed.');
       use(new SimulatedBoard(module), machinePanel);
     });
     // A board resets and sends its greeting when its port is opened.
-    setTimeout(() => board.ask('{sr:n}').then(() => settings.show()).catch(() => showLink('No answer', 'bad')), 2_500);
+    setTimeout(() => greet(board), 2_500);
   } catch (error) {
     if (error.name !== 'NotFoundError') say(`The port cannot be opened: ${error.message}`);
   }
@@ -242,6 +256,7 @@ async function start() {
     go(Number(event.target.value));
   });
   byId('play').addEventListener('click', () => play(!page.playing));
+  new VerifyPanel({ module, board: () => page.board });
   byId('connect').hidden = !('serial' in navigator);
   byId('connect').addEventListener('click', () => connect(machinePanel, module));
   use(new SimulatedBoard(module), machinePanel);

@@ -11,11 +11,12 @@
 //! | [`mod@curves`] | velocity, acceleration and jerk, computed from the samples |
 //! | [`mod@asked`] | the lines that ask for more than the machine's limits allow |
 //! | [`mod@tables`] | profiles and codes, as JSON |
+//! | [`mod@verify`] | the checks of a real board, for which no machine is needed |
 //!
 //! Bytes pass through two buffers. The page writes to [`input`] and passes the number of bytes. A call whose result is
 //! a length has written its output to [`output`]. A pointer is valid until the next call, because memory may grow.
-//! Lengths beyond a buffer are cut to it. Before [`boot`] all other functions do nothing and return 0. Units: ms of the
-//! machine's time, motor steps; mm and s in curves.
+//! Lengths beyond a buffer are cut to it. Before [`boot`] the functions of a machine do nothing and return 0. Units: ms
+//! of the machine's time, motor steps; mm and s in curves.
 //!
 //! Cost: a second of the machine's time takes 1 to 5 ms on a desktop computer.
 
@@ -24,11 +25,15 @@ pub mod bench;
 pub mod curves;
 pub mod samples;
 pub mod tables;
+pub mod verify;
 
 use std::cell::RefCell;
+use std::time::Duration;
 
 use bench::Bench;
 use curves::Curves;
+use kerf_verify::dialect::{GRBL, TINYG};
+use verify::{Verification, Want};
 
 /// The state of the module.
 #[derive(Default)]
@@ -37,6 +42,7 @@ struct Page {
     output: Vec<u8>,
     bench: Option<Bench>,
     curves: Curves,
+    verification: Option<Verification>,
 }
 
 thread_local! {
@@ -222,6 +228,38 @@ pub extern "C" fn asked(len: usize) -> usize {
 #[unsafe(no_mangle)]
 pub extern "C" fn tables() -> usize {
     page(|page| page.tell(tables::json().into_bytes()))
+}
+
+/// Prepares the checks of a real board, in grbl's dialect if `grbl` is 1, else in TinyG's. `seed` chooses the values
+/// that are stored.
+#[unsafe(no_mangle)]
+pub extern "C" fn verify_begin(grbl: u32, seed: f64) {
+    let dialect = if grbl != 0 { &GRBL } else { &TINYG };
+    page(|page| page.verification = Some(Verification::new(dialect, seed as u64)));
+}
+
+/// Goes on with the checks, see [`Verification::step`]. The time is in ms, the input is what the board has sent. Writes
+/// what is wanted next, see [`Want::bytes`]. Returns the length; 0 if nothing is wanted any more.
+#[unsafe(no_mangle)]
+pub extern "C" fn verify_step(ms: f64, len: usize) -> usize {
+    page(|page| {
+        let now = Duration::try_from_secs_f64(ms / 1e3).unwrap_or_default();
+        let Page { input, verification, .. } = page;
+        let heard = input.get(..len).unwrap_or(input);
+        let want = verification.as_mut().and_then(|checks| checks.step(now, heard));
+        page.tell(want.map(Want::bytes).unwrap_or_default())
+    })
+}
+
+/// Tells the checks that the port does not work any more. The input says why.
+#[unsafe(no_mangle)]
+pub extern "C" fn verify_fail(len: usize) {
+    page(|page| {
+        let why = String::from_utf8_lossy(page.given(len)).into_owned();
+        if let Some(checks) = &mut page.verification {
+            checks.fail(&why);
+        }
+    });
 }
 
 /// Returns the numbers of the input; 0 for missing ones.
