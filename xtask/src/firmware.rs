@@ -7,12 +7,13 @@ use clap::Args;
 
 use crate::boards::Board;
 use crate::chips::{ATMEGA1284P, ATMEGA2560, Chip};
+use crate::dist::hex;
 use crate::elf;
 use crate::machines::Machine;
 use crate::process::{self, root, run};
 use crate::rp2040;
 use crate::setup::{self, Scope};
-use crate::shrink::{self, link};
+use crate::shrink::{self, link, restart};
 use crate::toolchain::Toolchain;
 
 /// Flags of the compiler. Copies of code (`tail-dup-placement`, `rotation-max-header-size`,
@@ -156,7 +157,7 @@ fn make_small(text: &Path, linked: &Path, elf: &Path) -> Result<PathBuf> {
         let link = link::Link::read(linked)?;
         link.image(&texts.plain, &plain, &ATMEGA2560)?;
         elf::check_compiled(&plain, &ATMEGA2560)?;
-        link.image(&texts.small, &small, &ATMEGA2560)?;
+        restart::link(&link, &texts.small, &small, &ATMEGA2560)?;
     }
     keep(&small, elf)
 }
@@ -199,6 +200,19 @@ fn build_parts() -> Result<()> {
     let mut cargo = cargo_for(&ATMEGA2560)?;
     cargo.args(["--package", "kerf", "--no-default-features", "--features"]).arg(features);
     keep_examples(cargo, &ATMEGA2560, &PARTS, &directory().join("parts"))
+}
+
+/// Builds the image that tests a chip, with the others of `tests/chip`; returns the path of an Intel HEX file. It is
+/// short, and what the board had before it stays behind it. So the file also has a jump to 0 where the boot loader goes
+/// after a reset by the watchdog.
+pub fn build_self_test() -> Result<PathBuf> {
+    build_parts()?;
+    let elf = directory().join("parts/verify.elf");
+    let mut parts = hex::parts(&std::fs::read(&elf)?)?;
+    parts.push((restart::CALLED.into(), elf::restart::JUMP.to_vec()));
+    let file = elf.with_extension("hex");
+    std::fs::write(&file, hex::of_parts(&parts))?;
+    Ok(file)
 }
 
 /// Builds some examples for a chip, with a feature of the runtime, into a folder.

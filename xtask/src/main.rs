@@ -14,6 +14,7 @@
 //! | [`dist`] | writes the files of a release |
 //! | [`sim`] | runs the image on the simulated board |
 //! | [`settings`] | saves and loads the settings of a machine |
+//! | [`verify`] | finds out whether a board is sound |
 //! | [`fuzz`] | runs the fuzzers |
 //! | [`senders`] | runs real senders against the simulated board |
 //! | [`npm`] | installs packages of npm |
@@ -53,6 +54,7 @@ mod shrink;
 mod sim;
 mod size;
 mod toolchain;
+mod verify;
 mod web;
 
 use std::process::ExitCode;
@@ -94,6 +96,8 @@ enum Command {
     Flash(firmware::FlashArgs),
     /// Save the settings of a machine to a file, or load them
     Settings(settings::SettingsArgs),
+    /// Find out whether a board is sound: its chip, then Kerf on it; write what was found to a file
+    Verify(verify::VerifyArgs),
     /// Write the files of a release to target/dist: a .hex for each board, the settings as a schema, licences,
     /// checksums
     Dist,
@@ -146,6 +150,7 @@ fn dispatch(command: Command) -> anyhow::Result<ExitCode> {
         Command::Test => checks::run()?,
         Command::Flash(args) => firmware::flash(&args)?,
         Command::Settings(args) => return settings::run(&args),
+        Command::Verify(args) => return verify::run(&args),
         Command::Dist => dist::run()?,
         Command::Jobs => jobs::write()?,
         Command::Docs => process::run(host_cargo().args(DESCRIBE))?,

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command};
 use std::time::Duration;
 
-use kerf::boards::{MEGA2560_GRBL, RAMPS14_CNC};
+use kerf::boards::{MEGA2560_GRBL, MEGA2560_LATHE, RAMPS14_CNC};
 use kerf_sim::job::{self, Options};
 use kerf_sim::pty::{Peer, Pty};
 use kerf_sim::{Host, Image, Loader, Machine};
@@ -119,6 +119,40 @@ fn greeting(machine: &mut Machine, from: u64, longest_ms: u64) -> Option<u64> {
         }
     }
     Some((machine.cycle() - from) / machine.cycles(1))
+}
+
+/// After a reset by the watchdog the loader goes to 0x20000, in the middle of each image. There is a jump to the start:
+/// the firmware comes back, as a whole and at once, without the second that the loader waits otherwise.
+#[test]
+fn the_firmware_comes_back_when_the_watchdog_has_bitten() {
+    const TIMSK0: u16 = 0x6E;
+    for firmware in [&MEGA2560_GRBL, &MEGA2560_LATHE, &RAMPS14_CNC] {
+        let mut machine = Machine::load(&image(firmware), firmware).unwrap();
+        machine.install(&Loader::of_debian().unwrap());
+        let mut host = Host::new(1);
+        host.boot(&mut machine, 3_000).unwrap();
+        host.ask(&mut machine, "g1 f400 x1", 5_000).unwrap();
+        for (act, longest, cause) in [(true, 8_000, 3), (false, 8_000, 4)] {
+            let resets = machine.resets();
+            match act {
+                true => machine.poke(TIMSK0, 0),
+                false => machine.send(b"{reset:1}\n"),
+            }
+            let end = machine.cycle() + machine.cycles(longest);
+            while machine.resets() == resets {
+                machine.run_for_ms(1).unwrap();
+                assert!(machine.cycle() < end, "{}: no reset", firmware.name);
+            }
+            machine.receive();
+            let from = machine.cycle();
+            let ms = greeting(&mut machine, from, 3_000).unwrap();
+            assert!(ms < 300, "{}: {ms} ms", firmware.name);
+            let told = host.ask(&mut machine, "{rst:n}", 1_000).unwrap();
+            assert_eq!(told.body["rst"], cause, "{}: {}", firmware.name, told.raw);
+            host.ask(&mut machine, "{clear:n}", 1_000).unwrap();
+        }
+        works(&mut machine);
+    }
 }
 
 #[test]

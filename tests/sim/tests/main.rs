@@ -97,6 +97,7 @@ mod turning_alarms;
 mod turning_faults;
 mod turning_holds;
 mod turning_strays;
+mod verify;
 mod verify_chip;
 mod watchdog;
 mod wrap;

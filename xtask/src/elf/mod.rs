@@ -1,11 +1,12 @@
 //! Reads a firmware image: sections, symbols with readable names, code. Refuses images with certain defects.
 
 mod arithmetic;
-mod disasm;
+pub mod disasm;
 mod flow;
 mod marks;
 pub mod places;
 mod pointer;
+pub mod restart;
 mod scratch;
 pub mod stack;
 mod stack_args;
@@ -89,7 +90,9 @@ pub fn check(path: &Path) -> Result<()> {
         "{shown} takes {flash} bytes of flash, more than {}",
         caps::FLASH
     );
-    marks::check(&image, &hex::parts(&std::fs::read(path)?)?)?;
+    let parts = hex::parts(&std::fs::read(path)?)?;
+    marks::check(&image, &parts)?;
+    restart::check(&image, &parts)?;
     arithmetic::check(&image)?;
     tables::check(&image)
 }

@@ -17,6 +17,8 @@ pub enum Scope {
     Arm,
     /// Running the RP2040's emulator, beside the simulator.
     Emulator,
+    /// Building the firmware and flashing it.
+    Flash,
     /// Running all tests on simulated and emulated boards.
     Tests,
     /// Building the fuzzers, and nothing else.
@@ -41,7 +43,10 @@ impl Scope {
             Scope::Emulator => {
                 matches!(need, Scope::Arm | Scope::Senders) || Scope::Simulator.covers(need)
             }
-            Scope::Tests => need == Scope::Tests || Scope::Emulator.covers(need),
+            Scope::Flash => need == Scope::Flash || Scope::Firmware.covers(need),
+            Scope::Tests => {
+                matches!(need, Scope::Tests | Scope::Flash) || Scope::Emulator.covers(need)
+            }
             Scope::Fuzzers => need == Scope::Fuzzers,
             Scope::Senders => {
                 matches!(need, Scope::Senders | Scope::Python) || Scope::Simulator.covers(need)
@@ -90,7 +95,7 @@ pub static NEEDS: [Need; 14] = [
         let libraries = ["--exists", "libelf", "zlib", "libzstd"];
         probe(Command::new("pkg-config").args(libraries)).is_some()
     }),
-    tool("avrdude, which flashes simulated boards", &["avrdude"], Scope::Tests, || has("avrdude")),
+    tool("avrdude, which flashes boards", &["avrdude"], Scope::Flash, || has("avrdude")),
     tool("the boot loader of the Arduino Mega", &["arduino-core-avr"], Scope::Tests, || {
         Path::new(BOOT_LOADER).exists()
     }),
@@ -182,6 +187,7 @@ mod tests {
         assert_eq!(needs(Scope::Simulator), 7);
         assert_eq!(needs(Scope::Arm), 5);
         assert_eq!(needs(Scope::Emulator), 9);
+        assert_eq!(needs(Scope::Flash), 5);
         assert_eq!(needs(Scope::Tests), 11);
         assert_eq!(needs(Scope::Fuzzers), 1);
         assert_eq!(needs(Scope::Senders), 9);

@@ -15,6 +15,7 @@
 //! | [`via`] | trampolines: several long calls share one jump | 1,200 |
 //! | [`verify`] | inlines shared code again, and compares the result with the tidied text | |
 //! | [`link`] | assembles and links, as `rustc` did | |
+//! | [`restart`] | puts a jump to 0 where the boot loader goes after a reset by the watchdog | |
 //!
 //! Shared code costs its caller 7 to 25 cycles, and three bytes of stack while it runs. `crate::elf` searches LLVM's
 //! unchanged output for known compiler defects, and analyses the stack of the final image.
@@ -26,6 +27,7 @@ pub mod link;
 mod order;
 pub mod prologue;
 mod repeats;
+pub mod restart;
 pub mod text;
 mod tidy;
 mod verify;
@@ -38,12 +40,12 @@ use anyhow::{Context, Result};
 use hot::Heat;
 use text::{Function, Insn, Line, Program};
 
-/// Two texts for the assembler.
+/// A program twice.
 pub struct Texts {
-    /// The compiler's program, without debug information.
+    /// The compiler's program, without debug information, for the assembler.
     pub plain: String,
     /// The program that is linked: tidied, with shared code.
-    pub small: String,
+    pub small: Program,
 }
 
 /// Parses the compiler's text, and optimizes it.
@@ -58,7 +60,7 @@ pub fn shrink(text: &str) -> Result<Texts> {
     order::arrange(&mut small);
     via::share(&mut small);
     verify::check(&tidy, &small).context("the program that was made smaller is another one")?;
-    Ok(Texts { plain: text::without_debug(&plain.text()), small: small.text() })
+    Ok(Texts { plain: text::without_debug(&plain.text()), small })
 }
 
 /// How much of a function may be shared.

@@ -1,0 +1,354 @@
+//! `cargo xtask verify` at simulated boards, in simulated time: a sound board has no finding, and each fault is found by
+//! the check that is for it.
+
+use std::time::Duration;
+
+use embassy_futures::block_on;
+use kerf::boards::{Board, MEGA2560_GRBL, MEGA2560_GRBL_LATHE, RAMPS14};
+use kerf_sim::mechanics::Random;
+use kerf_sim::{Image, Loader, Machine};
+use kerf_verify::dialect::of_feature;
+use kerf_verify::line::Line;
+use kerf_verify::{Image as Which, Outcome, Plan, Report, chip, verify};
+
+use crate::common::{image, part};
+
+/// Cycles between two looks for bytes: half a millisecond.
+const SLICE: u64 = 8_000;
+/// Cycles in which a jumper carries a level from pin to pin: 2 us.
+const JUMPER_SLICE: u64 = 32;
+/// One bit in so many bytes is wrong on a bad line.
+const NOISE: u64 = 300;
+/// Where the loader goes after a reset by the watchdog, and a jump to 0.
+const CALLED: usize = 0x2_0000;
+const JUMP: [u8; 4] = [0x0C, 0x94, 0, 0];
+/// Number of cells of the EEPROM.
+const CELLS: usize = 4_096;
+/// The size of the flash below the boot loader.
+const FLASH: usize = 0x3_E000;
+/// Time in which a person or a program flashes a board, ms.
+const FLASHING_MS: u64 = 50;
+
+/// What is wrong with a board.
+#[derive(Clone, Copy)]
+struct Faults {
+    /// Its clock, compared with the nominal one.
+    clock: f64,
+    /// From this rate on, one bit in 300 bytes is wrong, both ways.
+    noise_from: u32,
+    /// The board falls silent after so many bytes.
+    silent_after: usize,
+    /// Kerf is not on it, but another program.
+    has_no_kerf: bool,
+    /// Each reset brings the values back that it had at first.
+    forgets: bool,
+    /// A jumper from the direction pin of X to its lower switch.
+    has_jumper: bool,
+    /// Changes to its chip.
+    chip: fn(&mut Machine),
+}
+
+const NONE: Faults = Faults {
+    clock: 1.0,
+    noise_from: u32::MAX,
+    silent_after: usize::MAX,
+    has_no_kerf: false,
+    forgets: false,
+    has_jumper: false,
+    chip: |_| {},
+};
+
+/// A simulated board behind its boot loader, and the computer at the other end of the line.
+struct Simulated {
+    machine: Machine,
+    board: &'static Board,
+    faults: Faults,
+    random: Random,
+    rate: u32,
+    heard: usize,
+    first_cells: Box<[u8; CELLS]>,
+    /// What has been checked.
+    told: Vec<String>,
+}
+
+impl Simulated {
+    fn new(board: &'static Board, faults: Faults) -> Self {
+        let mut machine = Machine::load(&image(board), board).unwrap();
+        machine.install(&Loader::of_debian().unwrap());
+        (faults.chip)(&mut machine);
+        let (random, first_cells) = (Random::new(1), Box::new(*machine.eeprom()));
+        let (rate, heard, told) = (115_200, 0, Vec::new());
+        Simulated { machine, board, faults, random, rate, heard, first_cells, told }
+    }
+
+    /// Returns the cycle of a time of the computer's clock.
+    fn cycle(&self, time: Duration) -> u64 {
+        let hz = f64::from(self.board.clock_hz) * self.faults.clock;
+        (time.as_secs_f64() * hz).round() as u64
+    }
+
+    /// Spoils some bits.
+    fn spoiled(&mut self, mut bytes: Vec<u8>) -> Vec<u8> {
+        for byte in bytes.iter_mut().filter(|_| self.rate >= self.faults.noise_from) {
+            if self.random.below(NOISE) == 0 {
+                *byte ^= 1 << self.random.below(8);
+            }
+        }
+        bytes
+    }
+
+    fn set_wire(&mut self, rate: u32) {
+        self.rate = rate;
+        self.machine.set_baud((f64::from(rate) / self.faults.clock).round() as u32);
+    }
+
+    /// Runs for some cycles.
+    fn run(&mut self, until: u64) -> Result<(), String> {
+        let (from, to) = (self.board.motors[0].dir, self.board.inputs[0].unwrap());
+        while self.machine.cycle() < until {
+            let slice = if self.faults.has_jumper { JUMPER_SLICE } else { SLICE };
+            let next = (self.machine.cycle() + slice).min(until);
+            self.machine.run_until(next).map_err(|fault| fault.to_string())?;
+            if self.faults.has_jumper {
+                let level = self.machine.is_high(from);
+                self.machine.drive_pin(to.port.letter(), to.bit, level);
+            }
+        }
+        Ok(())
+    }
+}
+
+impl kerf_verify::Board for Simulated {
+    async fn flash(&mut self, which: Which) -> Result<(), String> {
+        let is_other = which == Which::SelfTest || self.faults.has_no_kerf;
+        let elf = if is_other { part("verify") } else { image(self.board) };
+        let image = Image::read(&elf).map_err(|error| error.to_string())?;
+        self.machine.run_for_ms(FLASHING_MS).map_err(|fault| fault.to_string())?;
+        // What was there before stays behind the image, and the file of the self-test has a jump there.
+        let mut flash: Vec<u8> = (0..FLASH as u32).map(|at| self.machine.flash(at)).collect();
+        flash[..image.flash.len()].copy_from_slice(&image.flash);
+        if which == Which::SelfTest {
+            flash[CALLED..][..JUMP.len()].copy_from_slice(&JUMP);
+        }
+        self.machine.fill_flash(&flash);
+        assert!(self.machine.recognises(&image));
+        self.reset().await
+    }
+
+    async fn reset(&mut self) -> Result<(), String> {
+        self.machine.reset();
+        self.machine.receive();
+        if self.faults.forgets {
+            self.machine.set_eeprom(&self.first_cells);
+        }
+        self.set_wire(115_200);
+        Ok(())
+    }
+
+    async fn set_rate(&mut self, rate: u32) -> Result<(), String> {
+        while self.machine.wire().backlog() > 0 {
+            self.machine.run_for_ms(1).map_err(|fault| fault.to_string())?;
+        }
+        // The last byte, and what a converter takes.
+        self.machine.run_for_ms(3).map_err(|fault| fault.to_string())?;
+        self.set_wire(rate);
+        Ok(())
+    }
+
+    async fn send(&mut self, bytes: &[u8]) -> Result<(), String> {
+        let bytes = self.spoiled(bytes.to_vec());
+        self.machine.send(&bytes);
+        Ok(())
+    }
+
+    async fn receive(&mut self, until: Duration) -> Result<Vec<u8>, String> {
+        let end = self.cycle(until);
+        loop {
+            let bytes = self.machine.receive();
+            self.heard += bytes.len();
+            let is_silent = self.heard > self.faults.silent_after;
+            if !bytes.is_empty() && !is_silent || self.machine.cycle() >= end {
+                return Ok(if is_silent { Vec::new() } else { self.spoiled(bytes) });
+            }
+            let next = self.machine.cycle() + SLICE;
+            self.run(next.min(end))?;
+        }
+    }
+
+    fn now(&self) -> Duration {
+        let hz = f64::from(self.board.clock_hz) * self.faults.clock;
+        Duration::from_secs_f64(self.machine.cycle() as f64 / hz)
+    }
+
+    fn tell(&mut self, what: &str) {
+        self.told.push(what.to_owned());
+    }
+}
+
+fn plan(board: &'static Board, faults: Faults, tests_chip: bool) -> Plan {
+    Plan {
+        board: board.name.to_owned(),
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        dialect: board.features.iter().find_map(|feature| of_feature(feature)).unwrap(),
+        clock_hz: tests_chip.then_some(board.clock_hz),
+        static_end: Image::read(&image(board)).ok().map(|image| image.static_end),
+        has_jumper: faults.has_jumper,
+        seconds: 2,
+        seed: 1,
+    }
+}
+
+/// Makes all checks. The self-test image takes part if `tests_chip`.
+fn report(board: &'static Board, faults: Faults, tests_chip: bool) -> Report {
+    let mut simulated = Simulated::new(board, faults);
+    block_on(verify(&mut simulated, &plan(board, faults, tests_chip)))
+}
+
+/// Makes the checks of the chip.
+fn chip_report(faults: Faults) -> Report {
+    let board = &MEGA2560_GRBL;
+    let mut simulated = Simulated::new(board, faults);
+    let plan = plan(board, faults, true);
+    let mut report = Report::new(&plan);
+    block_on(chip::check(&mut Line::new(&mut simulated), &plan, &mut report));
+    report
+}
+
+fn names(report: &Report, outcome: Outcome) -> Vec<&'static str> {
+    let these = report.findings().iter().filter(|one| one.outcome == outcome);
+    these.map(|one| one.name).collect()
+}
+
+/// Only these checks have failed. Returns what the first of them measured.
+fn fails(report: &Report, wanted: &[&str]) -> String {
+    assert_eq!(names(report, Outcome::Failed), wanted, "{report}");
+    let found = report.findings().iter().find(|one| one.outcome == Outcome::Failed);
+    found.unwrap().measured.clone()
+}
+
+/// Also the free stack is what the simulator has seen.
+#[test]
+fn a_sound_board_has_no_finding() {
+    let faults = Faults { has_jumper: true, ..NONE };
+    let report = report(&MEGA2560_GRBL, faults, true);
+    println!("{report}");
+    assert!(report.is_sound(), "{report}");
+    assert_eq!(names(&report, Outcome::Untried), [""; 0], "{report}");
+}
+
+#[test]
+fn kerf_is_checked_in_each_dialect() {
+    for board in [&MEGA2560_GRBL, &MEGA2560_GRBL_LATHE, &RAMPS14] {
+        let report = report(board, NONE, false);
+        assert!(report.is_sound(), "{report}");
+    }
+}
+
+/// The values that a check stores are the old ones afterwards.
+#[test]
+fn settings_are_as_before() {
+    for (board, read) in
+        [(&MEGA2560_GRBL, "{uda:n}"), (&MEGA2560_GRBL_LATHE, "$$"), (&RAMPS14, "M503")]
+    {
+        let mut simulated = Simulated::new(board, NONE);
+        let settings = |simulated: &mut Simulated| {
+            let mut line = Line::new(simulated);
+            block_on(async {
+                line.reset().await?;
+                line.pass(Duration::from_secs(3)).await?;
+                line.say(read).await?;
+                let mut all = Vec::new();
+                let until = line.now() + Duration::from_secs(1);
+                while let Some(one) = line.next(until).await? {
+                    all.push(one);
+                }
+                Ok::<_, String>(all)
+            })
+            .unwrap()
+        };
+        let before = settings(&mut simulated);
+        assert!(!before.is_empty(), "{before:?}");
+        block_on(verify(&mut simulated, &plan(board, NONE, false)));
+        assert_eq!(settings(&mut simulated), before, "{}", board.name);
+    }
+}
+
+#[test]
+fn a_dead_cell_is_found() {
+    let report = chip_report(Faults { chip: |m| m.stick_cell(0x4D2, 0x10, 0x10), ..NONE });
+    assert!(fails(&report, &["EEPROM"]).contains("1 of 4096 cells are bad, the first at 0x4d2"));
+}
+
+#[test]
+fn a_bad_byte_of_ram_is_found() {
+    let report = chip_report(Faults { chip: |m| m.stick_ram(0x1234, 0x02, 0), ..NONE });
+    assert!(fails(&report, &["RAM"]).contains("the first at 0x1234"), "{report}");
+}
+
+#[test]
+fn a_timer_at_a_wrong_rate_is_found() {
+    for pace in [0.0, 0.5] {
+        let chip = if pace > 0.0 {
+            |m: &mut Machine| m.set_pace(4, 0.5)
+        } else {
+            |m: &mut Machine| m.set_pace(4, 0.0)
+        };
+        let measured = fails(&chip_report(Faults { chip, ..NONE }), &["timers"]);
+        assert!(measured.starts_with("timer 4 counts"), "{measured}");
+    }
+}
+
+#[test]
+fn a_rate_with_noise_is_found() {
+    let report = chip_report(Faults { noise_from: 250_000, ..NONE });
+    let measured = fails(&report, &["rates of the line"]);
+    assert!(measured.contains("250000 baud") && !measured.contains("230400"), "{measured}");
+}
+
+/// The clock of Kerf is wrong, too. The serial line does not bear much more.
+#[test]
+fn a_wrong_crystal_is_found() {
+    let faults = Faults { clock: 0.985, ..NONE };
+    let report = report(&MEGA2560_GRBL, faults, true);
+    let failed = names(&report, Outcome::Failed);
+    for name in ["clock of the chip", "clock of Kerf"] {
+        assert!(failed.contains(&name), "{report}");
+    }
+    let told = report.findings().iter().find(|one| one.name == "clock of the chip");
+    let ppm = told.unwrap().measured.split(' ').next().unwrap().parse::<f64>().unwrap();
+    assert!((ppm + 15_000.0).abs() < 1_000.0, "{report}");
+}
+
+#[test]
+fn a_crystal_that_is_far_off_lets_nothing_be_tried() {
+    let report = report(&MEGA2560_GRBL, Faults { clock: 1.12, ..NONE }, true);
+    assert_eq!(names(&report, Outcome::Failed), ["self-test image", "Kerf"], "{report}");
+    assert_eq!(names(&report, Outcome::Sound), [""; 0], "{report}");
+}
+
+#[test]
+fn another_program_is_not_taken_for_kerf() {
+    let faults = Faults { has_no_kerf: true, ..NONE };
+    let measured = fails(&report(&MEGA2560_GRBL, faults, false), &["Kerf"]);
+    assert!(measured.contains("no answer"), "{measured}");
+}
+
+#[test]
+fn a_board_that_forgets_is_found() {
+    let faults = Faults { forgets: true, ..NONE };
+    for board in [&MEGA2560_GRBL, &MEGA2560_GRBL_LATHE, &RAMPS14] {
+        let report = report(board, faults, false);
+        assert!(names(&report, Outcome::Failed).contains(&"settings through a reset"), "{report}");
+    }
+}
+
+/// Wherever the board falls silent, the checks end, and at least one has failed.
+#[test]
+fn a_board_that_falls_silent_ends_the_checks() {
+    let mut random = Random::new(3);
+    for _ in 0..4 {
+        let silent_after = random.below(3_000) as usize;
+        let report = report(&MEGA2560_GRBL, Faults { silent_after, ..NONE }, false);
+        assert!(!names(&report, Outcome::Failed).is_empty(), "{silent_after}: {report}");
+    }
+}

@@ -1,0 +1,96 @@
+//! TinyG's dialect.
+
+use super::{Dialect, Each, ForJob, Question, Stored, between, number};
+use crate::random::Random;
+
+/// The end of a value in JSON.
+const END: &[char] = &[',', '}'];
+/// The state of a machine that moves or dwells.
+const RUNS: &str = "5";
+
+macro_rules! word {
+    ($name:literal) => {
+        Stored {
+            read: concat!("{", $name, ":n}"),
+            find: |lines| value(lines, $name).map(|text| text.trim_matches('"').to_owned()),
+            store: |text| vec![format!(concat!("{{", $name, ":\"{}\"}}"), text)],
+            other,
+        }
+    };
+}
+
+macro_rules! unpowered {
+    ($name:literal) => {
+        ForJob {
+            value: Stored {
+                read: concat!("{", $name, ":n}"),
+                find: |lines| value(lines, $name),
+                store: |text| vec![format!(concat!("{{", $name, ":{}}}"), text)],
+                other,
+            },
+            needed: "0",
+        }
+    };
+}
+
+/// TinyG's dialect.
+pub static TINYG: Dialect = Dialect {
+    name: "tinyg",
+    is_greeting: |line| line.contains("SYSTEM READY"),
+    answer,
+    version: Question {
+        request: "{kerf:n}",
+        find: |lines| value(lines, "kerf").map(|text| text.trim_matches('"').into()),
+    },
+    stored: &[word!("uda0"), word!("uda1"), word!("udb0"), word!("udd3")],
+    check_mode: Some(["{chk:1}", "{chk:0}"]),
+    dwell: |ms| format!("g4 p{}", f64::from(ms) / 1_000.0),
+    rest: Question {
+        request: "{stat:n}",
+        find: |lines| value(lines, "stat").map(|stat| stat != RUNS),
+    },
+    for_job: &[unpowered!("1pm"), unpowered!("2pm"), unpowered!("3pm"), unpowered!("4pm")],
+    before_job: &["{md:n}", "g21", "g94", "g91"],
+    scale_requests: &["{1:n}", "{2:n}", "{3:n}", "{4:n}"],
+    scale,
+    steps_request: "{_ps:n}",
+    steps,
+    late: Some(Question { request: "{stv:n}", find: |lines| value(lines, "stv") }),
+};
+
+fn answer(line: &str) -> Option<Result<(), String>> {
+    let footer = line.starts_with("{\"r\":").then(|| line.split_once("\"f\":["))??.1;
+    let status = footer.split(',').nth(1)?.trim();
+    Some(if status == "0" { Ok(()) } else { Err(line.to_owned()) })
+}
+
+/// Returns the value of a name in an answer.
+pub(crate) fn value(lines: &[String], name: &str) -> Option<String> {
+    between(lines, &format!("{{\"{name}\":"), END)
+}
+
+fn other(random: &mut Random) -> String {
+    format!("{:#x}", random.number())
+}
+
+/// The axis of a motor, and its steps/mm, from the answer about it.
+fn motor(line: &str) -> Option<(usize, f64)> {
+    let lines = [line.to_owned()];
+    let of = |name: &str| number(&lines, &format!("\"{name}\":"), END);
+    let axis = of("ma")?;
+    Some((axis as usize, 360.0 / of("sa")? / of("tr")? * of("mi")?))
+}
+
+/// The first motor of each axis: their number, and their steps/mm. An answer may have a setting of the same name in
+/// another group; those of motors are the only ones with all four.
+fn scale(lines: &[String]) -> Option<Each> {
+    let motors: Vec<_> = lines.iter().filter_map(|line| motor(line)).collect();
+    let of = |axis| motors.iter().find(|(of, _)| *of == axis).map(|(_, scale)| *scale);
+    Some([of(0)?, of(1)?, of(2)?])
+}
+
+/// The steps of motors 1 to 3, which are those of X, Y and Z in all profiles but with CoreXY.
+fn steps(lines: &[String], _: &Each) -> Option<Each> {
+    let of = |motor: usize| number(lines, &format!("\"{motor}\":"), END);
+    Some([of(1)?, of(2)?, of(3)?])
+}

@@ -1,0 +1,102 @@
+//! The check with a jumper: from the direction pin of X to the input of its lower switch.
+//!
+//! Y moves at full speed. A line begins in which X turns, so its direction pin closes the switch at a step of Y that is
+//! known. The switch is a limit, and stops Y. The steps that Y makes after that are the time from the switch to the last
+//! step. A step pin could not do this: inputs ignore what is as short as its pulse.
+
+use std::time::Duration;
+
+use crate::Plan;
+use crate::board::Board;
+use crate::dialect::TINYG;
+use crate::firmware::Kerf;
+use crate::line::Line;
+use crate::report::{Checked, Report, judged};
+
+const NAME: &str = "switch to last step";
+const WANTED: &str = "60 us, and the step that was under way";
+/// The longest time, s (docs/safety.md, A1).
+const LONGEST: f64 = 60e-6;
+/// Length of each of the two lines, mm, and their speed, mm/min. `careful` reaches it.
+const LENGTH: f64 = 4.0;
+const SPEED: f64 = 800.0;
+/// Makes the lower switch of X a limit that closes to ground, and all other inputs no switches.
+const LIMIT: &str = "{xsn:2,st:0}";
+/// No input is a switch.
+const NO_SWITCH: &str = "{xsn:0,xsx:0,ysn:0,ysx:0,zsn:0,zsx:0}";
+/// The state of an input that is not pressed.
+const OPEN: &str = "0";
+/// Time of the filters of the inputs, and more.
+const FILTER: Duration = Duration::from_millis(100);
+/// The settings that the check changes.
+const CHANGED: [&str; 8] = ["xsn", "xsx", "ysn", "ysx", "zsn", "zsx", "st", "1po"];
+
+/// Makes the check, if the plan says that there is a jumper.
+pub async fn check(line: &mut Line<'_, impl Board>, plan: &Plan, report: &mut Report) {
+    if !plan.has_jumper {
+        return report.leave_out(NAME, WANTED, "there is no jumper");
+    }
+    if plan.dialect.name != TINYG.name {
+        return report.leave_out(NAME, WANTED, "only in TinyG's dialect");
+    }
+    let mut kerf = Kerf::new(line, plan.dialect);
+    let result = latency(&mut kerf).await;
+    report.add(NAME, WANTED, result);
+    kerf.tell(report);
+}
+
+/// Measures, and restores the settings.
+async fn latency(kerf: &mut Kerf<'_, '_, impl Board>) -> Checked {
+    let mut before = Vec::new();
+    for name in CHANGED {
+        before.push(format!("{{{name}:{}}}", kerf.value(name).await?));
+    }
+    let result = with_either_polarity(kerf).await;
+    let mut restored = kerf.restart().await;
+    for request in before {
+        restored = restored.and(kerf.ask(&request).await.map(|_| ()));
+    }
+    let judged = result?;
+    restored.map(|()| judged)
+}
+
+/// The direction pin may be high or low for X-, which must close the switch. So both polarities are tried.
+async fn with_either_polarity(kerf: &mut Kerf<'_, '_, impl Board>) -> Checked {
+    for polarity in [0, 1] {
+        kerf.restart().await?;
+        kerf.ask(NO_SWITCH).await?;
+        kerf.ask(&format!("{{1po:{polarity}}}")).await?;
+        for line in ["g21", "g94", "g91", "g1 f800 x0.1"] {
+            kerf.ask(line).await?;
+        }
+        kerf.rest().await?;
+        kerf.ask(LIMIT).await?;
+        kerf.line().pass(FILTER).await?;
+        if kerf.value("in1").await? == OPEN {
+            return at_speed(kerf).await;
+        }
+    }
+    judged(false, "the switch is closed with either direction of X".into())
+}
+
+/// Moves Y, lets X turn, and counts the steps that Y still makes.
+async fn at_speed(kerf: &mut Kerf<'_, '_, impl Board>) -> Checked {
+    kerf.ask(&format!("g1 y{LENGTH} f{SPEED}")).await?;
+    // The alarm may come before the answer, and refuse the line.
+    let _ = kerf.ask(&format!("g1 x-0.1 y{LENGTH} f{SPEED}")).await;
+    let scale = kerf.scale().await?;
+    let rate = SPEED / 60.0 * scale[1];
+    kerf.rest().await?;
+    let [_, y, _] = kerf.steps(&scale).await?;
+    let at_switch = (LENGTH * scale[1]).round();
+    if y == 2.0 * at_switch {
+        return judged(
+            false,
+            "X turns, and the switch does not stop the machine: no jumper?".into(),
+        );
+    }
+    let more = y - at_switch;
+    let most = (LONGEST * rate).ceil() + 1.0;
+    let text = format!("{more} steps at {rate:.0} steps/s");
+    judged((0.0..=most).contains(&more), text)
+}
