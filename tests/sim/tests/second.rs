@@ -24,7 +24,7 @@ const APART_IN_THREADS: u64 = 1_600;
 /// Cycles in a microsecond.
 const US: u64 = 16;
 /// Longest time from the edge of a limit switch to the last step, at 50,000 steps a second (docs/safety.md, A1), us.
-const STOP_US: u64 = 60;
+const STOP_US: u64 = 70;
 /// Longest wait for a line of the firmware, and for rest behind the last answer, ms.
 const PATIENCE_MS: u64 = 120_000;
 /// Number of the lines that ask for the machine state.

@@ -27,7 +27,7 @@ use crate::size;
 /// `cargo xtask test`
 #[derive(Args)]
 pub struct TestArgs {
-    /// Run all cases of the tests on boards, and the senders with whole jobs and at more boards: two hours and more
+    /// Run all cases of the tests on boards, and the senders with whole jobs and at more boards: about 1.5 hours
     #[arg(long)]
     long: bool,
 }
