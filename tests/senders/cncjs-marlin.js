@@ -80,7 +80,7 @@ async function stop() {
 async function start() {
   await server.load(job, gcode);
   server.command('gcode:start');
-  await until(() => server.workflow === 'running' && server.sender.total > 1000);
+  await until(() => server.workflow === 'running' && server.sender.total > 500);
   return `${server.sender.total} lines`;
 }
 

@@ -15,8 +15,13 @@ use proptest::test_runner::{Config, RngAlgorithm, TestCaseError, TestError, Test
 
 /// Returns and prints the seeds; `count` is the default number.
 pub fn seeds(count: u64) -> Range<u64> {
-    let first = wanted("KERF_SEED").unwrap_or(0);
-    let seeds = first..first + wanted("KERF_CASES").unwrap_or(count);
+    seeds_of(0..count)
+}
+
+/// Returns and prints the seeds; these are the default.
+pub fn seeds_of(usual: Range<u64>) -> Range<u64> {
+    let first = wanted("KERF_SEED").unwrap_or(usual.start);
+    let seeds = first..first + wanted("KERF_CASES").unwrap_or(usual.end - usual.start);
     tell(&format!("random conversations: seeds {} to {}", seeds.start, seeds.end - 1));
     seeds
 }
@@ -26,10 +31,15 @@ const TOLD: usize = 3;
 /// Number of cases between two lines of progress.
 const PROGRESS: u64 = 5_000;
 
-/// Tries the case of each seed, on all cores or on as many as `KERF_CORES` says. Reports the first failures.
+/// Tries the cases of so many seeds, as [`try_each`] does.
 #[allow(dead_code)]
 pub fn try_all(count: u64, try_seed: impl Fn(u64) -> Result<(), String> + Sync) {
-    let seeds = seeds(count);
+    try_each(seeds(count), try_seed);
+}
+
+/// Tries the case of each seed, on all cores or on as many as `KERF_CORES` says. Reports the first failures.
+#[allow(dead_code)]
+pub fn try_each(seeds: Range<u64>, try_seed: impl Fn(u64) -> Result<(), String> + Sync) {
     let (next, failed) = (AtomicU64::new(seeds.start), Mutex::new(Vec::new()));
     let told = wanted("KERF_TOLD").map_or(TOLD, |n| n as usize);
     let work = || {
@@ -61,7 +71,8 @@ fn cores() -> usize {
     thread::available_parallelism().map_or(1, usize::from)
 }
 
-fn wanted(name: &str) -> Option<u64> {
+/// Returns the number in a variable of the environment.
+pub fn wanted(name: &str) -> Option<u64> {
     std::env::var(name).ok().and_then(|n| n.parse().ok())
 }
 

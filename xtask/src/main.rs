@@ -91,7 +91,7 @@ enum Command {
     /// Build the page with the firmware in it: a folder of static files; the last line is `page: FOLDER`
     Web(web::WebArgs),
     /// Run every check: format, lints, host tests, firmware, sizes, simulator
-    Test,
+    Test(checks::TestArgs),
     /// Write the firmware to a board
     Flash(firmware::FlashArgs),
     /// Save the settings of a machine to a file, or load them
@@ -147,7 +147,7 @@ fn dispatch(command: Command) -> anyhow::Result<ExitCode> {
         Command::Fuzz(args) => return fuzz::run(&args),
         Command::Senders(args) => senders::run(&args)?,
         Command::Web(args) => web::run(&args)?,
-        Command::Test => checks::run()?,
+        Command::Test(args) => checks::run(&args)?,
         Command::Flash(args) => firmware::flash(&args)?,
         Command::Settings(args) => return settings::run(&args),
         Command::Verify(args) => return verify::run(&args),

@@ -10,7 +10,7 @@
 //!
 //! While no switch changes, none of these interrupts comes. The sampling interrupt lets in all interrupts except itself
 //! and exec, which would run far too long inside it. When a limit is hit, this interrupt itself stops the steps: 20 us
-//! after the edge, plus its own 300 cycles, for which it competes with the step interrupt. The total is 36 to 56 us at
+//! after the edge, plus its own 300 cycles, for which it competes with the step interrupt. The total is 28 to 62 us at
 //! 50,000 steps a second, and 120 us at 85,000, where the step interrupt leaves it a sixth of the CPU. The position of a
 //! probe's contact is that at the first of two samples, 20 us after the edge: a fifth of a step at 10,000 steps a
 //! second.

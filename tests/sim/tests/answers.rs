@@ -5,6 +5,7 @@ use kerf::boards::MEGA2560_GRBL;
 use kerf_sim::bench::{curve, spiral};
 use kerf_sim::{Host, LINES_IN_FLIGHT, Machine};
 
+use crate::common::share::share_of;
 use crate::common::{booted, firmware, set};
 
 /// The longest wait for an answer, ms of AVR time, with arcs of 1 mm at this jerk limit (millions of mm/min^3) and
@@ -111,7 +112,7 @@ fn longest_on_both(line: &str, setup: &[&str]) -> [f64; 2] {
 #[test]
 fn requests_on_both_ports_are_answered_in_arcs_at_the_highest_step_rate() {
     for jerk in [300, 20_000] {
-        for radius in [0.3, 2.0, 20.0] {
+        for radius in share_of(&[0.3, 2.0, 20.0], 3) {
             let axis = format!("vm:4680,fr:4680,jm:{jerk},ac:2000");
             let setup =
                 [&format!("{{x:{{{axis}}},y:{{{axis}}}}}")[..], "{sv:2,si:100}", "g91f90000"];

@@ -3,6 +3,7 @@
 use kerf::boards::MEGA2560_GRBL;
 use kerf_sim::{Host, Machine};
 
+use crate::common::share::share;
 use crate::common::{booted, set};
 
 const CLOCK: f64 = 16e6;
@@ -67,7 +68,7 @@ fn it_slows_down_within_10_ms() {
     };
     for job in [one, many(0.1), many(0.075), many(0.05)] {
         let mut worst = 0;
-        for n in 0..30 {
+        for n in share(30, 4) {
             let (mut machine, mut host) = board(SHARP);
             (0..).zip(&job).for_each(|(n, line)| host.queue(n, line));
             // Holds come at all phases of a segment and of status reports.
@@ -91,7 +92,7 @@ fn it_is_soon_the_last_of_moves_that_each_stop() {
         [(0.03, 20_000.0, 13.0), (0.03, 1_000.0, 16.0), (0.003, 1_000.0, 13.0), (0.01, 200.0, 16.0)]
     {
         let mut worst = 0;
-        for n in 0..30 {
+        for n in share(30, 4) {
             let (mut machine, mut host) = board(SHARP);
             set(&mut machine, &mut host, &format!("{{xac:{accel},xvm:6000,xfr:6000}}"));
             (0..400)

@@ -1,6 +1,6 @@
 //! The example jobs on every board: right to the step, and within the promised budgets.
 //!
-//! Each job runs once, two at a time, and the tests check what was measured. On RAMPS the motors have coarser steps
+//! Each job runs once on each board, the longest on one of them or with `KERF_LONG=1` on both, two at a time, and the tests check what was measured. On RAMPS the motors have coarser steps
 //! and higher speeds, so that the long job ends sooner and gives other numbers.
 
 use std::collections::VecDeque;
@@ -13,6 +13,7 @@ use kerf_sim::job::{self, Lines, Options};
 use kerf_sim::oracle::{self, Setup};
 use kerf_sim::report::Report;
 
+use crate::common::share::share_of;
 use crate::common::{booted, firmware};
 
 /// The longest first.
@@ -31,7 +32,10 @@ struct Run {
 }
 
 static RUNS: LazyLock<Vec<Run>> = LazyLock::new(|| {
-    let pairs = JOBS.iter().flat_map(|job| [(*job, &MEGA2560_GRBL), (*job, &RAMPS14_CNC)]);
+    let boards = [&MEGA2560_GRBL, &RAMPS14_CNC];
+    let long = JOBS.iter().take(1).flat_map(|job| share_of(&boards, 2).map(|board| (*job, *board)));
+    let others = JOBS.iter().skip(1).flat_map(|job| boards.map(|board| (*job, board)));
+    let pairs = long.chain(others);
     let waiting: Mutex<VecDeque<(&str, &Board)>> = Mutex::new(pairs.collect());
     let done = Mutex::new(Vec::new());
     let work = || {

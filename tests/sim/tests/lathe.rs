@@ -9,6 +9,7 @@ use kerf_sim::plot::{self, Look};
 use kerf_sim::threads::Threads;
 use kerf_sim::{Host, LINES_IN_FLIGHT, Machine};
 
+use crate::common::share::share_of;
 use crate::common::{firmware, scratch, set};
 
 /// Longest time in which no tick is served outside the step interrupt, cycles.
@@ -217,7 +218,7 @@ const STEP: f64 = 1.0 / STEPS + 1e-9;
 fn z_is_where_the_spindle_says_at_each_index_whatever_its_speed() {
     for marks in [1, 4, 8, 100] {
         let mut all = Vec::new();
-        for rpm in [60.0, 300.0, 600.0, 1_000.0] {
+        for &rpm in share_of(&[60.0, 300.0, 600.0, 1_000.0], 2) {
             let (mut machine, mut host) = lathe(marks, rpm, |_| {});
             let phases = pass(&mut machine, &mut host, 10.0, 1.0);
             println!("N {marks}, {rpm} rpm: spread {:.4}", spread(&phases));
@@ -679,8 +680,9 @@ fn driven(marks: u32, rpm: f64, torque: f64) -> (Machine, Host) {
 #[test]
 fn a_tap_goes_in_and_out_in_step_with_the_spindle() {
     // The columns: marks, speed, torque, the largest error (near the reversal there are no pulses to go by), the
-    // depth (so that the reversal is anywhere between two pulses), and whether a second sensor tells the direction.
-    for (marks, rpm, torque, most, deep, tells) in [
+    // depth (so that the reversal is anywhere between two pulses), and whether a second sensor tells the direction. A share
+    // has each number of marks.
+    let rows = [
         (4, 300.0, 600.0, 0.45, 10.0, false),
         (4, 300.0, 600.0, 0.45, 10.074, false),
         (4, 300.0, 600.0, 0.45, 10.185, false),
@@ -699,7 +701,8 @@ fn a_tap_goes_in_and_out_in_step_with_the_spindle() {
         (20, 300.0, 600.0, 0.1, 10.111, true),
         (100, 300.0, 600.0, 0.06, 10.0, true),
         (100, 600.0, 900.0, 0.06, 10.005, true),
-    ] {
+    ];
+    for &(marks, rpm, torque, most, deep, tells) in share_of(&rows, 3) {
         let (mut machine, mut host) = driven(marks, rpm, torque);
         set(&mut machine, &mut host, &format!("{{spdi:{}}}", u8::from(tells)));
         set(&mut machine, &mut host, &format!("m3 s{rpm}"));

@@ -2,7 +2,7 @@
 //! jobs with two axes at high step rates, with holds and overrides at random times; and jobs with many lines shorter
 //! than a step between fast ones. No job has a pause, and each ends on its exact steps.
 //!
-//! `KERF_SEED` and `KERF_CASES` choose the jobs: `KERF_CASES=1000` runs a thousand. `KERF_TOLD=1000` reports up to a
+//! A share of the jobs runs. `KERF_SEED` and `KERF_CASES` choose others: `KERF_CASES=1000` runs a thousand. `KERF_TOLD=1000` reports up to a
 //! thousand failures.
 
 use std::fmt::Write;
@@ -13,16 +13,17 @@ use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 
 use crate::common::firmware;
+use crate::common::share::share_of_seeds;
 use crate::seeds;
 
-/// Default number of jobs: half a minute on two cores.
-const CASES: u64 = 50;
+/// Number of jobs, and of those in a share: half a minute on two cores, and a quarter of that.
+const CASES: [u64; 2] = [50, 15];
 
-/// Default number of jobs with holds and overrides: some seconds.
-const DISTURBED: u64 = 12;
+/// Number of jobs with holds and overrides, and of those in a share.
+const DISTURBED: [u64; 2] = [12, 4];
 
-/// Default number of jobs with lines shorter than a step: a quarter of a minute.
-const BRIEF: u64 = 100;
+/// Number of jobs with lines shorter than a step, and of those in a share.
+const BRIEF: [u64; 2] = [100, 30];
 
 /// A move by offsets of X, Y, Z (mm) and A (degrees).
 #[derive(Clone, Debug)]
@@ -226,6 +227,11 @@ impl Job {
     }
 }
 
+/// Runs the jobs of a share of so many seeds.
+fn play_share<S: Strategy<Value = Job>>([all, least]: [u64; 2], any: impl Fn() -> S + Sync) {
+    seeds::try_each(share_of_seeds(all, least), |seed| play(seed, any()));
+}
+
 /// Runs the job of a seed.
 fn play(seed: u64, any: impl Strategy<Value = Job>) -> Result<(), String> {
     let (tree, _) = seeds::case(seed, &any);
@@ -247,15 +253,15 @@ fn play(seed: u64, any: impl Strategy<Value = Job>) -> Result<(), String> {
 
 #[test]
 fn random_jobs_have_no_pause_and_end_exactly() {
-    seeds::try_all(CASES, |seed| play(seed, any_job()));
+    play_share(CASES, any_job);
 }
 
 #[test]
 fn holds_and_overrides_at_high_step_rates_make_no_pause() {
-    seeds::try_all(DISTURBED, |seed| play(seed, fast_job()));
+    play_share(DISTURBED, fast_job);
 }
 
 #[test]
 fn lines_shorter_than_a_step_make_no_pause() {
-    seeds::try_all(BRIEF, |seed| play(seed, brief_job()));
+    play_share(BRIEF, brief_job);
 }

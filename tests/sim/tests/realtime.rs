@@ -2,7 +2,7 @@
 //! that change, resets. They are shorter ones of the kind in `tests/realtime.rs`; `tests/support/session.rs` judges
 //! them.
 //!
-//! Each of two machines plays half of them in sequence. The seed of one that fails is printed: `KERF_SEED=47
+//! Each of two machines plays half of a share in sequence. The seed of one that fails is printed: `KERF_SEED=47
 //! KERF_CASES=1 cargo test -p kerf-sim-tests realtime::` plays it alone. With the first seed of its machine and
 //! enough cases it is played after all that came before it.
 
@@ -16,6 +16,7 @@ use kerf_sim::Machine;
 use proptest::strategy::ValueTree;
 
 use crate::common::firmware;
+use crate::common::share::share_of_seeds;
 use crate::ops::{self, Op, Scale};
 use crate::seeds;
 use crate::session::Session;
@@ -71,7 +72,7 @@ fn alone(seed: u64) -> Result<(), String> {
 
 #[test]
 fn any_conversation_ends_where_it_is_to() {
-    let seeds = seeds::seeds(500);
+    let seeds = share_of_seeds(500, 150);
     let share = (seeds.end - seeds.start).div_ceil(MACHINES) as usize;
     thread::scope(|scope| {
         for first in seeds.clone().step_by(share.max(1)) {

@@ -3,6 +3,7 @@
 
 use kerf::boards::{Board, MEGA2560_GRBL_LATHE, MEGA2560_LATHE};
 
+use crate::common::share::share_of;
 use crate::common::turning::{Lathe, MARKS, RPM, STEPS, driven};
 
 const Z: usize = 1;
@@ -107,7 +108,7 @@ fn a_spindle_that_stops_dead_while_it_turns_round_stops_a_tap() {
     };
     for board in BOARDS {
         // The spindle stands 440 ms later, and then turns back.
-        for later in [0, 20, 200, 350, 480, 520, 600] {
+        for &later in share_of(&[0, 20, 200, 350, 480, 520, 600], 2) {
             let mut lathe = driven(board);
             lathe.begin(TAP, Z, 4.0);
             while !slowed(&mut lathe) {

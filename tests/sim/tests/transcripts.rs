@@ -5,6 +5,7 @@ use std::path::Path;
 use kerf::boards::{MEGA2560_GRBL, MEGA2560_GRBL_LATHE, MEGA2560_LATHE, RAMPS14, RAMPS14_CNC};
 
 use crate::common::firmware;
+use crate::common::share::share_of;
 use crate::{pages, transcript};
 
 /// Transcripts that only the image of a lathe can play.
@@ -24,31 +25,31 @@ const DRILLING: [&str; 10] = [
     "steps",
     "words",
 ];
+/// Transcripts that only emulated boards can play. No image for this chip has drivers with UART, built-in jobs, help
+/// screens, canned cycles and a second port, or both printing hosts and a second port or TinyG's dialect.
+pub const ELSEWHERE: [&str; 14] = [
+    "actions",
+    "corexy",
+    "cycles-by-hand",
+    "drivers",
+    "heat",
+    "job",
+    "program.",
+    "program-over",
+    "reprap-ports",
+    "text-grbl",
+    "text-help",
+    "text-in-json",
+    "text-setting-joined",
+    "verbosity",
+];
 /// Transcripts that also need grbl's dialect.
 const BOTH: [&str; 2] = ["grbl-thread", "grbl-lathe"];
 
 #[test]
 fn the_image_keeps_to_the_transcripts() {
     let mut all = transcript::read_all(Path::new("../../transcripts"));
-    // No image for this chip has drivers with UART, built-in jobs, help screens, canned cycles and a second port, or
-    // both printing hosts and a second port or TinyG's dialect. The emulated boards have them.
-    let elsewhere = [
-        "actions",
-        "corexy",
-        "cycles-by-hand",
-        "drivers",
-        "heat",
-        "job",
-        "program.",
-        "program-over",
-        "reprap-ports",
-        "text-grbl",
-        "text-help",
-        "text-in-json",
-        "text-setting-joined",
-        "verbosity",
-    ];
-    all.retain(|one| !elsewhere.iter().any(|name| one.name.starts_with(name)));
+    all.retain(|one| !ELSEWHERE.iter().any(|name| one.name.starts_with(name)));
     let begins = |names: &[&str], one: &transcript::Transcript| {
         names.iter().any(|name| one.name.starts_with(name))
     };
@@ -69,5 +70,6 @@ fn the_image_keeps_to_the_transcripts() {
 #[test]
 fn the_image_does_what_the_pages_show() {
     let pages = pages::read_all(Path::new("../../../docs"));
+    let pages = share_of(&pages, 2).cloned().collect();
     transcript::play_all(pages, 2, || firmware(&MEGA2560_GRBL));
 }

@@ -1,12 +1,14 @@
 //! `cargo xtask test`: everything that must pass before a merge.
 
 mod beside;
+mod cases;
 
 use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
 
 use anyhow::{Context, Result, ensure};
+use clap::Args;
 
 use beside::Beside;
 
@@ -21,6 +23,14 @@ use crate::senders;
 use crate::setup::{self, Scope};
 use crate::sim;
 use crate::size;
+
+/// `cargo xtask test`
+#[derive(Args)]
+pub struct TestArgs {
+    /// Run all cases of the tests on boards, and the senders with whole jobs and at more boards: about 1.5 hours
+    #[arg(long)]
+    long: bool,
+}
 
 /// A check and its name.
 struct Stage {
@@ -45,7 +55,6 @@ const WITH_IMAGES: &[Stage] = &[
     Stage { name: "sizes and stack of every board", run: size_all },
     Stage { name: "the emulator of the RP2040", run: || emulator::RP2040.test() },
     Stage { name: "the second simulator of AVR", run: || emulator::AVR.test() },
-    Stage { name: "simulated and emulated boards", run: simulator_tests },
 ];
 
 /// Test targets, of all packages together, that need no image.
@@ -56,7 +65,7 @@ const HOST_TARGETS: [&str; 8] =
 const BOARD_TARGETS: [&str; 2] = ["--test", "chip"];
 
 /// Runs all checks; stops at the first that fails.
-pub fn run() -> Result<()> {
+pub fn run(args: &TestArgs) -> Result<()> {
     stage("tools", || setup::ensure(Scope::Tests))?;
     let images = Beside::start(&["build", "--all"])?;
     WITHOUT_IMAGES.iter().try_for_each(|one| stage(one.name, one.run))?;
@@ -64,12 +73,13 @@ pub fn run() -> Result<()> {
     let senders = Beside::start(&["senders", "--install"])?;
     let page = Beside::start(&["web"])?;
     WITH_IMAGES.iter().try_for_each(|one| stage(one.name, one.run))?;
+    stage("simulated and emulated boards", || simulator_tests(args.long))?;
     stage("senders, installed beside", || senders.wait())?;
     stage("the page, built beside", || page.wait())?;
-    stage("real senders", senders::run_short)?;
+    stage("real senders", if args.long { senders::run_long } else { senders::run_short })?;
     // The emulated board of a session takes one core, the page the other one.
     let page = Beside::start(&["web", "--test"])?;
-    stage("real senders at the emulated RP2040", senders::run_emulated)?;
+    stage("real senders at the emulated RP2040", || senders::run_emulated(args.long))?;
     stage("the page in a browser, tested beside", || page.wait())?;
     println!("\ncargo xtask test: all stages passed");
     Ok(())
@@ -170,9 +180,13 @@ fn build_simulator_tests() -> Result<()> {
 }
 
 /// Runs the tests on boards, including those on the emulated chip and on the second simulator of AVR, which are ignored
-/// by default because they need these programs.
-fn simulator_tests() -> Result<()> {
-    run_child(tests(&BOARD_TARGETS).args(["--", "--include-ignored"]))
+/// by default because they need these programs. One more test runs at once than there are cores, because a test waits now
+/// and then for an emulator or for `avrdude`. No test depends on the time of the computer.
+fn simulator_tests(long: bool) -> Result<()> {
+    let mut tests = tests(&BOARD_TARGETS);
+    tests.env("RUST_TEST_THREADS", senders::at_once().to_string());
+    cases::choose(&mut tests, long);
+    run_child(tests.args(["--", "--include-ignored"]))
 }
 
 /// Returns the command that builds and runs these tests. It names all packages even where few are tested, because

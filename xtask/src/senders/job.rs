@@ -1,17 +1,19 @@
-//! The job of printing hosts: 2,000 short moves, each relative to the one before. A line that is executed twice, or
+//! The job of printing hosts: up to 2,000 short moves, each relative to the one before. A line that is executed twice, or
 //! not at all, shows in the end position.
 
 use std::fmt::Write;
 
 /// Number of moves in the job.
-const MOVES: u32 = 2_000;
+pub const MOVES: u32 = 2_000;
+/// Number of moves in a short job. A host has more lines than any buffer on the way holds.
+pub const BRIEF: u32 = 600;
 /// Distance from its middle at which the job turns back, thousandths of a mm.
 const FAR: i32 = 15_000;
 /// One in this many moves is a travel, with the filament retracted.
 const TRAVEL_EVERY: u32 = 50;
 
 const START: &str = "\
-; 2,000 moves, each from where the one before ends
+; moves, each from where the one before ends
 M104 S190
 M109 S190
 G21
@@ -25,11 +27,11 @@ M107
 G90
 ";
 
-/// Returns the text of the file.
-pub fn prints() -> String {
+/// Returns the text of a file with so many moves.
+pub fn prints(moves: u32) -> String {
     let mut text = START.to_owned();
     let (mut at, mut random) = ([0; 2], 21u32);
-    for n in 0..MOVES {
+    for n in 0..moves {
         let mut below = |end: u32| {
             random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             ((random >> 16) % end) as i32
@@ -54,11 +56,11 @@ pub fn prints() -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::prints;
+    use super::{MOVES, prints};
 
     #[test]
     fn it_is_long_and_stays_near() {
-        let job = prints();
+        let job = prints(MOVES);
         assert!(job.lines().count() > 2_000);
         let mut at = [0.0; 2];
         for line in job.lines() {

@@ -31,6 +31,7 @@ use crate::machines::Machine;
 use crate::process::root;
 use crate::setup::{self, Scope};
 use crate::sim;
+pub use pool::at_once;
 use session::Session;
 
 /// `cargo xtask senders`
@@ -48,6 +49,9 @@ pub struct SendersArgs {
     /// Install the senders and run none
     #[arg(long)]
     install: bool,
+    /// Whether the print of printing hosts is short
+    #[arg(skip)]
+    brief: bool,
 }
 
 /// A sender that has a driver.
@@ -119,16 +123,24 @@ impl Sender {
     }
 }
 
-/// Runs all senders with half of the normal job, because the conversations are tested. Whole jobs are tested with the
-/// simulator.
+/// Runs all senders with half of the normal job and a third of the print, because the conversations are tested. Whole
+/// jobs are tested with the simulator.
 pub fn run_short() -> Result<()> {
-    run(&SendersArgs { job: Some(root().join("examples/engraving.gcode")), ..Default::default() })
+    let job = Some(root().join("examples/engraving.gcode"));
+    run(&SendersArgs { job, brief: true, ..Default::default() })
 }
 
-/// Runs a sender of TinyG's dialect and one of grbl's at the emulated RP2040, in sequence, because an emulator needs
-/// a core of the computer to itself.
-pub fn run_emulated() -> Result<()> {
-    for sender in [Sender::Cncjs, Sender::GrblStreamer] {
+/// Runs all senders with whole jobs.
+pub fn run_long() -> Result<()> {
+    run(&SendersArgs::default())
+}
+
+/// Runs a sender of TinyG's dialect and one of grbl's at the emulated RP2040, or all senders that can work with it. They
+/// run in sequence, because an emulator needs a core of the computer to itself.
+pub fn run_emulated(all: bool) -> Result<()> {
+    let some = [Sender::Cncjs, Sender::GrblStreamer];
+    let senders = Sender::value_variants().iter().filter(|sender| !sender.prints());
+    for &sender in senders.filter(|sender| all || some.contains(sender)) {
         let job = Some(root().join("examples/square.gcode"));
         let board = Some(Board::PicoCnc);
         run(&SendersArgs { sender: Some(sender), job, board, ..Default::default() })?;
@@ -160,14 +172,14 @@ pub fn run(args: &SendersArgs) -> Result<()> {
     let program = sim::program();
     // A printing host sends a print.
     let print = folder.join("print.gcode");
-    std::fs::write(&print, job::prints())?;
+    std::fs::write(&print, job::prints(if args.brief { job::BRIEF } else { job::MOVES }))?;
     let session = &|(sender, elf): (Sender, &PathBuf)| {
         let job = if sender.prints() { &print } else { &job };
         let board = board_of(sender);
         Session { sender, program: &program, elf, board, job, folder: &folder }.run()
     };
     let pairs: Vec<_> = senders.iter().copied().zip(&elves).collect();
-    let results = pool::run(&pairs, pool::at_once(), session);
+    let results = pool::run(&pairs, at_once(), session);
     ensure!(table::show(&results), "a sender cannot work with the firmware");
     Ok(())
 }

@@ -3,6 +3,7 @@
 #[macro_use]
 mod rows;
 pub mod printing;
+pub mod share;
 mod simulated;
 pub mod turning;
 
