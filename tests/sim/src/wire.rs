@@ -119,8 +119,21 @@ impl Wire {
         if spoils { byte ^ 1 << random.below(8) } else { byte }
     }
 
+    /// Takes the machine's speed if it has changed and this side follows. Returns the machine's cycles per bit.
+    fn follow_speed(&mut self, uart: &Uart) -> f64 {
+        let own = uart.bit_cycles() as f64;
+        if own != self.own_before {
+            if self.follows && self.understands(self.own_before) {
+                self.bit_cycles = own;
+            }
+            self.own_before = own;
+        }
+        own
+    }
+
     /// Begins the frame that is due.
     pub fn pump(&mut self, uart: &mut Uart) {
+        self.follow_speed(uart);
         if let Some(byte) = self.outgoing.pop_front() {
             let byte = self.spoilt(byte);
             uart.start_bit(byte, self.bit_cycles, self.due);
@@ -135,13 +148,7 @@ impl Wire {
 
     /// Takes the bytes that the machine has sent.
     pub fn listen(&mut self, uart: &mut Uart) {
-        let own = uart.bit_cycles() as f64;
-        if own != self.own_before {
-            if self.follows && self.understands(self.own_before) {
-                self.bit_cycles = own;
-            }
-            self.own_before = own;
-        }
+        let own = self.follow_speed(uart);
         while let Some((_, byte)) = uart.take_sent() {
             if !self.understands(own) {
                 self.garbled += 1;

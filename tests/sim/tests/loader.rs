@@ -151,7 +151,10 @@ fn the_firmware_comes_back_when_the_watchdog_has_bitten() {
             assert_eq!(told.body["rst"], cause, "{}: {}", firmware.name, told.raw);
             host.ask(&mut machine, "{clear:n}", 1_000).unwrap();
         }
-        works(&mut machine);
+        let steps = machine.recorder().steps();
+        host.ask(&mut machine, "g1 f400 x2", 5_000).unwrap();
+        host.run_for_ms(&mut machine, 2_000).unwrap();
+        assert!(machine.recorder().steps() > steps, "{}: it moves again", firmware.name);
     }
 }
 

@@ -44,6 +44,8 @@ struct Faults {
     forgets: bool,
     /// A jumper from the direction pin of X to its lower switch.
     has_jumper: bool,
+    /// A line that it accepts, and does not obey.
+    ignores: &'static str,
     /// Changes to its chip.
     chip: fn(&mut Machine),
 }
@@ -55,6 +57,7 @@ const NONE: Faults = Faults {
     has_no_kerf: false,
     forgets: false,
     has_jumper: false,
+    ignores: "none",
     chip: |_| {},
 };
 
@@ -66,6 +69,8 @@ struct Simulated {
     random: Random,
     rate: u32,
     heard: usize,
+    /// What it says beside the machine.
+    said: Vec<u8>,
     first_cells: Box<[u8; CELLS]>,
     /// What has been checked.
     told: Vec<String>,
@@ -78,7 +83,8 @@ impl Simulated {
         (faults.chip)(&mut machine);
         let (random, first_cells) = (Random::new(1), Box::new(*machine.eeprom()));
         let (rate, heard, told) = (115_200, 0, Vec::new());
-        Simulated { machine, board, faults, random, rate, heard, first_cells, told }
+        let said = Vec::new();
+        Simulated { machine, board, faults, random, rate, heard, said, first_cells, told }
     }
 
     /// Returns the cycle of a time of the computer's clock.
@@ -156,6 +162,10 @@ impl kerf_verify::Board for Simulated {
     }
 
     async fn send(&mut self, bytes: &[u8]) -> Result<(), String> {
+        if bytes.strip_suffix(b"\n") == Some(self.faults.ignores.as_bytes()) {
+            self.said.extend(b"{\"r\":{},\"f\":[1,0,1]}\n");
+            return Ok(());
+        }
         let bytes = self.spoiled(bytes.to_vec());
         self.machine.send(&bytes);
         Ok(())
@@ -164,7 +174,8 @@ impl kerf_verify::Board for Simulated {
     async fn receive(&mut self, until: Duration) -> Result<Vec<u8>, String> {
         let end = self.cycle(until);
         loop {
-            let bytes = self.machine.receive();
+            let mut bytes = std::mem::take(&mut self.said);
+            bytes.extend(self.machine.receive());
             self.heard += bytes.len();
             let is_silent = self.heard > self.faults.silent_after;
             if !bytes.is_empty() && !is_silent || self.machine.cycle() >= end {
@@ -210,7 +221,7 @@ fn chip_report(faults: Faults) -> Report {
     let mut simulated = Simulated::new(board, faults);
     let plan = plan(board, faults, true);
     let mut report = Report::new(&plan);
-    block_on(chip::check(&mut Line::new(&mut simulated), &plan, &mut report));
+    block_on(chip::check(&mut Line::new(&mut simulated), &plan, &mut report)).unwrap();
     report
 }
 
@@ -294,7 +305,7 @@ fn a_timer_at_a_wrong_rate_is_found() {
             |m: &mut Machine| m.set_pace(4, 0.0)
         };
         let measured = fails(&chip_report(Faults { chip, ..NONE }), &["timers"]);
-        assert!(measured.starts_with("timer 4 counts"), "{measured}");
+        assert!(measured.contains("timer 4 counts"), "{measured}");
     }
 }
 
@@ -339,6 +350,23 @@ fn a_board_that_forgets_is_found() {
     for board in [&MEGA2560_GRBL, &MEGA2560_GRBL_LATHE, &RAMPS14] {
         let report = report(board, faults, false);
         assert!(names(&report, Outcome::Failed).contains(&"settings through a reset"), "{report}");
+    }
+}
+
+/// What a board accepts and does not obey is no result, and what is not restored is told.
+#[test]
+fn a_board_that_does_not_obey_is_found() {
+    for (ignores, name, tells) in [
+        ("{3pm:0}", "job", "the job does not run: {3pm:n} answers 2"),
+        ("{3pm:2}", "job", "NOT RESTORED, please send: {3pm:2}"),
+        ("{uda0:\"0x0\"}", "settings through a reset", "NOT RESTORED, please send: {uda0:\"0x0\"}"),
+        ("G1 X", "job in check mode", "the wrong line \"G1 X\" is accepted"),
+        ("G1 F600 X0.13 Y0.07 Z0.00", "job", "in place of"),
+        ("g1 x-0.1 y4 f800", "switch to last step", "not the switch has stopped the machine"),
+    ] {
+        let faults = Faults { ignores, has_jumper: true, ..NONE };
+        let measured = fails(&report(&MEGA2560_GRBL, faults, false), &[name]);
+        assert!(measured.contains(tells), "{ignores}: {measured}");
     }
 }
 

@@ -20,6 +20,8 @@ use crate::report::{Checked, Report, judged};
 
 /// What the image says after a reset.
 const GREETING: &str = "kerf-chip 1 ";
+/// Why the chip is not tested.
+const NOT_FLASHED: &str = "the self-test image was not flashed";
 /// Longest time from a reset to it. The boot loader waits for a second; early bytes make it wait for five more.
 const START: Duration = Duration::from_secs(8);
 /// Longest time of an answer that needs no time of its own.
@@ -28,6 +30,7 @@ const ANSWER: Duration = Duration::from_secs(3);
 const RAM: Duration = Duration::from_secs(20);
 /// Least RAM that is tested: the chip has 8,192 bytes.
 const LEAST_RAM: u32 = 7_000;
+const MOST_RAM: u32 = 8_192;
 /// The limits of the supply of a chip at 16 MHz, mV, each with the 10 % that the reference may be off.
 const SUPPLY: (u32, u32) = (4_100, 6_000);
 /// Greatest deviation of the clock. A resonator is good to 0.5 %, and a serial line fails from about 2 % on.
@@ -46,6 +49,8 @@ const WINDOW: usize = 32;
 const ECHO: Duration = Duration::from_millis(200);
 /// Longest time until a board that was at another rate is back at the usual one.
 const BACK: Duration = Duration::from_secs(5);
+/// Shortest time from a hang to the reset by the watchdog, whose time is 250 ms, to 20 %.
+const BITES: Duration = Duration::from_millis(200);
 /// Number of EEPROM cells, and of those in one request.
 const CELLS: u32 = 4_096;
 const CELLS_AT_ONCE: u32 = 64;
@@ -109,8 +114,12 @@ impl Check {
     }
 }
 
-/// Makes all checks. Leaves the RAM painted.
-pub async fn check(line: &mut Line<'_, impl Board>, plan: &Plan, report: &mut Report) {
+/// Makes all checks. Returns whether the RAM has been painted.
+pub async fn check(
+    line: &mut Line<'_, impl Board>,
+    plan: &Plan,
+    report: &mut Report,
+) -> Result<(), String> {
     let mut start = begin(line).await;
     report.add("self-test image", "is flashed, and says its name", named(&start));
     tell(line, report);
@@ -128,17 +137,17 @@ pub async fn check(line: &mut Line<'_, impl Board>, plan: &Plan, report: &mut Re
             start = restart(line).await;
         }
     }
-    if start.is_ok() {
-        // Without paint the free stack cannot be measured, which is told then.
-        let _ = numbers::<1>(line, "paint", ANSWER).await;
-    }
+    start?;
+    let [painted] = numbers(line, "paint", ANSWER).await?;
+    if painted < LEAST_RAM { Err(format!("only {painted} bytes are painted")) } else { Ok(()) }
 }
 
-/// Says that none of the checks was made.
-pub fn leave_out(report: &mut Report) {
+/// Says that none of the checks was made. Returns why.
+pub fn leave_out(report: &mut Report) -> Result<(), String> {
     for one in Check::ALL {
-        report.leave_out(one.name(), one.wanted(), "the self-test image was not flashed");
+        report.leave_out(one.name(), one.wanted(), NOT_FLASHED);
     }
+    Err(NOT_FLASHED.into())
 }
 
 fn named(start: &Result<String, String>) -> Checked {
@@ -176,6 +185,7 @@ async fn numbers<const N: usize>(
     command: &str,
     longest: Duration,
 ) -> Result<[u32; N], String> {
+    line.forget().await?;
     line.say(command).await?;
     answer(line, command.split(' ').next().unwrap_or(command), longest).await
 }
@@ -201,7 +211,7 @@ async fn ram(line: &mut Line<'_, impl Board>) -> Checked {
         0 => format!("{tested} bytes"),
         _ => format!("{bad} of {tested} bytes are bad, the first at {first:#x}"),
     };
-    judged(bad == 0 && tested >= LEAST_RAM, measured)
+    judged(bad == 0 && (LEAST_RAM..=MOST_RAM).contains(&tested), measured)
 }
 
 async fn supply(line: &mut Line<'_, impl Board>) -> Checked {
@@ -236,11 +246,11 @@ async fn timers(line: &mut Line<'_, impl Board>, plan: &Plan) -> Checked {
     let bad: Vec<String> = (0..)
         .zip(&counts)
         .filter(|(_, counts)| !is_like(counts))
-        .map(|(n, counts)| format!("timer {n} counts {counts}, timer 1 {usual}"))
+        .map(|(n, counts)| format!("timer {n} counts {counts}"))
         .collect();
     let measured = match bad.is_empty() && usual > 0 {
         true => format!("six timers, {usual} counts each"),
-        false => bad.join("; "),
+        false => format!("timer 1 counts {usual}; {}", bad.join("; ")),
     };
     judged(bad.is_empty() && usual > 0, measured)
 }
@@ -273,7 +283,8 @@ async fn echoed(
     for chunk in bytes.chunks(WINDOW) {
         let back = exchange(line, chunk).await?;
         wrong += back.iter().zip(chunk).filter(|(back, sent)| back != sent).count();
-        lost += chunk.len() - back.len();
+        wrong += back.len().saturating_sub(chunk.len());
+        lost += chunk.len().saturating_sub(back.len());
         // What is not even in step any more says nothing further.
         if lost > WINDOW {
             break;
@@ -303,7 +314,6 @@ async fn exchange(line: &mut Line<'_, impl Board>, bytes: &[u8]) -> Result<Vec<u
         }
         back.extend(more);
     }
-    back.truncate(bytes.len());
     Ok(back)
 }
 
@@ -311,7 +321,10 @@ async fn cells(line: &mut Line<'_, impl Board>) -> Checked {
     let (mut bad, mut first) = (0, None);
     for from in (0..CELLS).step_by(CELLS_AT_ONCE as usize) {
         let command = format!("cells {from} {CELLS_AT_ONCE}");
-        let [_, _, some, at] = numbers(line, &command, ANSWER).await?;
+        let [at_once, count, some, at] = numbers(line, &command, ANSWER).await?;
+        if at_once != from || count != CELLS_AT_ONCE || some > count {
+            return Err(format!("the answer to {command:?} is about {count} cells from {at_once}"));
+        }
         bad += some;
         first = first.or((some > 0).then_some(at));
     }
@@ -326,7 +339,8 @@ async fn watchdog(line: &mut Line<'_, impl Board>) -> Checked {
     let [] = numbers(line, "hang", ANSWER).await?;
     let start = line.now();
     greeting(line).await.map_err(|why| format!("the chip does not come back: {why}"))?;
-    judged(true, format!("back after {:.1} s", (line.now() - start).as_secs_f64()))
+    let time = line.now() - start;
+    judged(time >= BITES, format!("back after {:.2} s", time.as_secs_f64()))
 }
 
 /// Bytes behind the static data of Kerf that have the mark of the last reset.
@@ -336,8 +350,18 @@ const LEAST_STACK: u32 = 100;
 
 /// Counts the paint behind the static data of Kerf, which has run since the RAM was painted. Kerf is on the board
 /// again afterwards.
-pub async fn free_stack(line: &mut Line<'_, impl Board>, from: u16, report: &mut Report) {
+pub async fn free_stack(
+    line: &mut Line<'_, impl Board>,
+    plan: &Plan,
+    painted: &Result<(), String>,
+    report: &mut Report,
+) {
     let (name, wanted) = ("free stack", "100 bytes or more never used");
+    let from = match (plan.static_end, painted) {
+        (Some(from), Ok(())) => from,
+        (None, _) => return report.leave_out(name, wanted, "the image is not known"),
+        (_, Err(why)) => return report.leave_out(name, wanted, why),
+    };
     let result = stack_left(line, from).await;
     report.add(name, wanted, result);
     tell(line, report);
@@ -350,5 +374,5 @@ async fn stack_left(line: &mut Line<'_, impl Board>, from: u16) -> Checked {
     begin(line).await?;
     let command = format!("stack {}", from.saturating_add(MARK));
     let [left] = numbers(line, &command, ANSWER).await?;
-    judged(left >= LEAST_STACK, format!("{left} bytes"))
+    judged((LEAST_STACK..=MOST_RAM).contains(&left), format!("{left} bytes"))
 }

@@ -54,6 +54,8 @@ pub struct Dialect {
     pub dwell: fn(u32) -> String,
     /// Whether the machine is at rest.
     pub rest: Question<bool>,
+    /// What is known of the drivers in the job.
+    pub drivers: &'static str,
     /// Values that the job needs otherwise: they are restored behind it.
     pub for_job: &'static [ForJob],
     /// The lines before the job's.

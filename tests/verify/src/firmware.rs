@@ -6,18 +6,18 @@
 //! | settings | values are stored, the board is reset, the values are read and restored |
 //! | clock of Kerf | a dwell of ten seconds |
 //! | check mode | the job is accepted, a wrong line in it is refused, nothing moves |
-//! | job | the job runs with the drivers off: steps half way and at the end |
+//! | job | the job runs, with the drivers off where the dialect can do that: steps half way and at the end |
 //! | late segments | Kerf's own count of segments that came too late |
 
 use std::time::Duration;
 
 use crate::Plan;
 use crate::board::{Board, Image};
-use crate::dialect::{AXES, Dialect, Each, ForJob, Question, Stored, tinyg};
+use crate::dialect::{Dialect, Each, ForJob, Question, Stored, tinyg};
 use crate::job::{Job, is_exact, out_and_back};
 use crate::line::Line;
 use crate::random::Random;
-use crate::report::{Checked, Report, judged};
+use crate::report::{Checked, Report, and_restored, judged};
 
 /// Longest time from a reset to the greeting. The boot loader waits for a second; early bytes make it wait for five
 /// more.
@@ -32,6 +32,10 @@ const POLL: Duration = Duration::from_millis(2);
 const REST: Duration = Duration::from_secs(60);
 /// Time in which what was not asked for comes, such as a greeting.
 const SETTLE: Duration = Duration::from_millis(500);
+/// How often the values of before are stored until they are read.
+const RESTORES: usize = 2;
+/// Fewest steps of an axis half way through the job: fewer would not tell a step that is missing.
+const FEWEST: f64 = 50.0;
 /// Greatest deviation of a clock, ppm.
 const CLOCK_PPM: f64 = 10_000.0;
 /// A line that every dialect refuses.
@@ -54,7 +58,7 @@ impl Check {
             Check::Settings => "settings through a reset",
             Check::Clock => "clock of Kerf",
             Check::Tried => "job in check mode",
-            Check::Job => "job with the drivers off",
+            Check::Job => "job",
             Check::Late => "late segments",
         }
     }
@@ -70,10 +74,11 @@ impl Check {
     }
 
     /// Why the check cannot be made; `None` if it can.
-    fn hindrance(self, plan: &Plan) -> Option<&'static str> {
+    fn hindrance(self, plan: &Plan, has_run: bool) -> Option<&'static str> {
         match self {
             Check::Tried if plan.dialect.check_mode.is_none() => Some("the dialect has none"),
             Check::Late if plan.dialect.late.is_none() => Some("the dialect does not tell them"),
+            Check::Late if !has_run => Some("no job has run"),
             _ => None,
         }
     }
@@ -89,30 +94,39 @@ impl Check {
     }
 }
 
-/// Makes all checks. Returns whether Kerf is on the board and answers.
-pub async fn check(line: &mut Line<'_, impl Board>, plan: &Plan, report: &mut Report) -> bool {
+/// Makes all checks. The error says why Kerf is not on the board, or does not answer.
+pub async fn check(
+    line: &mut Line<'_, impl Board>,
+    plan: &Plan,
+    report: &mut Report,
+) -> Result<(), String> {
     let mut kerf = Kerf::new(line, plan.dialect);
     let version = version(&mut kerf, plan).await;
     let mut start = version.as_ref().map(|_| ()).map_err(Clone::clone);
-    report.add("Kerf", "is flashed, and has the version of this source", version);
+    report.add("Kerf", "answers, and has the version of this source", version);
     kerf.tell(report);
+    let mut has_run = false;
     for one in Check::ALL {
-        let hindrance = one.hindrance(plan).map(str::to_owned);
-        if let Some(why) = hindrance.or(start.as_ref().err().cloned()) {
+        let hindrance = one.hindrance(plan, has_run).map(str::to_owned);
+        if let Some(why) = start.as_ref().err().cloned().or(hindrance) {
             report.leave_out(one.name(), one.wanted(), &why);
             continue;
         }
         kerf.line.board().tell(one.name());
         let result = one.run(&mut kerf, plan).await;
         let again = result.is_err();
+        has_run = matches!(one, Check::Job) && !again;
         report.add(one.name(), one.wanted(), result);
         kerf.tell(report);
         if again {
             start = kerf.restart().await;
         }
     }
-    start.is_ok()
+    start
 }
+
+/// A value, and what it was.
+pub(crate) type Borrowed<'v> = (&'v Stored, String);
 
 /// Kerf at the other end of the line.
 pub(crate) struct Kerf<'l, 'b, B> {
@@ -154,12 +168,58 @@ impl<'l, 'b, B: Board> Kerf<'l, 'b, B> {
         longest: Duration,
         request: &str,
     ) -> Result<Vec<String>, String> {
+        let (lines, refusal) = self.answer(longest, request).await?;
+        refusal.map_or(Ok(lines), |why| Err(format!("{request} is refused: {why}")))
+    }
+
+    /// Sends a request. Returns all lines up to its answer, and the refusal if it is one.
+    async fn answer(
+        &mut self,
+        longest: Duration,
+        request: &str,
+    ) -> Result<(Vec<String>, Option<String>), String> {
+        self.line.forget().await?;
         self.line.say(request).await?;
         let answer = self.dialect.answer;
         let lines = self.line.until(longest, |line| answer(line).is_some()).await;
         let lines = lines.map_err(|why| format!("{request}: {why}"))?;
-        let last = lines.last().and_then(|last| answer(last)).unwrap_or(Ok(()));
-        last.map(|()| lines).map_err(|why| format!("{request} is refused: {why}"))
+        let refusal = lines.last().and_then(|last| answer(last)).and_then(Result::err);
+        Ok((lines, refusal))
+    }
+
+    /// Reads values that a check is going to change.
+    pub(crate) async fn borrow<'v>(
+        &mut self,
+        values: impl Iterator<Item = &'v Stored>,
+    ) -> Result<Vec<Borrowed<'v>>, String> {
+        let mut before = Vec::new();
+        for value in values {
+            before.push((value, self.read(value).await?));
+        }
+        Ok(before)
+    }
+
+    /// Stores the values that were there before, and reads them back. The error says which are not as before.
+    pub(crate) async fn give_back(&mut self, before: &[Borrowed<'_>]) -> Result<(), String> {
+        let mut left = Vec::new();
+        for _ in 0..RESTORES {
+            for (value, text) in before {
+                // What fails is noticed when it is read.
+                let _ = self.store(value, text).await;
+            }
+            let _ = self.line.pass(STORE).await;
+            left.clear();
+            for (value, text) in before {
+                if self.read(value).await.as_ref() != Ok(text) {
+                    left.push((value.store)(text).join(" "));
+                }
+            }
+            if left.is_empty() {
+                return Ok(());
+            }
+            let _ = self.restart().await;
+        }
+        Err(format!("NOT RESTORED, please send: {}", left.join(", ")))
     }
 
     /// Waits until the machine is at rest.
@@ -183,12 +243,12 @@ impl<'l, 'b, B: Board> Kerf<'l, 'b, B> {
         tinyg::value(&lines, name).ok_or_else(|| format!("no {name} in {lines:?}"))
     }
 
-    async fn read(&mut self, value: &Stored) -> Result<String, String> {
+    pub(crate) async fn read(&mut self, value: &Stored) -> Result<String, String> {
         let lines = self.ask(value.read).await?;
         (value.find)(&lines).ok_or_else(|| format!("{} is not answered: {lines:?}", value.read))
     }
 
-    async fn store(&mut self, value: &Stored, text: &str) -> Result<(), String> {
+    pub(crate) async fn store(&mut self, value: &Stored, text: &str) -> Result<(), String> {
         for request in (value.store)(text) {
             self.ask(&request).await?;
         }
@@ -225,31 +285,13 @@ async fn version(kerf: &mut Kerf<'_, '_, impl Board>, plan: &Plan) -> Checked {
 async fn settings(kerf: &mut Kerf<'_, '_, impl Board>, plan: &Plan) -> Checked {
     let values = kerf.dialect.stored;
     let mut random = Random::new(plan.seed);
-    let (mut before, mut others) = (Vec::new(), Vec::new());
-    for value in values {
-        before.push(kerf.read(value).await?);
-        others.push((value.other)(&mut random));
-    }
-    let result = kept(kerf, values, &others).await;
-    let restored = restore(kerf, values.iter().zip(&before)).await;
-    let changed = result?;
-    restored?;
-    let measured = match changed.is_empty() {
-        true => format!("{} values", values.len()),
-        false => changed.join("; "),
-    };
-    judged(changed.is_empty(), measured)
-}
-
-/// Stores the values that were there before.
-async fn restore<'v>(
-    kerf: &mut Kerf<'_, '_, impl Board>,
-    values: impl Iterator<Item = (&'v Stored, &'v String)>,
-) -> Result<(), String> {
-    for (value, text) in values {
-        kerf.store(value, text).await.map_err(|why| format!("{text} is not restored: {why}"))?;
-    }
-    kerf.line.pass(STORE).await
+    let others: Vec<_> = values.iter().map(|value| (value.other)(&mut random)).collect();
+    let before = kerf.borrow(values.iter()).await?;
+    let result = kept(kerf, values, &others).await.and_then(|changed| match changed.is_empty() {
+        true => judged(true, format!("{} values", values.len())),
+        false => judged(false, changed.join("; ")),
+    });
+    and_restored(result, kerf.give_back(&before).await)
 }
 
 /// Stores values, and returns what has become of those that a reset has changed.
@@ -287,61 +329,81 @@ async fn clock(kerf: &mut Kerf<'_, '_, impl Board>, plan: &Plan) -> Checked {
     let ms = plan.seconds * 1_000;
     let short = dwell(kerf, 100).await?;
     let took = dwell(kerf, ms + 100).await? - short;
+    if took < f64::from(ms) / 2_000.0 {
+        return Err(format!("a dwell of {ms} ms takes {took:.3} s"));
+    }
     let ppm = (f64::from(ms) / 1_000.0 / took - 1.0) * 1e6;
     judged(ppm.abs() <= CLOCK_PPM, format!("{ppm:+.0} ppm against this computer's clock"))
 }
 
+/// Half of the job, so that a machine that moves all the same ends elsewhere than it began.
 async fn check_mode(kerf: &mut Kerf<'_, '_, impl Board>) -> Checked {
     let [on, off] = kerf.dialect.check_mode.unwrap_or_default();
+    let scale = kerf.scale().await?;
+    let before = kerf.steps(&scale).await?;
     kerf.ask(on).await?;
-    let mut lines = 0;
     for line in kerf.dialect.before_job.iter().filter(|line| line.starts_with(['G', 'g'])) {
         kerf.ask(line).await?;
     }
-    let [out, back] = out_and_back();
-    for line in out.lines.iter().chain(&back.lines) {
+    let [out, _] = out_and_back();
+    for line in &out.lines {
         kerf.ask(line).await?;
-        lines += 1;
     }
-    let refused = kerf.ask(WRONG).await;
+    let (_, refusal) = kerf.answer(ANSWER, WRONG).await?;
+    kerf.line.pass(SETTLE).await?;
+    let steps = kerf.steps(&scale).await?;
     kerf.ask(off).await?;
     kerf.line.pass(SETTLE).await?;
-    let scale = kerf.scale().await?;
-    let steps = kerf.steps(&scale).await?;
-    match refused {
-        Ok(_) => judged(false, format!("the wrong line {WRONG:?} is accepted")),
-        Err(_) => judged(steps == [0.0; AXES], format!("{lines} lines; steps {steps:?}")),
+    match refusal {
+        None => judged(false, format!("the wrong line {WRONG:?} is accepted")),
+        Some(_) => judged(steps == before, format!("{} lines; steps {steps:?}", out.lines.len())),
     }
 }
 
 /// Runs the job from a reset on, so that it begins at 0.
 async fn job(kerf: &mut Kerf<'_, '_, impl Board>) -> Checked {
-    let mut before = Vec::new();
-    for ForJob { value, needed } in kerf.dialect.for_job {
-        before.push(kerf.read(value).await?);
+    let values = kerf.dialect.for_job;
+    let before = kerf.borrow(values.iter().map(|one| &one.value)).await?;
+    let result = prepared(kerf, values).await;
+    let again = if result.is_err() { kerf.restart().await } else { Ok(()) };
+    let restored = kerf.give_back(&before).await;
+    and_restored(result, again.and(restored))
+}
+
+/// Stores what the job needs, and runs it if that has been kept in a reset.
+async fn prepared(kerf: &mut Kerf<'_, '_, impl Board>, values: &[ForJob]) -> Checked {
+    for ForJob { value, needed } in values {
         kerf.store(value, needed).await?;
     }
     kerf.line.pass(STORE).await?;
-    let result = from_reset(kerf).await;
-    let again = if result.is_err() { kerf.restart().await } else { Ok(()) };
-    let values = kerf.dialect.for_job.iter().map(|one| &one.value);
-    let restored = restore(kerf, values.zip(&before)).await;
-    let judged = result?;
-    again.and(restored).map(|()| judged)
+    kerf.restart().await?;
+    for ForJob { value, needed } in values {
+        let found = kerf.read(value).await?;
+        if found != *needed {
+            return Err(format!("the job does not run: {} answers {found}", value.read));
+        }
+    }
+    from_reset(kerf).await
 }
 
 async fn from_reset(kerf: &mut Kerf<'_, '_, impl Board>) -> Checked {
-    kerf.restart().await?;
     for line in kerf.dialect.before_job {
         kerf.ask(line).await?;
     }
     let scale = kerf.scale().await?;
     let [out, back] = out_and_back();
+    let mut ways = out.at.iter().zip(&scale).map(|(mm, scale)| mm * scale);
+    if !ways.all(|way| way.is_finite() && way >= FEWEST) {
+        return Err(format!("too few steps/mm to tell a step: {scale:?}"));
+    }
     let there = run(kerf, &out, &scale).await?;
     let home = run(kerf, &back, &scale).await?;
     let lines = out.lines.len() + back.lines.len();
     let is_sound = there.is_exact && home.is_exact;
-    judged(is_sound, format!("{lines} lines; {} half way, {} at the end", there.text, home.text))
+    let drivers = kerf.dialect.drivers;
+    let text =
+        format!("{lines} lines; {} half way, {} at the end; {drivers}", there.text, home.text);
+    judged(is_sound, text)
 }
 
 struct Arrival {

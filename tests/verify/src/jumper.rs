@@ -9,14 +9,15 @@ use std::time::Duration;
 use crate::Plan;
 use crate::board::Board;
 use crate::dialect::TINYG;
+use crate::dialect::tinyg::SWITCHES;
 use crate::firmware::Kerf;
 use crate::line::Line;
-use crate::report::{Checked, Report, judged};
+use crate::report::{Checked, Report, and_restored, judged};
 
 const NAME: &str = "switch to last step";
-const WANTED: &str = "60 us, and the step that was under way";
+const WANTED: &str = "70 us, and the step that was under way";
 /// The longest time, s (docs/safety.md, A1).
-const LONGEST: f64 = 60e-6;
+const LONGEST: f64 = 70e-6;
 /// Length of each of the two lines, mm, and their speed, mm/min. `careful` reaches it.
 const LENGTH: f64 = 4.0;
 const SPEED: f64 = 800.0;
@@ -24,20 +25,30 @@ const SPEED: f64 = 800.0;
 const LIMIT: &str = "{xsn:2,st:0}";
 /// No input is a switch.
 const NO_SWITCH: &str = "{xsn:0,xsx:0,ysn:0,ysx:0,zsn:0,zsx:0}";
+/// The motors have no power.
+const NO_POWER: &str = "{1pm:0,2pm:0,3pm:0,4pm:0,md:n}";
 /// The state of an input that is not pressed.
 const OPEN: &str = "0";
 /// Time of the filters of the inputs, and more.
 const FILTER: Duration = Duration::from_millis(100);
-/// The settings that the check changes.
-const CHANGED: [&str; 8] = ["xsn", "xsx", "ysn", "ysx", "zsn", "zsx", "st", "1po"];
+/// The state of a machine with an alarm.
+const ALARM: &str = "2";
 
-/// Makes the check, if the plan says that there is a jumper.
-pub async fn check(line: &mut Line<'_, impl Board>, plan: &Plan, report: &mut Report) {
-    if !plan.has_jumper {
-        return report.leave_out(NAME, WANTED, "there is no jumper");
-    }
-    if plan.dialect.name != TINYG.name {
-        return report.leave_out(NAME, WANTED, "only in TinyG's dialect");
+/// Makes the check, if the plan says that there is a jumper. `works` says whether Kerf answers.
+pub async fn check(
+    line: &mut Line<'_, impl Board>,
+    plan: &Plan,
+    works: &Result<(), String>,
+    report: &mut Report,
+) {
+    let hindrance = match works {
+        _ if !plan.has_jumper => Some("there is no jumper"),
+        _ if plan.dialect.name != TINYG.name => Some("only in TinyG's dialect"),
+        Err(why) => Some(why.as_str()),
+        Ok(()) => None,
+    };
+    if let Some(why) = hindrance {
+        return report.leave_out(NAME, WANTED, why);
     }
     let mut kerf = Kerf::new(line, plan.dialect);
     let result = latency(&mut kerf).await;
@@ -47,17 +58,10 @@ pub async fn check(line: &mut Line<'_, impl Board>, plan: &Plan, report: &mut Re
 
 /// Measures, and restores the settings.
 async fn latency(kerf: &mut Kerf<'_, '_, impl Board>) -> Checked {
-    let mut before = Vec::new();
-    for name in CHANGED {
-        before.push(format!("{{{name}:{}}}", kerf.value(name).await?));
-    }
+    let before = kerf.borrow(SWITCHES.iter()).await?;
     let result = with_either_polarity(kerf).await;
-    let mut restored = kerf.restart().await;
-    for request in before {
-        restored = restored.and(kerf.ask(&request).await.map(|_| ()));
-    }
-    let judged = result?;
-    restored.map(|()| judged)
+    let again = kerf.restart().await;
+    and_restored(result, again.and(kerf.give_back(&before).await))
 }
 
 /// The direction pin may be high or low for X-, which must close the switch. So both polarities are tried.
@@ -65,6 +69,7 @@ async fn with_either_polarity(kerf: &mut Kerf<'_, '_, impl Board>) -> Checked {
     for polarity in [0, 1] {
         kerf.restart().await?;
         kerf.ask(NO_SWITCH).await?;
+        kerf.ask(NO_POWER).await?;
         kerf.ask(&format!("{{1po:{polarity}}}")).await?;
         for line in ["g21", "g94", "g91", "g1 f800 x0.1"] {
             kerf.ask(line).await?;
@@ -95,8 +100,12 @@ async fn at_speed(kerf: &mut Kerf<'_, '_, impl Board>) -> Checked {
             "X turns, and the switch does not stop the machine: no jumper?".into(),
         );
     }
+    let (state, input) = (kerf.value("stat").await?, kerf.value("in1").await?);
+    if state != ALARM || input == OPEN {
+        return Err(format!("not the switch has stopped the machine: state {state}, in1 {input}"));
+    }
     let more = y - at_switch;
     let most = (LONGEST * rate).ceil() + 1.0;
-    let text = format!("{more} steps at {rate:.0} steps/s");
+    let text = format!("step {more} after the switch was the last one, at {rate:.0} steps/s");
     judged((0.0..=most).contains(&more), text)
 }

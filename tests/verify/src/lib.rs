@@ -59,16 +59,14 @@ pub struct Plan {
 pub async fn verify(board: &mut impl Board, plan: &Plan) -> Report {
     let mut report = Report::new(plan);
     let mut line = Line::new(board);
-    match plan.clock_hz {
+    let painted = match plan.clock_hz {
         Some(_) => chip::check(&mut line, plan, &mut report).await,
         None => chip::leave_out(&mut report),
-    }
+    };
     let works = firmware::check(&mut line, plan, &mut report).await;
-    if works {
-        jumper::check(&mut line, plan, &mut report).await;
-    }
-    if let (Some(_), Some(from), true) = (plan.clock_hz, plan.static_end, works) {
-        chip::free_stack(&mut line, from, &mut report).await;
-    }
+    jumper::check(&mut line, plan, &works, &mut report).await;
+    chip::free_stack(&mut line, plan, &painted.and(works), &mut report).await;
+    // The job has left its modes behind. A board that is silent has been told of already.
+    let _ = line.reset().await;
     report
 }

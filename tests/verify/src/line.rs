@@ -95,6 +95,11 @@ impl<'b, B: Board> Line<'b, B> {
         })
     }
 
+    /// Forgets what has come before.
+    pub async fn forget(&mut self) -> Result<(), String> {
+        self.pass(Duration::from_millis(1)).await
+    }
+
     /// Waits for this time, and forgets what comes meanwhile.
     pub async fn pass(&mut self, time: Duration) -> Result<(), String> {
         let until = self.now() + time;

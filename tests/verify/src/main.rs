@@ -2,6 +2,8 @@
 
 mod port;
 
+use std::fs::File;
+use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -72,12 +74,12 @@ fn run(args: &Args) -> Result<ExitCode> {
         seconds: SECONDS,
         seed: SystemTime::now().duration_since(UNIX_EPOCH).map_or(1, |time| time.as_secs()),
     };
+    let name = args.file.display();
+    let mut file = File::create(&args.file).with_context(|| format!("cannot write {name}"))?;
     let way = images.map_or(Way::Usb, |(kerf, self_test)| Way::Loader { kerf, self_test });
     let mut board = Port::open(&args.port, way).map_err(|why| anyhow!(why))?;
     let report = block_on(verify(&mut board, &plan));
-    let name = args.file.display();
-    std::fs::write(&args.file, report.to_string())
-        .with_context(|| format!("cannot write {name}"))?;
+    write!(file, "{report}").with_context(|| format!("cannot write {name}"))?;
     println!("{}\nAll of it is in {name}, which can be attached to an issue.", report.verdict());
     Ok(if report.is_sound() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }

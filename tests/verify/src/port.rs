@@ -2,7 +2,7 @@
 
 use std::io::{ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
@@ -15,6 +15,8 @@ const RATE: u32 = 115_200;
 const DRAIN: Duration = Duration::from_millis(30);
 /// Longest time until a port can be opened: a board with USB of its own takes its port away in a reset.
 const OPEN: Duration = Duration::from_secs(10);
+/// Longest time in which an image is flashed and read back: 242,000 bytes take a minute and a half.
+const FLASH: Duration = Duration::from_secs(300);
 /// Time between two attempts.
 const AGAIN: Duration = Duration::from_millis(200);
 /// Time for which DTR is off, so that the board resets when it goes on.
@@ -60,6 +62,7 @@ impl Port {
     /// Closes the port and opens it again, with an edge of DTR.
     fn reopen(&mut self) -> Result<(), String> {
         self.port = None;
+        sleep(AGAIN);
         let mut port = opened(&self.name)?;
         // A pseudo-terminal has no DTR.
         let _ = port.write_data_terminal_ready(false);
@@ -91,13 +94,37 @@ fn avrdude(port: &str, image: &Path) -> Result<(), String> {
     let is_hex = image.extension().is_some_and(|extension| extension == "hex");
     let format = if is_hex { 'i' } else { 'e' };
     command.arg("-U").arg(format!("flash:w:{}:{format}", image.display()));
-    let output = command.output().map_err(|error| format!("cannot start avrdude: {error}"))?;
-    if output.status.success() {
+    let child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn();
+    let mut child = child.map_err(|error| format!("cannot start avrdude: {error}"))?;
+    let said = child.stderr.take().map(|mut said| {
+        std::thread::spawn(move || {
+            let mut text = String::new();
+            // What is no text is not told.
+            let _ = said.read_to_string(&mut text);
+            text
+        })
+    });
+    if ended(child)? {
         return Ok(());
     }
-    let said = String::from_utf8_lossy(&output.stderr);
-    let lines: Vec<_> = said.lines().filter(|line| !line.trim().is_empty()).collect();
+    let text = said.and_then(|said| said.join().ok()).unwrap_or_default();
+    let lines: Vec<_> = text.lines().filter(|line| !line.trim().is_empty()).collect();
     Err(format!("avrdude fails: {}", lines[lines.len().saturating_sub(TOLD)..].join(" / ")))
+}
+
+/// Waits until a program ends, and returns whether it reports success. Kills it if it does not end: without its port
+/// `avrdude` may wait for ever.
+fn ended(mut child: Child) -> Result<bool, String> {
+    let start = Instant::now();
+    while start.elapsed() < FLASH {
+        match child.try_wait() {
+            Ok(Some(status)) => return Ok(status.success()),
+            Ok(None) => sleep(AGAIN),
+            Err(error) => return Err(error.to_string()),
+        }
+    }
+    let _ = child.kill();
+    Err(format!("avrdude does not end within {} s", FLASH.as_secs()))
 }
 
 impl Board for Port {

@@ -55,6 +55,15 @@ pub fn judged(is_sound: bool, measured: String) -> Checked {
     Ok(Judged { is_sound, measured })
 }
 
+/// Adds to a result what was not restored.
+pub fn and_restored(result: Checked, restored: Result<(), String>) -> Checked {
+    match (result, restored) {
+        (result, Ok(())) => result,
+        (Ok(Judged { measured, .. }), Err(why)) => Err(format!("{why}; {measured}")),
+        (Err(first), Err(why)) => Err(format!("{why}; {first}")),
+    }
+}
+
 /// All findings about a board.
 pub struct Report {
     plan: Plan,
@@ -85,12 +94,13 @@ impl Report {
             Ok(Judged { measured, .. }) => (Outcome::Failed, measured),
             Err(why) => (Outcome::Failed, why),
         };
+        let measured = plain(&measured);
         self.findings.push(Finding { name, outcome, measured, wanted });
     }
 
     /// Adds a check that was not made.
     pub fn leave_out(&mut self, name: &'static str, wanted: &'static str, why: &str) {
-        let measured = why.to_owned();
+        let measured = plain(why);
         self.findings.push(Finding { name, outcome: Outcome::Untried, measured, wanted });
     }
 
@@ -116,9 +126,18 @@ impl Report {
     }
 }
 
-/// A cell of a table: a vertical bar would end it.
-fn cell(text: &str) -> String {
-    text.replace('|', "\\|").replace(['\r', '\n'], " ")
+/// Most characters of what a check measured.
+const LONGEST: usize = 400;
+
+/// Makes of a board's words what harms neither a terminal nor a table: no control characters, no ends of cells and of
+/// code, and not too many.
+fn plain(text: &str) -> String {
+    let harmless = |c: char| match c {
+        '`' | '|' => '\'',
+        c if c.is_control() => ' ',
+        c => c,
+    };
+    text.chars().take(LONGEST).map(harmless).collect()
 }
 
 impl Display for Report {
@@ -127,7 +146,7 @@ impl Display for Report {
         writeln!(f, "# Kerf {version} on `{board}`\n\n{}\n", self.verdict())?;
         writeln!(f, "| check | result | measured | wanted |\n|---|---|---|---|")?;
         for Finding { name, outcome, measured, wanted } in &self.findings {
-            writeln!(f, "| {name} | {} | {} | {wanted} |", outcome.word(), cell(measured))?;
+            writeln!(f, "| {name} | {} | `{measured}` | {wanted} |", outcome.word())?;
         }
         Ok(())
     }

@@ -34,6 +34,7 @@ pub static GRBL: Dialect = Dialect {
         request: "?",
         find: |lines| Some(lines.iter().any(|line| line.starts_with("<Idle"))),
     },
+    drivers: "the dialect cannot switch the drivers off",
     for_job: &[hundred!("100"), hundred!("101"), hundred!("102")],
     before_job: &["G21", "G94", "G91"],
     scale_requests: &["$$"],

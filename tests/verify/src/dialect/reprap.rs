@@ -27,6 +27,7 @@ pub static REPRAP: Dialect = Dialect {
     check_mode: None,
     dwell: |ms| format!("G4 P{ms}"),
     rest: Question { request: "M400", find: |_| Some(true) },
+    drivers: "the dialect cannot switch the drivers off",
     for_job: &[],
     before_job: &["G21", "G91"],
     scale_requests: &["M92"],

@@ -19,19 +19,38 @@ macro_rules! word {
     };
 }
 
-macro_rules! unpowered {
+macro_rules! setting {
     ($name:literal) => {
-        ForJob {
-            value: Stored {
-                read: concat!("{", $name, ":n}"),
-                find: |lines| value(lines, $name),
-                store: |text| vec![format!(concat!("{{", $name, ":{}}}"), text)],
-                other,
-            },
-            needed: "0",
+        Stored {
+            read: concat!("{", $name, ":n}"),
+            find: |lines| value(lines, $name),
+            store: |text| vec![format!(concat!("{{", $name, ":{}}}"), text)],
+            other,
         }
     };
 }
+
+macro_rules! unpowered {
+    ($name:literal) => {
+        ForJob { value: setting!($name), needed: "0" }
+    };
+}
+
+/// The settings that the check with a jumper changes: switches, the direction of X, and the power of the motors.
+pub(crate) static SWITCHES: [Stored; 12] = [
+    setting!("xsn"),
+    setting!("xsx"),
+    setting!("ysn"),
+    setting!("ysx"),
+    setting!("zsn"),
+    setting!("zsx"),
+    setting!("st"),
+    setting!("1po"),
+    setting!("1pm"),
+    setting!("2pm"),
+    setting!("3pm"),
+    setting!("4pm"),
+];
 
 /// TinyG's dialect.
 pub static TINYG: Dialect = Dialect {
@@ -49,6 +68,7 @@ pub static TINYG: Dialect = Dialect {
         request: "{stat:n}",
         find: |lines| value(lines, "stat").map(|stat| stat != RUNS),
     },
+    drivers: "the motors have no power",
     for_job: &[unpowered!("1pm"), unpowered!("2pm"), unpowered!("3pm"), unpowered!("4pm")],
     before_job: &["{md:n}", "g21", "g94", "g91"],
     scale_requests: &["{1:n}", "{2:n}", "{3:n}", "{4:n}"],
@@ -59,14 +79,19 @@ pub static TINYG: Dialect = Dialect {
 };
 
 fn answer(line: &str) -> Option<Result<(), String>> {
-    let footer = line.starts_with("{\"r\":").then(|| line.split_once("\"f\":["))??.1;
+    let footer = is_answer(line).then(|| line.rsplit_once("\"f\":["))??.1;
     let status = footer.split(',').nth(1)?.trim();
     Some(if status == "0" { Ok(()) } else { Err(line.to_owned()) })
 }
 
-/// Returns the value of a name in an answer.
+fn is_answer(line: &str) -> bool {
+    line.starts_with("{\"r\":")
+}
+
+/// Returns the value of a name in an answer. Reports that come unasked have values of the same names.
 pub(crate) fn value(lines: &[String], name: &str) -> Option<String> {
-    between(lines, &format!("{{\"{name}\":"), END)
+    let answers: Vec<String> = lines.iter().filter(|line| is_answer(line)).cloned().collect();
+    between(&answers, &format!("{{\"{name}\":"), END)
 }
 
 fn other(random: &mut Random) -> String {
