@@ -272,5 +272,5 @@ test('a port that fails ends the checks', async () => {
   link.send = () => (link.broken = 'unplugged');
   const { isSound, file, seconds } = await checked(link);
   assert.ok(!isSound && seconds < 5, file);
-  assert.match(file, /FAILED \| unplugged/);
+  assert.match(file, /FAILED \| `unplugged/);
 });

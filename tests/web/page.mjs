@@ -520,7 +520,7 @@ await step('a check that is stopped ends at once', async () => {
   await other.click('#check-start');
   await other.click('#check-stop');
   await other.waitForSelector('#check-save', { timeout: 2_000 });
-  assert.match(await report(other), /FAILED \| stopped by the person/);
+  assert.match(await report(other), /FAILED \| `stopped by the person/);
   await other.close();
 });
 

@@ -359,8 +359,8 @@ pub async fn free_stack(
     let (name, wanted) = ("free stack", "100 bytes or more never used");
     let from = match (plan.static_end, painted) {
         (Some(from), Ok(())) => from,
-        (None, _) => return report.leave_out(name, wanted, "the image is not known"),
         (_, Err(why)) => return report.leave_out(name, wanted, why),
+        (None, _) => return report.leave_out(name, wanted, "the image is not known"),
     };
     let result = stack_left(line, from).await;
     report.add(name, wanted, result);
