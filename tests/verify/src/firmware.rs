@@ -324,7 +324,7 @@ async fn dwell(kerf: &mut Kerf<'_, '_, impl Board>, ms: u32) -> Result<f64, Stri
     Ok((kerf.line.now() - start).as_secs_f64())
 }
 
-/// A dwell of no length shows what the conversation takes.
+/// A short dwell shows what the conversation takes.
 async fn clock(kerf: &mut Kerf<'_, '_, impl Board>, plan: &Plan) -> Checked {
     let ms = plan.seconds * 1_000;
     let short = dwell(kerf, 100).await?;
@@ -386,6 +386,7 @@ async fn prepared(kerf: &mut Kerf<'_, '_, impl Board>, values: &[ForJob]) -> Che
     from_reset(kerf).await
 }
 
+/// Runs the job from the position 0 on.
 async fn from_reset(kerf: &mut Kerf<'_, '_, impl Board>) -> Checked {
     for line in kerf.dialect.before_job {
         kerf.ask(line).await?;
