@@ -612,7 +612,7 @@ fn what_is_dropped_leaves_its_words() {
                     return two.fails(&format!("sps is not {wanted}"));
                 }
             }
-            // The same lines, of which none is dropped.
+            // The lines that were answered go to a second machine, which drops no line.
             let program = lines[..answers.min(lines.len())].to_vec();
             let rest = |words: Vec<String>| -> Vec<_> {
                 words.into_iter().filter(|word| !is_output(word)).collect()

@@ -11,7 +11,7 @@ use kerf_verify::dialect::of_feature;
 use kerf_verify::line::Line;
 use kerf_verify::{Image as Which, Outcome, Plan, Report, chip, verify};
 
-use crate::common::{image, part};
+use crate::common::{CALLED, JUMP_TO_0, image, part};
 
 /// Cycles between two looks for bytes: half a millisecond.
 const SLICE: u64 = 8_000;
@@ -19,9 +19,6 @@ const SLICE: u64 = 8_000;
 const JUMPER_SLICE: u64 = 32;
 /// One bit in so many bytes is wrong on a bad line.
 const NOISE: u64 = 300;
-/// Where the loader goes after a reset by the watchdog, and a jump to 0.
-const CALLED: usize = 0x2_0000;
-const JUMP: [u8; 4] = [0x0C, 0x94, 0, 0];
 /// Number of cells of the EEPROM.
 const CELLS: usize = 4_096;
 /// The size of the flash below the boot loader.
@@ -134,7 +131,7 @@ impl kerf_verify::Board for Simulated {
         let mut flash: Vec<u8> = (0..FLASH as u32).map(|at| self.machine.flash(at)).collect();
         flash[..image.flash.len()].copy_from_slice(&image.flash);
         if which == Which::SelfTest {
-            flash[CALLED..][..JUMP.len()].copy_from_slice(&JUMP);
+            flash[CALLED..][..JUMP_TO_0.len()].copy_from_slice(&JUMP_TO_0);
         }
         self.machine.fill_flash(&flash);
         assert!(self.machine.recognises(&image));

@@ -5,7 +5,7 @@ use kerf::boards::MEGA2560_GRBL;
 use kerf_sim::mechanics::Random;
 use kerf_sim::{Host, Image, Loader, Machine};
 
-use crate::common::{MS, image, part};
+use crate::common::{CALLED, JUMP_TO_0, MS, image, part};
 
 const GREETING: &str = "kerf-chip 1 atmega2560";
 /// Time of a byte on the wire at 115,200 baud, in cycles.
@@ -14,9 +14,6 @@ const BYTE: u64 = 1_389;
 const COUNT: u64 = 64;
 /// Longest time from a byte to the start or stop of the timers, in cycles: what `image/count.rs` says.
 const LATE: u64 = 90;
-/// Where the loader calls after a reset by the watchdog, and an instruction that starts the program.
-const CALLED: usize = 0x2_0000;
-const JUMP_TO_0: [u8; 4] = [0x0C, 0x94, 0, 0];
 
 /// A board that has started the image.
 fn started() -> Machine {

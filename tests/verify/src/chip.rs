@@ -121,8 +121,8 @@ pub async fn check(
     report: &mut Report,
 ) -> Result<(), String> {
     let mut start = begin(line).await;
-    report.add("self-test image", "is flashed, and says its name", named(&start));
-    tell(line, report);
+    let wanted = "is flashed, and says its name";
+    report.add_and_tell(line.board(), "self-test image", wanted, named(&start));
     for one in Check::ALL {
         if let Err(why) = &start {
             report.leave_out(one.name(), one.wanted(), why);
@@ -131,8 +131,7 @@ pub async fn check(
         line.board().tell(one.name());
         let result = one.run(line, plan).await;
         let again = result.is_err();
-        report.add(one.name(), one.wanted(), result);
-        tell(line, report);
+        report.add_and_tell(line.board(), one.name(), one.wanted(), result);
         if again {
             start = restart(line).await;
         }
@@ -155,11 +154,6 @@ fn named(start: &Result<String, String>) -> Checked {
         Ok(name) => judged(true, name.clone()),
         Err(why) => Err(why.clone()),
     }
-}
-
-fn tell(line: &mut Line<'_, impl Board>, report: &Report) {
-    let last = report.last_line();
-    line.board().tell(&last);
 }
 
 async fn begin(line: &mut Line<'_, impl Board>) -> Result<String, String> {
@@ -363,8 +357,7 @@ pub async fn free_stack(
         (None, _) => return report.leave_out(name, wanted, "the image is not known"),
     };
     let result = stack_left(line, from).await;
-    report.add(name, wanted, result);
-    tell(line, report);
+    report.add_and_tell(line.board(), name, wanted, result);
     if let Err(why) = line.flash(Image::Kerf).await {
         report.add("Kerf, flashed again", "is on the board at the end", Err(why));
     }

@@ -103,8 +103,8 @@ pub async fn check(
     let mut kerf = Kerf::new(line, plan.dialect);
     let version = version(&mut kerf, plan).await;
     let mut start = version.as_ref().map(|_| ()).map_err(Clone::clone);
-    report.add("Kerf", "answers, and has the version of this source", version);
-    kerf.tell(report);
+    let wanted = "answers, and has the version of this source";
+    report.add_and_tell(kerf.line.board(), "Kerf", wanted, version);
     let mut has_run = false;
     for one in Check::ALL {
         let hindrance = one.hindrance(plan, has_run).map(str::to_owned);
@@ -116,8 +116,7 @@ pub async fn check(
         let result = one.run(&mut kerf, plan).await;
         let again = result.is_err();
         has_run = matches!(one, Check::Job) && !again;
-        report.add(one.name(), one.wanted(), result);
-        kerf.tell(report);
+        report.add_and_tell(kerf.line.board(), one.name(), one.wanted(), result);
         if again {
             start = kerf.restart().await;
         }
@@ -141,11 +140,6 @@ impl<'l, 'b, B: Board> Kerf<'l, 'b, B> {
 
     pub(crate) fn line(&mut self) -> &mut Line<'b, B> {
         self.line
-    }
-
-    pub(crate) fn tell(&mut self, report: &Report) {
-        let last = report.last_line();
-        self.line.board().tell(&last);
     }
 
     async fn greeting(&mut self) -> Result<(), String> {

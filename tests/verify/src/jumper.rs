@@ -52,8 +52,7 @@ pub async fn check(
     }
     let mut kerf = Kerf::new(line, plan.dialect);
     let result = latency(&mut kerf).await;
-    report.add(NAME, WANTED, result);
-    kerf.tell(report);
+    report.add_and_tell(kerf.line().board(), NAME, WANTED, result);
 }
 
 /// Measures, and restores the settings.

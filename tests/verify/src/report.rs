@@ -3,6 +3,7 @@
 use std::fmt::{self, Display, Formatter};
 
 use crate::Plan;
+use crate::board::Board;
 
 /// What came of a check.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -98,6 +99,18 @@ impl Report {
         self.findings.push(Finding { name, outcome, measured, wanted });
     }
 
+    /// Adds what came of a check, and tells the person at the board.
+    pub fn add_and_tell(
+        &mut self,
+        board: &mut impl Board,
+        name: &'static str,
+        wanted: &'static str,
+        checked: Checked,
+    ) {
+        self.add(name, wanted, checked);
+        board.tell(&self.last_line());
+    }
+
     /// Adds a check that was not made.
     pub fn leave_out(&mut self, name: &'static str, wanted: &'static str, why: &str) {
         let measured = plain(why);
@@ -105,7 +118,7 @@ impl Report {
     }
 
     /// Returns the last finding as a line for a terminal.
-    pub fn last_line(&self) -> String {
+    fn last_line(&self) -> String {
         self.findings.last().map_or(String::new(), |one| {
             format!("{:>9}  {}: {}", one.outcome.word(), one.name, one.measured)
         })

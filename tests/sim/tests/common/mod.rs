@@ -123,6 +123,10 @@ pub fn set(machine: &mut Machine, host: &mut Host, line: &str) {
     assert_eq!(response.status, 0, "{line} is answered by {}", response.raw);
 }
 
+/// Where the boot loader calls after a reset by the watchdog, and an instruction there that starts the program.
+pub const CALLED: usize = 0x2_0000;
+pub const JUMP_TO_0: [u8; 4] = [0x0C, 0x94, 0, 0];
+
 /// Cycles in a millisecond.
 pub const MS: u64 = 16_000;
 /// Time of a byte on the wire at 115,200 baud, in cycles.
