@@ -213,6 +213,10 @@ contract! {
         /// Returns the pulses counted and timed so far. Has to be called at least each 100 ms, or times become
         /// ambiguous. Thread mode and exec. Cost: 300.
         fn read() -> Pulses;
+        /// Returns the pulses at the pin of a counter that the firmware does not use itself, since the start, modulo
+        /// 2^16. It counts in hardware, so it shows what comes out of a step pin that is connected with it. 0 on chips
+        /// and images without one. Thread mode.
+        fn at_counter() -> u16;
     }
 
     /// The PWM output that controls the speed of the spindle.

@@ -136,6 +136,10 @@ const VALUES: [(&str, &str); 62] = [
         "cause of the last start: 0 power, 1 reset button or port, 2 low supply voltage, 3 watchdog, 4 request",
     ),
     ("stv", "number of times that steps came late since the start; should be 0"),
+    (
+        "pls",
+        "rising edges at D47 since the start, modulo 65,536: connect it with a step pin to count pulses; 0 on images with `spn`, and on the RP2040",
+    ),
     ("kept", "1: everything is stored, 0: EEPROM is still being written"),
     ("inp", "probe: 1 closed, 0 open, -1 no input"),
     ("ind", "door: 1 open, 0 closed (or `saf` 0), -1 no input"),

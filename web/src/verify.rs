@@ -157,6 +157,7 @@ impl Verification {
             clock_hz: None,
             static_end: None,
             has_jumper: false,
+            has_counter: false,
             seconds: SECONDS,
             seed,
         };

@@ -23,7 +23,8 @@ pub struct VerifyArgs {
     /// The board
     #[arg(long, value_enum, default_value_t)]
     board: Board,
-    /// A jumper connects the direction pin of X with the input of its lower switch: see docs/verify.md
+    /// Jumpers connect the direction pin of X with the input of its lower switch, and its step pin with D47: see
+    /// docs/verify.md
     #[arg(long)]
     jumper: bool,
     /// The file for the result; `kerf-verify-BOARD.md` without it
@@ -50,6 +51,7 @@ pub fn run(args: &VerifyArgs) -> Result<ExitCode> {
 /// Returns the command that checks a board which has Kerf already.
 fn verify(args: &VerifyArgs) -> Result<Command> {
     let features = args.board.features()?;
+    let has_counter = !args.board.is_rp2040() && !features.iter().any(|name| name == "lathe");
     let dialect = features.into_iter().find(|name| name.starts_with("dialect-"));
     let dialect = dialect.with_context(|| format!("{} has no dialect", args.board))?;
     let mut command = host_cargo();
@@ -59,9 +61,8 @@ fn verify(args: &VerifyArgs) -> Result<Command> {
     command.args(["--dialect", &dialect, "--file"]);
     let file = args.file.clone();
     command.arg(file.unwrap_or_else(|| format!("kerf-verify-{}.md", args.board).into()));
-    if args.jumper {
-        command.arg("--jumper");
-    }
+    command.args(args.jumper.then_some("--jumper"));
+    command.args(has_counter.then_some("--counter"));
     Ok(command)
 }
 

@@ -26,6 +26,8 @@ const TCCR5B: *mut u8 = 0x121 as *mut u8;
 const TCNT5: *const u16 = 0x124 as *const u16;
 /// A count each 64 cycles.
 const RUN: u8 = 0b011;
+/// A count at each rising edge of the pin T5: PL2, D47.
+const EDGES: u8 = 0b111;
 
 /// The state of one sensor. The assembly knows its layout.
 #[repr(C)]
@@ -78,8 +80,12 @@ pub(super) static SHARED: Place = Place(UnsafeCell::new(Shared {
     in_use: 0,
 }));
 
-/// Sets the pull-ups. Before interrupts are on.
+/// Sets the pull-ups. On images without threads, the timer counts edges of a pin instead. Before interrupts are on.
 pub(super) fn start() {
+    if !Capability::Lathe.is_built_in() {
+        // SAFETY: start-up; the timer's register is this module's.
+        unsafe { TCCR5B.write_volatile(EDGES) };
+    }
     if let Some(encoder) = ACTIVE.encoder
         && Capability::Lathe.is_built_in()
     {
@@ -89,6 +95,16 @@ pub(super) fn start() {
             super::gpio::high(second);
         }
     }
+}
+
+/// Returns the rising edges at D47 since the start, modulo 2^16; 0 on images with threads. Thread mode.
+#[small]
+pub fn at_counter() -> u16 {
+    if Capability::Lathe.is_built_in() {
+        return 0;
+    }
+    // SAFETY: on these images nobody else reads a 16-bit register of this timer, so nothing comes between its two bytes.
+    unsafe { TCNT5.read_volatile() }
 }
 
 /// Sets which sensors are read from now on (bit 0 index, bit 1 sync, bit 2 the second sync sensor), and for how many

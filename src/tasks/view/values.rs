@@ -6,7 +6,7 @@ use super::{View, queue_free};
 use crate::boards::outputs;
 use crate::gcode::modal::{Coolant, Turn};
 use crate::hal::serial::capacity;
-use crate::hal::{gpio, uart, watchdog};
+use crate::hal::{encoder, gpio, uart, watchdog};
 use crate::machine;
 use crate::motion::queue;
 use crate::protocol::{Speech, Value, thousandths};
@@ -85,6 +85,7 @@ pub(super) fn value(view: &mut View<'_>, value: Value) -> i32 {
         Value::Pass => turning::pass(view.links.thread) as i32,
         Value::PulseMisfits => turning::misfits(view.links.thread).into(),
         Value::Starvations => health::starvations().into(),
+        Value::AtCounter => encoder::at_counter().into(),
         Value::Temperature(heater) => view.standing(heater).now.into(),
         Value::WantedTemperature(heater) => view.standing(heater).to.into(),
         Value::HeaterPower(heater) => i32::from(view.standing(heater).power) * 1_000 / 255,

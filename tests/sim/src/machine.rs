@@ -743,6 +743,17 @@ impl Machine {
         self.bus_mut().eeprom.set_cells(cells);
     }
 
+    /// Connects an output with an input by a wire.
+    pub fn connect(&mut self, from: Pin, to: Pin) {
+        self.probes.push(recorder::attach_input(self.bus, self.cpu, from, to));
+        self.drive_pin(to.port.letter(), to.bit, self.is_high(from));
+    }
+
+    /// Connects an output with the pin of a timer's external clock by a wire.
+    pub fn clock(&mut self, from: Pin, timer: usize) {
+        self.probes.push(recorder::attach_clock(self.bus, self.cpu, from, timer));
+    }
+
     /// A fault: from now on the bits of `mask` in a cell of the EEPROM stay as in `value`, whatever is written.
     pub fn stick_cell(&mut self, address: u16, mask: u8, value: u8) {
         self.bus_mut().eeprom.stick(Stuck { address, mask, value });

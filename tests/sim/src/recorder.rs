@@ -268,6 +268,10 @@ enum What {
     Spindle(SpindlePin),
     /// Selects a device on SPI.
     Select(Pin),
+    /// Is connected with an input.
+    Input(Pin),
+    /// Is connected with the external clock of a timer.
+    Clock(usize),
 }
 
 /// Listens to the motors' pins of a board. The probes must live as long as the CPU.
@@ -295,6 +299,16 @@ pub(crate) fn attach_spindle(
 /// Listens to a pin that selects a device on SPI. The probes must live as long as the CPU.
 pub(crate) fn attach_select(bus: NonNull<Bus>, cpu: Cpu, pin: Pin) -> Vec<Probe> {
     watch(bus, cpu, &[(pin, What::Select(pin))])
+}
+
+/// Connects an output with an input. The probes must live as long as the CPU.
+pub(crate) fn attach_input(bus: NonNull<Bus>, cpu: Cpu, from: Pin, to: Pin) -> Vec<Probe> {
+    watch(bus, cpu, &[(from, What::Input(to))])
+}
+
+/// Connects an output with the external clock of a timer. The probes must live as long as the CPU.
+pub(crate) fn attach_clock(bus: NonNull<Bus>, cpu: Cpu, from: Pin, timer: usize) -> Vec<Probe> {
+    watch(bus, cpu, &[(from, What::Clock(timer))])
 }
 
 fn watch(bus: NonNull<Bus>, cpu: Cpu, pins: &[(Pin, What)]) -> Vec<Probe> {
@@ -325,6 +339,12 @@ unsafe extern "C" fn pin_changed(_: *mut ffi::avr_irq_t, value: u32, param: *mut
         }
         What::Dir(motor) => bus.recorder.dir_edge(motor, high, now),
         What::Select(pin) => bus.spi.select(pin, high, now),
+        What::Input(pin) => {
+            bus.changed.push((pin, high));
+            bus.due = bus.due.min(now);
+        }
+        What::Clock(timer) if high => bus.timers[timer].rising_edge(),
+        What::Clock(_) => {}
         What::Spindle(pin) => {
             if let Some(mechanics) = &mut bus.mechanics {
                 mechanics.spindle(pin, high, now);

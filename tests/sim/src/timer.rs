@@ -4,7 +4,7 @@
 //! continues from it. A flag raised while its interrupt is masked stays raised. A match is blocked for one timer
 //! clock after the counter was written. The TEMP register of the 16-bit timers is modelled, so an access torn by an
 //! interrupt goes wrong as on the chip. The phase-correct modes count like fast PWM. Not modelled: input capture,
-//! external clocks, waveform pins.
+//! waveform pins. An edge of an external clock is counted at once, not at the next cycle of the CPU.
 //!
 //! Nothing here runs in each cycle. A timer knows the cycle of its next flag, and its count at any time follows from
 //! the last known count.
@@ -15,6 +15,9 @@ pub use layout::{ATMEGA1284P, ATMEGA2560, Layout};
 
 /// The cycle of an event that never comes.
 const NEVER: u64 = u64::MAX;
+
+/// Clock select: rising edges of the pin.
+const EXTERNAL: u8 = 7;
 
 // Bits of TIFR and TIMSK; compare channel n is bit `COMPARE + n`.
 const OVERFLOW: usize = 0;
@@ -225,6 +228,13 @@ impl Timer {
         self.sync(now);
         self.flags &= !bits;
         self.plan();
+    }
+
+    /// A rising edge of the external clock. Counts it if the timer is set to count such edges.
+    pub fn rising_edge(&mut self) {
+        if self.control_b & 7 == EXTERNAL && self.pace != 0.0 {
+            self.count = if self.count >= self.max { 0 } else { self.count + 1 };
+        }
     }
 
     fn write_compare(&mut self, channel: usize, word: u32) {

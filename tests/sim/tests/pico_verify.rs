@@ -68,6 +68,7 @@ fn plan(dialect: &'static Dialect) -> Plan {
         clock_hz: None,
         static_end: None,
         has_jumper: false,
+        has_counter: false,
         seconds: 1,
         seed: 1,
     }

@@ -15,8 +15,8 @@ use crate::common::{CALLED, JUMP_TO_0, image, part};
 
 /// Cycles between two looks for bytes: half a millisecond.
 const SLICE: u64 = 8_000;
-/// Cycles in which a jumper carries a level from pin to pin: 2 us.
-const JUMPER_SLICE: u64 = 32;
+/// The timer that counts edges at D47.
+const COUNTER: usize = 5;
 /// One bit in so many bytes is wrong on a bad line.
 const NOISE: u64 = 300;
 /// Number of cells of the EEPROM.
@@ -39,7 +39,7 @@ struct Faults {
     has_no_kerf: bool,
     /// Each reset brings the values back that it had at first.
     forgets: bool,
-    /// A jumper from the direction pin of X to its lower switch.
+    /// Jumpers from the direction pin of X to its lower switch, and from its step pin to the counter.
     has_jumper: bool,
     /// A line that it accepts, and does not obey.
     ignores: &'static str,
@@ -77,6 +77,10 @@ impl Simulated {
     fn new(board: &'static Board, faults: Faults) -> Self {
         let mut machine = Machine::load(&image(board), board).unwrap();
         machine.install(&Loader::of_debian().unwrap());
+        if faults.has_jumper {
+            machine.connect(board.motors[0].dir, board.inputs[0].unwrap());
+            machine.clock(board.motors[0].step, COUNTER);
+        }
         (faults.chip)(&mut machine);
         let (random, first_cells) = (Random::new(1), Box::new(*machine.eeprom()));
         let (rate, heard, told) = (115_200, 0, Vec::new());
@@ -103,21 +107,6 @@ impl Simulated {
     fn set_wire(&mut self, rate: u32) {
         self.rate = rate;
         self.machine.set_baud((f64::from(rate) / self.faults.clock).round() as u32);
-    }
-
-    /// Runs for some cycles.
-    fn run(&mut self, until: u64) -> Result<(), String> {
-        let (from, to) = (self.board.motors[0].dir, self.board.inputs[0].unwrap());
-        while self.machine.cycle() < until {
-            let slice = if self.faults.has_jumper { JUMPER_SLICE } else { SLICE };
-            let next = (self.machine.cycle() + slice).min(until);
-            self.machine.run_until(next).map_err(|fault| fault.to_string())?;
-            if self.faults.has_jumper {
-                let level = self.machine.is_high(from);
-                self.machine.drive_pin(to.port.letter(), to.bit, level);
-            }
-        }
-        Ok(())
     }
 }
 
@@ -179,7 +168,7 @@ impl kerf_verify::Board for Simulated {
                 return Ok(if is_silent { Vec::new() } else { self.spoiled(bytes) });
             }
             let next = self.machine.cycle() + SLICE;
-            self.run(next.min(end))?;
+            self.machine.run_until(next.min(end)).map_err(|fault| fault.to_string())?;
         }
     }
 
@@ -201,6 +190,7 @@ fn plan(board: &'static Board, faults: Faults, tests_chip: bool) -> Plan {
         clock_hz: tests_chip.then_some(board.clock_hz),
         static_end: Image::read(&image(board)).ok().map(|image| image.static_end),
         has_jumper: faults.has_jumper,
+        has_counter: !board.features.contains(&"lathe"),
         seconds: 2,
         seed: 1,
     }
@@ -365,6 +355,14 @@ fn a_board_that_does_not_obey_is_found() {
         let measured = fails(&report(&MEGA2560_GRBL, faults, false), &[name]);
         assert!(measured.contains(tells), "{ignores}: {measured}");
     }
+}
+
+/// The counter stands still.
+#[test]
+fn pulses_that_are_not_those_of_the_step_pin_are_found() {
+    let loose = Faults { has_jumper: true, chip: |m| m.set_pace(COUNTER, 0.0), ..NONE };
+    let measured = fails(&report(&MEGA2560_GRBL, loose, false), &["pulses at the step pin"]);
+    assert_eq!(measured, "0 pulses, 10240 steps");
 }
 
 /// Wherever the board falls silent, the checks end, and at least one has failed.

@@ -237,6 +237,12 @@ impl<'l, 'b, B: Board> Kerf<'l, 'b, B> {
         tinyg::value(&lines, name).ok_or_else(|| format!("no {name} in {lines:?}"))
     }
 
+    /// Returns a value by its name as a number, in TinyG's dialect.
+    pub(crate) async fn number(&mut self, name: &str) -> Result<f64, String> {
+        let text = self.value(name).await?;
+        text.parse().map_err(|_| format!("{name} is {text:?}, no number"))
+    }
+
     pub(crate) async fn read(&mut self, value: &Stored) -> Result<String, String> {
         let lines = self.ask(value.read).await?;
         (value.find)(&lines).ok_or_else(|| format!("{} is not answered: {lines:?}", value.read))

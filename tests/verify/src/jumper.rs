@@ -1,6 +1,9 @@
-//! The check with a jumper: from the direction pin of X to the input of its lower switch.
+//! The checks with jumpers: from the step pin of X to a counter of the chip, and from its direction pin to the input of
+//! its lower switch.
 //!
-//! Y moves at full speed. A line begins in which X turns, so its direction pin closes the switch at a step of Y that is
+//! The counter counts in hardware what comes out of the step pin; the pulses must be as many as the steps that Kerf says.
+//!
+//! For the switch, Y moves at full speed. A line begins in which X turns, so its direction pin closes the switch at a step of Y that is
 //! known. The switch is a limit, and stops Y. The steps that Y makes after that are the time from the switch to the last
 //! step. A step pin could not do this: inputs ignore what is as short as its pulse.
 
@@ -34,7 +37,12 @@ const FILTER: Duration = Duration::from_millis(100);
 /// The state of a machine with an alarm.
 const ALARM: &str = "2";
 
-/// Makes the check, if the plan says that there is a jumper. `works` says whether Kerf answers.
+const PULSES: &str = "pulses at the step pin";
+const AS_STEPS: &str = "as many as steps, there and back";
+/// Counts after which the counter begins anew.
+const COUNTS: f64 = 65_536.0;
+
+/// Makes the checks, if the plan says that there is a jumper. `works` says whether Kerf answers.
 pub async fn check(
     line: &mut Line<'_, impl Board>,
     plan: &Plan,
@@ -47,12 +55,49 @@ pub async fn check(
         Err(why) => Some(why.as_str()),
         Ok(()) => None,
     };
-    if let Some(why) = hindrance {
-        return report.leave_out(NAME, WANTED, why);
-    }
+    let uncounted = (!plan.has_counter).then_some("the image uses the counter itself, or has none");
     let mut kerf = Kerf::new(line, plan.dialect);
-    let result = latency(&mut kerf).await;
-    report.add_and_tell(kerf.line().board(), NAME, WANTED, result);
+    match hindrance.or(uncounted) {
+        Some(why) => report.leave_out(PULSES, AS_STEPS, why),
+        None => {
+            let result = pulses(&mut kerf).await;
+            report.add_and_tell(kerf.line().board(), PULSES, AS_STEPS, result);
+        }
+    }
+    match hindrance {
+        Some(why) => report.leave_out(NAME, WANTED, why),
+        None => {
+            let result = latency(&mut kerf).await;
+            report.add_and_tell(kerf.line().board(), NAME, WANTED, result);
+        }
+    }
+}
+
+/// Moves X there and back, and counts.
+async fn pulses(kerf: &mut Kerf<'_, '_, impl Board>) -> Checked {
+    let before = kerf.borrow(SWITCHES.iter()).await?;
+    let result = counted(kerf).await;
+    let again = kerf.restart().await;
+    and_restored(result, again.and(kerf.give_back(&before).await))
+}
+
+async fn counted(kerf: &mut Kerf<'_, '_, impl Board>) -> Checked {
+    kerf.restart().await?;
+    for line in [NO_SWITCH, NO_POWER, "g21", "g94", "g91"] {
+        kerf.ask(line).await?;
+    }
+    let scale = kerf.scale().await?;
+    let first = kerf.number("pls").await?;
+    kerf.ask(&format!("g1 x{LENGTH} f{SPEED}")).await?;
+    kerf.rest().await?;
+    let [there, ..] = kerf.steps(&scale).await?;
+    kerf.ask(&format!("g0 x-{LENGTH}")).await?;
+    kerf.rest().await?;
+    let [home, ..] = kerf.steps(&scale).await?;
+    let steps = there.abs() + (there - home).abs();
+    let pulses = (kerf.number("pls").await? - first).rem_euclid(COUNTS);
+    let text = format!("{pulses} pulses, {steps} steps");
+    judged(steps > 0.0 && pulses == steps.rem_euclid(COUNTS), text)
 }
 
 /// Measures, and restores the settings.

@@ -47,8 +47,11 @@ pub struct Plan {
     pub clock_hz: Option<u32>,
     /// The first address behind the image's static data, if it is known.
     pub static_end: Option<u16>,
-    /// Whether a jumper connects the direction pin of X with the input of its lower switch.
+    /// Whether a wire connects the direction pin of X with the input of its lower switch, and another one its step pin
+    /// with D47.
     pub has_jumper: bool,
+    /// Whether the image counts pulses at D47.
+    pub has_counter: bool,
     /// Seconds over which clocks are compared.
     pub seconds: u32,
     /// Chooses the random bytes.

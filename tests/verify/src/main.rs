@@ -43,9 +43,12 @@ struct Args {
     /// The first address behind the static data of Kerf
     #[arg(long)]
     static_end: Option<u16>,
-    /// A jumper connects the direction pin of X with the input of its lower switch
+    /// Jumpers connect the direction pin of X with the input of its lower switch, and its step pin with D47
     #[arg(long)]
     jumper: bool,
+    /// The image counts pulses at D47
+    #[arg(long)]
+    counter: bool,
     /// The file that is written
     #[arg(long)]
     file: PathBuf,
@@ -71,6 +74,7 @@ fn run(args: &Args) -> Result<ExitCode> {
         clock_hz: images.is_some().then_some(args.clock),
         static_end: args.static_end,
         has_jumper: args.jumper,
+        has_counter: args.counter,
         seconds: SECONDS,
         seed: SystemTime::now().duration_since(UNIX_EPOCH).map_or(1, |time| time.as_secs()),
     };
