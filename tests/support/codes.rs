@@ -87,7 +87,7 @@ can be read as well: [settings.md](settings.md). Names that do something: [proto
 ";
 
 /// Values of the machine: the name, or the name within its group with `x`, `1` or `e` for the group; and the meaning.
-const VALUES: [(&str, &str); 62] = [
+const VALUES: [(&str, &str); 63] = [
     (
         "n",
         "line number (N) of the last finished line; in motion, of those that move or switch something",

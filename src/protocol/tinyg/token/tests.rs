@@ -35,7 +35,7 @@ fn every_token_has_a_name_that_finds_it() {
             + 18
             + 2 * 9
             + 42
-            + 47
+            + 48
             + 2 * 6
             + 2
             + 6 * 4
