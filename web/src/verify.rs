@@ -156,8 +156,7 @@ impl Verification {
             dialect,
             clock_hz: None,
             static_end: None,
-            has_jumper: false,
-            has_counter: false,
+            jumpers: None,
             seconds: SECONDS,
             seed,
         };

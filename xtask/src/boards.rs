@@ -46,10 +46,23 @@ impl Board {
 
     /// The Cargo features that the board's file asks for: dialects and capabilities.
     pub fn features(self) -> Result<Vec<String>> {
+        listed(&self.data()?).with_context(|| format!("no line `features: &[...]` for {self}"))
+    }
+
+    /// The text of its file.
+    fn data(self) -> Result<String> {
         let file = root().join(format!("boards/{self}.rs"));
-        let text = std::fs::read_to_string(&file);
-        let text = text.with_context(|| format!("no {}", file.display()))?;
-        listed(&text).with_context(|| format!("no line `features: &[...]` in {}", file.display()))
+        std::fs::read_to_string(&file).with_context(|| format!("no {}", file.display()))
+    }
+
+    /// The channel of timer 4 that makes the spindle's pulses; `None` on an RP2040.
+    pub fn pwm_channel(self) -> Result<Option<u8>> {
+        if self.is_rp2040() {
+            return Ok(None);
+        }
+        let text = self.data()?;
+        let (_, rest) = text.split_once("Timer::T4, channel: ").context("no pulses by timer 4")?;
+        Ok(rest.chars().next().and_then(|digit| digit.to_digit(10)).map(|digit| digit as u8))
     }
 
     /// Whether its chip is the RP2040; otherwise it is the ATmega2560.

@@ -23,8 +23,7 @@ pub struct VerifyArgs {
     /// The board
     #[arg(long, value_enum, default_value_t)]
     board: Board,
-    /// Jumpers connect the direction pin of X with the input of its lower switch, and its step pin with D47: see
-    /// docs/verify.md
+    /// Jumpers connect the pins of X and of the spindle with inputs, as docs/verify.md draws them
     #[arg(long)]
     jumper: bool,
     /// The file for the result; `kerf-verify-BOARD.md` without it
@@ -61,8 +60,10 @@ fn verify(args: &VerifyArgs) -> Result<Command> {
     command.args(["--dialect", &dialect, "--file"]);
     let file = args.file.clone();
     command.arg(file.unwrap_or_else(|| format!("kerf-verify-{}.md", args.board).into()));
-    command.args(args.jumper.then_some("--jumper"));
     command.args(has_counter.then_some("--counter"));
+    if let Some(channel) = args.board.pwm_channel()?.filter(|_| args.jumper) {
+        command.arg("--jumpers").arg(channel.to_string());
+    }
     Ok(command)
 }
 

@@ -67,8 +67,7 @@ fn plan(dialect: &'static Dialect) -> Plan {
         dialect,
         clock_hz: None,
         static_end: None,
-        has_jumper: false,
-        has_counter: false,
+        jumpers: None,
         seconds: 1,
         seed: 1,
     }

@@ -9,7 +9,7 @@ use kerf_sim::mechanics::Random;
 use kerf_sim::{Image, Loader, Machine};
 use kerf_verify::dialect::of_feature;
 use kerf_verify::line::Line;
-use kerf_verify::{Image as Which, Outcome, Plan, Report, chip, verify};
+use kerf_verify::{Image as Which, Jumpers, Outcome, Plan, Report, chip, verify};
 
 use crate::common::{CALLED, JUMP_TO_0, image, part};
 
@@ -17,6 +17,8 @@ use crate::common::{CALLED, JUMP_TO_0, image, part};
 const SLICE: u64 = 8_000;
 /// The timer that counts edges at D47.
 const COUNTER: usize = 5;
+/// The channel of the analog input that the spindle's pulses are wired to.
+const A5: u8 = 5;
 /// One bit in so many bytes is wrong on a bad line.
 const NOISE: u64 = 300;
 /// Number of cells of the EEPROM.
@@ -39,8 +41,11 @@ struct Faults {
     has_no_kerf: bool,
     /// Each reset brings the values back that it had at first.
     forgets: bool,
-    /// Jumpers from the direction pin of X to its lower switch, and from its step pin to the counter.
+    /// Jumpers from the direction pin of X to its lower switch, from its step pin to the counter, and from the pin of the
+    /// spindle's pulses to A5.
     has_jumper: bool,
+    /// The share of the spindle's pulses that comes through.
+    passes: f64,
     /// A line that it accepts, and does not obey.
     ignores: &'static str,
     /// Changes to its chip.
@@ -54,6 +59,7 @@ const NONE: Faults = Faults {
     has_no_kerf: false,
     forgets: false,
     has_jumper: false,
+    passes: 1.0,
     ignores: "none",
     chip: |_| {},
 };
@@ -102,6 +108,16 @@ impl Simulated {
             }
         }
         bytes
+    }
+
+    /// Puts the mean of the spindle's pulses on A5.
+    fn wire_pulses(&mut self) {
+        let Some(pwm) = self.board.pwm.filter(|_| self.faults.has_jumper) else { return };
+        let direction = self.machine.peek(pwm.pin().port.address() as u16 - 1);
+        let drives = direction >> pwm.pin().bit & 1 != 0;
+        let share = if drives { self.machine.pulses().share } else { 0.0 };
+        let millivolts = (5_000.0 * share * self.faults.passes).round() as u32;
+        self.machine.set_millivolts(A5, millivolts);
     }
 
     fn set_wire(&mut self, rate: u32) {
@@ -168,6 +184,7 @@ impl kerf_verify::Board for Simulated {
                 return Ok(if is_silent { Vec::new() } else { self.spoiled(bytes) });
             }
             let next = self.machine.cycle() + SLICE;
+            self.wire_pulses();
             self.machine.run_until(next.min(end)).map_err(|fault| fault.to_string())?;
         }
     }
@@ -189,8 +206,10 @@ fn plan(board: &'static Board, faults: Faults, tests_chip: bool) -> Plan {
         dialect: board.features.iter().find_map(|feature| of_feature(feature)).unwrap(),
         clock_hz: tests_chip.then_some(board.clock_hz),
         static_end: Image::read(&image(board)).ok().map(|image| image.static_end),
-        has_jumper: faults.has_jumper,
-        has_counter: !board.features.contains(&"lathe"),
+        jumpers: faults.has_jumper.then_some(Jumpers {
+            counts: !board.features.contains(&"lathe"),
+            pwm: board.pwm.unwrap().channel,
+        }),
         seconds: 2,
         seed: 1,
     }
@@ -363,6 +382,14 @@ fn pulses_that_are_not_those_of_the_step_pin_are_found() {
     let loose = Faults { has_jumper: true, chip: |m| m.set_pace(COUNTER, 0.0), ..NONE };
     let measured = fails(&report(&MEGA2560_GRBL, loose, false), &["pulses at the step pin"]);
     assert_eq!(measured, "0 pulses, 10240 steps");
+}
+
+#[test]
+fn a_duty_cycle_that_is_wrong_is_found() {
+    for (passes, measured) in [(0.9, "22.4 %, 45.0 %, 67.4 %"), (0.0, "0.0 %, 0.0 %, 0.0 %")] {
+        let report = chip_report(Faults { has_jumper: true, passes, ..NONE });
+        assert_eq!(fails(&report, &["duty cycle"]), measured);
+    }
 }
 
 /// Wherever the board falls silent, the checks end, and at least one has failed.

@@ -7,6 +7,7 @@
 //! | clock, timers | each of the six timers counts between two bytes, whose times the computer knows |
 //! | rates | random bytes at each rate, which the chip sends back; it counts framing errors and overruns |
 //! | EEPROM | each cell takes the complement of its content, and its content again |
+//! | duty cycle | the pin of the spindle's pulses is high for a quarter, a half, three quarters of the time; the converter measures it through a jumper |
 //! | watchdog | the chip hangs, and must come back |
 //! | free stack | RAM is painted, Kerf runs in it, the paint that is left is counted |
 
@@ -51,6 +52,10 @@ const ECHO: Duration = Duration::from_millis(200);
 const BACK: Duration = Duration::from_secs(5);
 /// Shortest time from a hang to the reset by the watchdog, whose time is 250 ms, to 20 %.
 const BITES: Duration = Duration::from_millis(200);
+/// The reading of the converter at the voltage of the supply.
+const FULL_SCALE: u32 = 1_023;
+/// Greatest deviation of a duty cycle. The number of pulses that are measured is no whole one: 1 %.
+const DUTY_ERROR: f64 = 0.03;
 /// Number of EEPROM cells, and of those in one request.
 const CELLS: u32 = 4_096;
 const CELLS_AT_ONCE: u32 = 64;
@@ -63,17 +68,19 @@ enum Check {
     Timers,
     Rates,
     Cells,
+    Duty,
     Watchdog,
 }
 
 impl Check {
-    const ALL: [Check; 7] = [
+    const ALL: [Check; 8] = [
         Check::Ram,
         Check::Supply,
         Check::Clock,
         Check::Timers,
         Check::Rates,
         Check::Cells,
+        Check::Duty,
         Check::Watchdog,
     ];
 
@@ -85,6 +92,7 @@ impl Check {
             Check::Timers => "timers",
             Check::Rates => "rates of the line",
             Check::Cells => "EEPROM",
+            Check::Duty => "duty cycle",
             Check::Watchdog => "watchdog",
         }
     }
@@ -97,8 +105,15 @@ impl Check {
             Check::Timers => "all count alike",
             Check::Rates => "each random byte comes back",
             Check::Cells => "each cell takes both values of each bit",
+            Check::Duty => "a quarter, a half, three quarters, to 3 %",
             Check::Watchdog => "a chip that hangs starts anew",
         }
+    }
+
+    /// Why the check cannot be made.
+    fn hindrance(self, plan: &Plan) -> Option<&'static str> {
+        let lacks = matches!(self, Check::Duty) && plan.jumpers.is_none();
+        lacks.then_some("there is no jumper")
     }
 
     async fn run(self, line: &mut Line<'_, impl Board>, plan: &Plan) -> Checked {
@@ -109,6 +124,7 @@ impl Check {
             Check::Timers => timers(line, plan).await,
             Check::Rates => rates(line, plan).await,
             Check::Cells => cells(line).await,
+            Check::Duty => duty(line, plan).await,
             Check::Watchdog => watchdog(line).await,
         }
     }
@@ -124,7 +140,8 @@ pub async fn check(
     let wanted = "is flashed, and says its name";
     report.add_and_tell(line.board(), "self-test image", wanted, named(&start));
     for one in Check::ALL {
-        if let Err(why) = &start {
+        let hindrance = start.as_ref().err().map(String::as_str).or(one.hindrance(plan));
+        if let Some(why) = hindrance {
             report.leave_out(one.name(), one.wanted(), why);
             continue;
         }
@@ -327,6 +344,16 @@ async fn cells(line: &mut Line<'_, impl Board>) -> Checked {
         Some(at) => format!("{bad} of {CELLS} cells are bad, the first at {at:#x}"),
     };
     judged(bad == 0, measured)
+}
+
+async fn duty(line: &mut Line<'_, impl Board>, plan: &Plan) -> Checked {
+    let channel = plan.jumpers.map_or(0, |jumpers| jumpers.pwm);
+    let readings: [u32; 3] = numbers(line, &format!("duty {channel}"), ANSWER).await?;
+    let shares = readings.map(|reading| f64::from(reading) / f64::from(FULL_SCALE));
+    let is_near = |(share, wanted): (&f64, f64)| (share - wanted).abs() <= DUTY_ERROR;
+    let sound = shares.iter().zip([0.25, 0.5, 0.75]).all(is_near);
+    let measured = shares.map(|share| format!("{:.1} %", 100.0 * share)).join(", ");
+    judged(sound, measured)
 }
 
 async fn watchdog(line: &mut Line<'_, impl Board>) -> Checked {

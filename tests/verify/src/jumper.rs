@@ -1,11 +1,12 @@
 //! The checks with jumpers: from the step pin of X to a counter of the chip, and from its direction pin to the input of
 //! its lower switch.
 //!
-//! The counter counts in hardware what comes out of the step pin; the pulses must be as many as the steps that Kerf says.
+//! The counter counts in hardware what comes out of the step pin. The pulses must be as many as the steps that Kerf
+//! reports.
 //!
-//! For the switch, Y moves at full speed. A line begins in which X turns, so its direction pin closes the switch at a step of Y that is
-//! known. The switch is a limit, and stops Y. The steps that Y makes after that are the time from the switch to the last
-//! step. A step pin could not do this: inputs ignore what is as short as its pulse.
+//! For the switch, Y moves at full speed. A line begins in which X turns, so its direction pin closes the switch at a
+//! known step of Y. The switch is a limit, and stops Y. The steps that Y makes after that are the time from the switch
+//! to the last step. A step pin could not do this: inputs ignore what is as short as its pulse.
 
 use std::time::Duration;
 
@@ -50,12 +51,13 @@ pub async fn check(
     report: &mut Report,
 ) {
     let hindrance = match works {
-        _ if !plan.has_jumper => Some("there is no jumper"),
+        _ if plan.jumpers.is_none() => Some("there is no jumper"),
         _ if plan.dialect.name != TINYG.name => Some("only in TinyG's dialect"),
         Err(why) => Some(why.as_str()),
         Ok(()) => None,
     };
-    let uncounted = (!plan.has_counter).then_some("the image uses the counter itself, or has none");
+    let counts = plan.jumpers.is_some_and(|jumpers| jumpers.counts);
+    let uncounted = (!counts).then_some("the image uses the counter itself, or has none");
     let mut kerf = Kerf::new(line, plan.dialect);
     match hindrance.or(uncounted) {
         Some(why) => report.leave_out(PULSES, AS_STEPS, why),

@@ -9,7 +9,7 @@
 //! | [`firmware`] | the checks of Kerf on the board |
 //! | [`dialect`] | how Kerf is asked in each dialect, as data |
 //! | [`job`] | the job that Kerf runs |
-//! | [`jumper`] | the check that needs a jumper |
+//! | [`jumper`] | the checks of Kerf that need jumpers |
 //! | [`report`] | the findings, and the file |
 //!
 //! The library does no input or output of its own, and has no clock: [`Board`] does. The program (`main.rs`) is a board
@@ -47,15 +47,22 @@ pub struct Plan {
     pub clock_hz: Option<u32>,
     /// The first address behind the image's static data, if it is known.
     pub static_end: Option<u16>,
-    /// Whether a wire connects the direction pin of X with the input of its lower switch, and another one its step pin
-    /// with D47.
-    pub has_jumper: bool,
-    /// Whether the image counts pulses at D47.
-    pub has_counter: bool,
+    /// The wires between pins of the board, if there are any.
+    pub jumpers: Option<Jumpers>,
     /// Seconds over which clocks are compared.
     pub seconds: u32,
     /// Chooses the random bytes.
     pub seed: u64,
+}
+
+/// The wires of docs/verify.md: from the direction pin of X to the input of its lower switch, from its step pin to D47,
+/// from the pin of the spindle's pulses to A5.
+#[derive(Clone, Copy, Debug)]
+pub struct Jumpers {
+    /// Whether the image counts pulses at D47.
+    pub counts: bool,
+    /// The channel of timer 4 that drives the pin of the spindle's pulses: 0 for A, 1 for B.
+    pub pwm: u8,
 }
 
 /// Runs all checks. Leaves Kerf on the board, with the settings that it had.

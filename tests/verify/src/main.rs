@@ -12,7 +12,7 @@ use anyhow::{Context, Result, anyhow};
 use clap::Parser;
 use embassy_futures::block_on;
 use kerf_verify::dialect::of_feature;
-use kerf_verify::{Plan, verify};
+use kerf_verify::{Jumpers, Plan, verify};
 
 use port::{Port, Way};
 
@@ -43,9 +43,9 @@ struct Args {
     /// The first address behind the static data of Kerf
     #[arg(long)]
     static_end: Option<u16>,
-    /// Jumpers connect the direction pin of X with the input of its lower switch, and its step pin with D47
-    #[arg(long)]
-    jumper: bool,
+    /// There are the jumpers of docs/verify.md; the spindle's pulses come from this channel of timer 4
+    #[arg(long, value_name = "PWM")]
+    jumpers: Option<u8>,
     /// The image counts pulses at D47
     #[arg(long)]
     counter: bool,
@@ -73,8 +73,7 @@ fn run(args: &Args) -> Result<ExitCode> {
         dialect,
         clock_hz: images.is_some().then_some(args.clock),
         static_end: args.static_end,
-        has_jumper: args.jumper,
-        has_counter: args.counter,
+        jumpers: args.jumpers.map(|pwm| Jumpers { counts: args.counter, pwm }),
         seconds: SECONDS,
         seed: SystemTime::now().duration_since(UNIX_EPOCH).map_or(1, |time| time.as_secs()),
     };

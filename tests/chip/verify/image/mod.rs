@@ -7,7 +7,9 @@
 
 mod cells;
 mod chip;
+mod converter;
 mod count;
+mod duty;
 mod echo;
 mod line;
 mod ram;
@@ -15,7 +17,6 @@ mod register;
 mod serial;
 mod text;
 mod timers;
-mod volt;
 
 use kerf::baud;
 use line::Line;
@@ -59,7 +60,8 @@ fn carry_out(line: &[u8]) -> Option<()> {
         }
         (b"count", None, None, None) => answer(b"count", &count::until_byte()),
         (b"rate", Some(bits), Some(count), None) => echo::run(bits, count)?,
-        (b"volt", None, None, None) => answer(b"volt", &[volt::reading()]),
+        (b"volt", None, None, None) => answer(b"volt", &[converter::supply()]),
+        (b"duty", Some(channel), None, None) => answer(b"duty", &duty::readings(channel)?),
         (b"hang", None, None, None) => {
             answer(b"hang", &[]);
             serial::flush();
