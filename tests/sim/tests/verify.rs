@@ -386,7 +386,7 @@ fn pulses_that_are_not_those_of_the_step_pin_are_found() {
 
 #[test]
 fn a_duty_cycle_that_is_wrong_is_found() {
-    for (passes, measured) in [(0.9, "22.4 %, 45.0 %, 67.4 %"), (0.0, "0.0 %, 0.0 %, 0.0 %")] {
+    for (passes, measured) in [(0.9, "22.1 %, 44.7 %, 67.2 %"), (0.0, "0.0 %, 0.0 %, 0.0 %")] {
         let report = chip_report(Faults { has_jumper: true, passes, ..NONE });
         assert_eq!(fails(&report, &["duty cycle"]), measured);
     }
