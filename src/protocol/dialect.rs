@@ -45,6 +45,9 @@ pub trait Dialect {
     /// undecided.
     fn is_decided_by(line: &[u8]) -> bool;
 
+    /// Whether a line that decides a dialect may begin with this byte: an underestimate is a defect.
+    fn may_be_decided_by(first: u8) -> bool;
+
     /// Returns the words of a jog (G-code that moves and changes no mode); `None` if the block is not a jog.
     fn jog(block: &[u8]) -> Option<&[u8]> {
         let _ = block;
@@ -248,8 +251,9 @@ macro_rules! dialects {
             /// Whether the image has several dialects, so that a sender may choose.
             pub const IS_CHOSEN: bool = 1 < 0 $(+ cfg!(feature = $feature) as usize)+;
 
-            /// Returns how a port is spoken to after a start: in the dialect that the settings select, else in the
-            /// first one of the table that is built in.
+            /// Returns how a port is spoken to after a start: in the dialect that the settings select, else in the one
+            /// whose senders begin with anything ([`Dialect::IN_ORDER`]), else in the first one of the table that is
+            /// built in.
             #[allow(unreachable_code)]
             #[inline(always)]
             pub fn at_start(settings: &Settings, port: u8) -> Self {
@@ -257,6 +261,11 @@ macro_rules! dialects {
                 if <$dialect>::is_chosen(settings, port) {
                     return Self::$name(<$dialect>::speech(settings));
                 })+
+                if let Some(speech) = Self::of_question(settings)
+                    && settings.lets_senders_choose(port)
+                {
+                    return speech;
+                }
                 $(#[cfg(feature = $feature)]
                 { return Self::$name(<$dialect>::speech(settings)); })+
             }
@@ -271,6 +280,15 @@ macro_rules! dialects {
                 None
             }
 
+            /// See [`Dialect::may_be_decided_by`]. Blanks may stand before any line.
+            #[inline(always)]
+            pub fn may_be_decided_by(first: u8) -> bool {
+                let mut may = first <= b' ';
+                $(#[cfg(feature = $feature)]
+                { may |= <$dialect>::may_be_decided_by(first); })+
+                may
+            }
+
             /// Returns the dialect whose senders ask with a single `?`, if it is built in.
             #[small]
             pub fn of_question(settings: &Settings) -> Option<Self> {
@@ -281,16 +299,16 @@ macro_rules! dialects {
                 None
             }
 
-            /// Returns the dialect of the second greeting that an undecided port sends, beside its own: the dialect
-            /// whose senders ask with a single `?`, else that of printing hosts.
+            /// Returns the dialect of the greeting that an undecided port sends before its own: the first one of the
+            /// table that is built in, if the port's own is that of senders who ask with a single `?`; else that of
+            /// printing hosts.
             #[small]
             pub fn of_other_greeting(settings: &Settings) -> Option<Self> {
-                let mut other = Self::of_question(settings);
                 $(#[cfg(feature = $feature)]
-                if <$dialect>::IS_PLAIN && other.is_none() {
-                    other = Some(Self::$name(<$dialect>::speech(settings)));
+                if <$dialect>::IS_PLAIN || (Self::HAS_QUESTION && !<$dialect>::IN_ORDER) {
+                    return Some(Self::$name(<$dialect>::speech(settings)));
                 })+
-                other
+                None
             }
 
             /// Whether the image has a dialect whose senders ask with a single `?`.

@@ -210,7 +210,7 @@ fn act(links: &Links, port: &Port, characters: u8) {
         return;
     }
     if characters & RESET != 0 {
-        if starts_over(links, port) {
+        if starts_over(port) {
             // The end of the program, which an earlier reset has queued, is no motion.
             let works = !links.is_resetting() && is_moving(links, port);
             return start_over(links, port, uart::last_cut(port.number), works);
@@ -261,14 +261,10 @@ fn act(links: &Links, port: &Port, characters: u8) {
 }
 
 /// Whether a reset character drops the job instead of resetting the chip. It does so in a dialect that keeps its lines
-/// in order, unless there is a panic. It does so too on an undecided port while the machine has nothing to do: a
-/// sender may begin with a reset there, and a start of the chip would lose the lines that follow.
+/// in order, unless there is a panic.
 #[inline(never)]
 #[small]
-fn starts_over(links: &Links, port: &Port) -> bool {
-    if port.waits_for_question() {
-        return machine::alarm() == Alarm::None && !is_busy(links) && !links.has_data();
-    }
+fn starts_over(port: &Port) -> bool {
     port.speech.get().is_in_order() && machine::alarm() != Alarm::Panic
 }
 

@@ -511,7 +511,7 @@ fn begin(
     let Chosen { port, id, class } = *chosen;
     let lines = port.lines.borrow();
     let (line, length) = (lines.text(id), lines.length(id));
-    if port.is_undecided() {
+    if port.may_decide(line.first()) || links.may_change_dialect(port, line) {
         links.decide_by(port, line);
     }
     if Speech::HAS_QUESTION && class == Class::Gone {

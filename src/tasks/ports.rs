@@ -73,8 +73,10 @@ pub enum Choice {
     Set = 1,
     /// The first line that is in one dialect alone has decided.
     Said = 2,
-    /// Nothing has decided: the first line that is in one dialect alone will.
+    /// Nothing has decided, and no line has come: the first line that is in one dialect alone will decide.
     Open = 3,
+    /// The same, after lines that exist in several dialects.
+    Begun = 4,
 }
 
 /// The lines in a receive ring that are dropped: those up to a slot.
@@ -192,12 +194,22 @@ impl Port {
 
     /// Whether the dialect is undecided: the first line that is in one dialect alone will decide.
     pub fn is_undecided(&self) -> bool {
-        self.choice.get() == Choice::Open
+        matches!(self.choice.get(), Choice::Open | Choice::Begun)
     }
 
     /// Whether `?` and bytes above 0x7F are recognised within lines.
     pub fn is_eager(&self) -> bool {
-        self.waits_for_question() || self.speech.get().is_in_order()
+        self.speech.get().is_in_order()
+    }
+
+    /// Whether a line that begins with this byte may decide the dialect, or is the first one.
+    #[inline(always)]
+    pub fn may_decide(&self, first: Option<&u8>) -> bool {
+        match self.choice.get() {
+            Choice::Open => true,
+            Choice::Begun => first.is_some_and(|first| Speech::may_be_decided_by(*first)),
+            _ => false,
+        }
     }
 
     /// Whether a `?` at the beginning of a line decides the dialect.
@@ -305,7 +317,20 @@ impl Links {
         let settings = self.settings.borrow();
         if let Some(speech) = Speech::decided_by(line, &settings) {
             self.decide(port, speech, &settings);
+        } else if port.choice.get() == Choice::Open && !line.trim_ascii().is_empty() {
+            port.choice.set(Choice::Begun);
+            self.decided(&settings);
         }
+    }
+
+    /// Whether `line` ends the dialect that was said first on a port. Only braces do, which are text nowhere but in the
+    /// dialect that they select, and only while the machine does nothing: a sender may have followed another one
+    /// without a start of the board.
+    #[inline(never)]
+    #[small]
+    pub fn may_change_dialect(&self, port: &Port, line: &[u8]) -> bool {
+        let others = port.choice.get() == Choice::Said && (port.is_eager() || port.is_plain());
+        others && line.first() == Some(&b'{') && !View::of(self, port).is_busy()
     }
 
     /// Sets the dialect of a port. The port does not wait for a decision any more.
@@ -327,7 +352,7 @@ impl Links {
         if View::of(self, port).is_busy() || self.has_data() || port.is_resetting() {
             return;
         }
-        if port.choice.get() == Choice::Said {
+        if matches!(port.choice.get(), Choice::Said | Choice::Begun) {
             let settings = self.settings.borrow();
             port.choice.set(Choice::Open);
             port.speech.set(Speech::at_start(&settings, USB));
@@ -351,7 +376,8 @@ impl Links {
             self.ports.iter().for_each(|port| uart::set_plain(port.number, port.is_plain()));
         }
         self.set_flow(settings);
-        if self.ports.iter().any(|port| port.speech.get().is_in_order()) {
+        let began = |port: &Port| port.choice.get() != Choice::Open;
+        if self.ports.iter().any(|port| began(port) && port.speech.get().is_in_order()) {
             self.model.borrow_mut().begin_with_rapids();
         }
     }

@@ -248,7 +248,7 @@ impl Intake {
     #[inline(always)]
     fn ended(&mut self, pool: &mut LinePool, looked: bool, links: &Links) {
         self.scan.serve(links, pool, looked);
-        if self.port.is_undecided() {
+        if self.port.is_undecided() && self.port.may_decide(pool.newest().first()) {
             self.decide(pool, links);
         }
         if machine::is_alarmed() && pool.ends_with_control() {

@@ -51,7 +51,12 @@ pub fn pick(links: &Links, port: &Port, ring: &mut Window<'_>) -> u8 {
         if port.waits_for_question() && byte == ASKS && !within {
             decide(links, port);
         }
-        within = if byte < b' ' { false } else { within || byte != b' ' };
+        // What is taken out of a line does not begin one.
+        within = match byte {
+            ..b' ' => false,
+            b' ' | 0x80.. => within,
+            _ => true,
+        };
         if acts(byte) && port.speech.get().is_in_order() && ring.replace(n, byte, b' ') {
             act(links, port, byte);
             if closes {

@@ -252,6 +252,10 @@ fn reports_queue(links: &Links) -> bool {
 #[inline(never)]
 #[small]
 fn begin(notice: Notice, links: &Links, port: &Port) -> Telling {
+    // The enquiry exists in one dialect, and does not decide.
+    if matches!(notice, Notice::Enquiry) && port.is_undecided() {
+        return begin_otherwise(links, port, notice);
+    }
     Telling::begin(notice, port.speech.get(), &mut View::of(links, port))
 }
 
@@ -283,11 +287,9 @@ async fn tell(links: &Links, port: &Port, notice: Notice) -> usize {
         Notice::Status | Notice::Exception(_) => port.tx_behind_answers().await,
         _ => port.tx.lock().await,
     };
-    if matches!(notice, Notice::Greeting(_)) && port.take_asked(OTHERS) {
-        tx.room().await;
-        greet_otherwise(links, port, &mut tx);
-    }
-    let mut telling = begin(notice, links, port);
+    let mut twice = matches!(notice, Notice::Greeting(_)) && port.take_asked(OTHERS);
+    let mut telling =
+        if twice { begin_otherwise(links, port, notice) } else { begin(notice, links, port) };
     // For the whole notice: while it is sent, the port is not answered.
     let (mut turns, mut splits) = (COURTESY, SPLITS);
     loop {
@@ -300,7 +302,10 @@ async fn tell(links: &Links, port: &Port, notice: Notice) -> usize {
             continue;
         }
         if !step(&mut telling, links, port, &mut tx) {
-            break;
+            if !core::mem::take(&mut twice) {
+                break;
+            }
+            telling = begin(notice, links, port);
         }
         // A status report takes 4 ms, and the ring of a second port may be full in 5.
         if uart::presses() || (turns > 0 && flags::has(Event::Tick)) {
@@ -346,13 +351,15 @@ fn is_over(port: &Port) -> bool {
 }
 
 /// Greets in another dialect as well on ports whose dialect is undecided, so that each sender finds its own greeting.
-/// At the start, when the transmit rings are empty.
+/// The port's own greeting comes last, because senders that know both take the last one. At the start, when the
+/// transmit rings are empty.
 #[inline(never)]
 #[small]
 fn greet_undecided(links: &Links) {
     for port in links.ports.iter().filter(|port| port.is_undecided() && !is_shared(port.number)) {
         let Ok(mut tx) = port.tx.try_lock() else { continue };
-        greet_otherwise(links, port, &mut tx);
+        let mut telling = begin_otherwise(links, port, Notice::Greeting(Occasion::Ready));
+        while step(&mut telling, links, port, &mut tx) {}
     }
 }
 
@@ -377,22 +384,16 @@ fn start_up(links: &Links) {
 pub fn tell_startup(links: &Links, line: u8, status: Status) {
     let port = links.told();
     let Ok(mut tx) = port.tx.try_lock() else { return };
-    let undecided = port.is_undecided();
-    let asks = if undecided { Speech::of_question(&links.settings.borrow()) } else { None };
-    let speech = asks.unwrap_or(port.speech.get());
-    let notice = Notice::Startup(line, status);
-    let mut telling = Telling::begin(notice, speech, &mut View::of(links, port));
+    let mut telling = begin(Notice::Startup(line, status), links, port);
     while step(&mut telling, links, port, &mut tx) {}
 }
 
-/// Greets in the dialect whose senders ask by a `?` alone: 30 bytes.
+/// Begins a notice in the dialect in which an undecided port greets before its own. A greeting has at most 110 bytes.
 #[inline(never)]
 #[small]
-fn greet_otherwise(links: &Links, port: &Port, tx: &mut Tx) {
-    let Some(speech) = Speech::of_other_greeting(&links.settings.borrow()) else { return };
-    let notice = Notice::Greeting(Occasion::Ready);
-    let mut telling = Telling::begin(notice, speech, &mut View::of(links, port));
-    while step(&mut telling, links, port, tx) {}
+fn begin_otherwise(links: &Links, port: &Port, notice: Notice) -> Telling {
+    let other = Speech::of_other_greeting(&links.settings.borrow());
+    Telling::begin(notice, other.unwrap_or(port.speech.get()), &mut View::of(links, port))
 }
 
 /// Sends a short message on a port, if its transmitter is free and there is room: at most 64 bytes, or for a greeting

@@ -14,6 +14,8 @@ pub enum Command {
     Question,
     /// `$`.
     Help,
+    /// `h` or `help`, which a user of TinyG types.
+    Hint,
     /// `$$`.
     Settings,
     /// `$#`.
@@ -56,6 +58,7 @@ pub const ALL: u8 = u8::MAX;
 pub fn of(line: &[u8]) -> Command {
     let line = trim(line);
     match line {
+        b"h" | b"H" | b"help" if cfg!(feature = "dialect-tinyg") => Command::Hint,
         [] => Command::Nothing,
         [b'$', rest @ ..] => system(rest),
         _ => Command::Gcode,

@@ -63,6 +63,10 @@ impl Dialect for Grbl {
         command::is_own(line)
     }
 
+    fn may_be_decided_by(first: u8) -> bool {
+        first == b'$'
+    }
+
     fn jog(block: &[u8]) -> Option<&[u8]> {
         command::jog(block)
     }

@@ -192,6 +192,10 @@ impl Request {
                 self.command = Command::Nothing;
                 Step::At(0)
             }
+            Command::Hint => {
+                message(out, text!("grbl's dialect - $ for help, {} for TinyG's"));
+                Step::Done
+            }
             Command::Named(from) if by_name::find(command::name(line, from)).is_none() => {
                 Step::Error(UNSUPPORTED)
             }

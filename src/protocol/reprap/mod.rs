@@ -118,6 +118,10 @@ impl Dialect for RepRap {
         frame::is_own(line)
     }
 
+    fn may_be_decided_by(first: u8) -> bool {
+        matches!(first.to_ascii_uppercase(), b'M' | b'N')
+    }
+
     fn begin(
         line: &[u8],
         _length: u16,

@@ -75,6 +75,10 @@ impl Dialect for Tinyg {
         }
     }
 
+    fn may_be_decided_by(first: u8) -> bool {
+        matches!(first, b'{' | b'$')
+    }
+
     #[inline(always)]
     fn begin(line: &[u8], length: u16, mode: &mut Mode, settings: &Settings) -> Option<Request> {
         Request::begin(line, length, mode, settings)
