@@ -318,6 +318,8 @@ fn in_tinygs_dialect_a_pause_is_answered_when_it_has_been_read() {
         eeprom::put(&[]);
         let machine = Machine::boot(115_200).expect("one machine for each thread");
         machine.run_ms(100);
+        machine.send(b"{}\n");
+        machine.run_ms(20);
         machine.received();
         machine.send(b"g1x5f300\ng4p1\n");
         machine.run_ms(50);

@@ -164,7 +164,7 @@ fn two_resets_at_rest_are_no_alarm() {
 #[test]
 fn a_jog_that_is_cancelled_is_no_alarm_though_a_greeting_waits() {
     for_all_delays(|machine, delay| {
-        machine.send_aux(b"{ex:2}\n$ex=2\n");
+        machine.send_aux(b"$ex=2\n");
         machine.send(b"$ex=2\n");
         machine.run_ms(300);
         machine.set_aux_cts(true);

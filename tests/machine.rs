@@ -4,7 +4,7 @@ use kerf::boards::inputs;
 use kerf::hal::imp::Machine;
 use kerf::motion::queue::{self, CAPACITY};
 
-/// The greeting of grbl's dialect, which comes first while no dialect is settled.
+/// The greeting of grbl's dialect, which comes last while no dialect is settled.
 const GRBL: &str = "\r\nGrbl 1.1h ['$' for help]\r\n";
 
 /// What the greeting adds in an alarm.
@@ -21,9 +21,12 @@ impl Sender {
         let machine = Machine::boot(115_200).expect("one machine for each test thread");
         let mut sender = Sender { machine, heard: String::new() };
         let banner = sender.ask("", 100);
-        let banner = banner.trim_start_matches(GRBL).trim_start_matches(LOCKED);
+        let banner = banner.trim_end_matches(LOCKED).trim_end_matches(GRBL);
         assert!(banner.starts_with("{\"r\":{\"fv\":0.970,\"fb\":440.20,"), "{banner}");
-        assert!(banner.contains("\"msg\":\"SYSTEM READY\"},\"f\":[1,0,0]}\n"), "{banner}");
+        assert!(banner.ends_with("\"msg\":\"SYSTEM READY\"},\"f\":[1,0,0]}\n"), "{banner}");
+        // TinyG's dialect from now on.
+        assert_eq!(sender.ask("{}\n", 20), "{\"r\":{},\"f\":[1,0,7]}\n");
+        sender.heard = banner.to_string();
         sender
     }
 

@@ -26,6 +26,8 @@ pub fn with<T: Send + 'static>(
         eeprom::put(&contents);
         let mut sender = Sender(Machine::boot(115_200).expect("one machine for each thread"));
         sender.ask("", 100);
+        // TinyG's dialect from now on.
+        sender.ask("{}\n", 20);
         run(&mut sender)
     };
     thread::spawn(machine).join().unwrap()
