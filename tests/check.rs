@@ -133,7 +133,9 @@ fn what_is_no_g_code_is_told_and_never_waited_for() {
         ("$$", ["", ""]),
         ("$xvm=500", ["", ""]),
         ("$100=", ["status 100", "error:"]),
-        ("h", ["not tried", "error:"]),
+        // In grbl's dialect the answer says how to go on.
+        ("h", ["not tried", ""]),
+        ("[h]", ["status", "error:"]),
         ("{ej:0}", ["not tried", "error:"]),
         ("{\"baud\":9600}", ["not tried", "error:"]),
         ("$baud=1", ["not tried", "not tried"]),

@@ -46,8 +46,16 @@ impl Printer {
         Self::at(AIR)
     }
 
-    /// A printer whose hot end has this temperature at power-up; `None` without the capability.
+    /// A printer in TinyG's dialect whose hot end has this temperature at power-up; `None` without the capability.
     pub fn at(degrees: f64) -> Option<Self> {
+        let mut printer = Self::open_at(degrees)?;
+        printer.ask("{}");
+        printer.said.clear();
+        Some(printer)
+    }
+
+    /// The same, in the dialect that its first line will decide.
+    pub fn open_at(degrees: f64) -> Option<Self> {
         if !Capability::Printer.is_built_in() {
             return None;
         }
@@ -67,8 +75,6 @@ impl Printer {
             ms: 0,
             said: String::new(),
         };
-        // TinyG's dialect, until the test says something else.
-        printer.send("{}");
         printer.run(1_000, |_| {});
         printer.said.clear();
         Some(printer)
@@ -340,7 +346,7 @@ fn the_end_of_a_program_switches_off() {
 
 /// A printer in the dialect of printing hosts, with the hot end at this temperature.
 fn prints(at: f64) -> Option<Printer> {
-    let mut printer = Printer::at(at)?;
+    let mut printer = Printer::open_at(at)?;
     printer.ask("M105");
     printer.ask("M92 E100");
     Some(printer)

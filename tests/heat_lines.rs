@@ -36,10 +36,15 @@ impl Hosted {
     fn new(seed: u64) -> Option<Self> {
         let mut random = Random::new(seed);
         let at = [AIR, random.between(AIR, 250.0)][random.below(2)];
-        let mut printer = Printer::at(at)?;
+        let mut printer = Printer::open_at(at)?;
         let host = [Host::Cnc, Host::Printing][random.below(2)];
         if host == Host::Printing {
             printer.ask("M105");
+        } else {
+            // TinyG's dialect on both ports.
+            printer.machine.send_aux(b"{}\n");
+            printer.ask("{}");
+            printer.machine.received_aux();
         }
         printer.said.clear();
         Some(Self { printer, random, host, asked: at, given: 0.0, most: at, lines: Vec::new() })

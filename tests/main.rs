@@ -104,6 +104,7 @@ mod motion;
 mod moves;
 mod nist;
 mod offsets;
+mod open_port;
 mod openings;
 mod overrides;
 mod pages;

@@ -4,7 +4,7 @@ use std::thread;
 
 use kerf::hal::imp::{Machine, eeprom};
 
-use crate::kept_machine::{Sender, with};
+use crate::kept_machine::{Sender, with, with_open};
 
 impl Sender {
     /// Sends a line and waits until it is executed, however long that takes.
@@ -187,7 +187,7 @@ fn a_power_cut_leaves_each_cold_setting_old_or_new() {
 
 #[test]
 fn startup_lines_survive_a_power_cut_and_are_carried_out() {
-    let left = with(Vec::new(), |sender| {
+    let left = with_open(Vec::new(), |sender| {
         let heard = sender.ask("$I\n$N0=g20 g55\n", 2_000);
         assert!(heard.ends_with("ok\r\nok\r\n"), "{heard}");
         eeprom::contents()

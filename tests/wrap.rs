@@ -15,6 +15,8 @@ impl Sender {
         let machine = Machine::boot_at(115_200, START_MS).expect("one machine for each thread");
         let mut sender = Sender { machine };
         assert!(sender.ask("", 100).contains("SYSTEM READY"));
+        // TinyG's dialect from now on.
+        sender.set("{}\n");
         sender
     }
 

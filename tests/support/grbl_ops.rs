@@ -138,7 +138,7 @@ const ANY: &[&str] = &[
     "A",
     "G91G81X0.2Z-0.2R0.1F600",
     "G95",
-    "{xvm:n}",
+    "[xvm:n]",
     "garbage",
 ];
 

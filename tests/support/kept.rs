@@ -16,8 +16,19 @@ impl Sender {
     }
 }
 
-/// Does something with a machine that has these EEPROM contents, in a thread of its own.
+/// Does something in TinyG's dialect with a machine that has these EEPROM contents, in a thread of its own.
 pub fn with<T: Send + 'static>(
+    contents: impl AsRef<[u8]>,
+    run: impl FnOnce(&mut Sender) -> T + Send + 'static,
+) -> T {
+    with_open(contents, |sender| {
+        sender.ask("{}\n", 20);
+        run(sender)
+    })
+}
+
+/// The same, with a machine whose dialect is undecided.
+pub fn with_open<T: Send + 'static>(
     contents: impl AsRef<[u8]>,
     run: impl FnOnce(&mut Sender) -> T + Send + 'static,
 ) -> T {
@@ -26,8 +37,6 @@ pub fn with<T: Send + 'static>(
         eeprom::put(&contents);
         let mut sender = Sender(Machine::boot(115_200).expect("one machine for each thread"));
         sender.ask("", 100);
-        // TinyG's dialect from now on.
-        sender.ask("{}\n", 20);
         run(&mut sender)
     };
     thread::spawn(machine).join().unwrap()

@@ -13,6 +13,8 @@ const XOFF: char = '\x13';
 const XON: char = '\x11';
 /// How a banner ends.
 const BANNER: &str = "\"SYSTEM READY\"},\"f\":[1,0,0]}";
+/// The greeting of grbl's dialect, which comes behind the banner while no dialect is settled.
+const GRBL: [&str; 2] = ["", "Grbl 1.1h ['$' for help]"];
 
 /// What the answer to a line must report.
 #[derive(Clone, PartialEq, Debug)]
@@ -54,6 +56,8 @@ pub struct Sender {
     wanted: Vec<Want>,
     /// Banners since the last reset.
     pub banners: usize,
+    /// Whether the port has answered since the last reset, so that its dialect is settled.
+    settled: bool,
     /// Jogs that were accepted, minus jogs that have ended.
     pub jogs: isize,
 }
@@ -67,6 +71,7 @@ impl Sender {
             heard: Vec::new(),
             wanted: Vec::new(),
             banners: 0,
+            settled: false,
             jogs: 0,
         }
     }
@@ -109,6 +114,9 @@ impl Sender {
             // A reset has broken the line off.
             return Ok(());
         }
+        if !self.settled && GRBL.contains(&line.as_str()) {
+            return Ok(());
+        }
         if !is_whole(line) {
             return Err(format!("heard {line}, which is no line"));
         }
@@ -138,12 +146,13 @@ impl Sender {
         self.jogs +=
             isize::from(name.is_some_and(|n| n.starts_with("jog")) && line.contains("\"f\":[1,0,"));
         self.wanted.remove(at);
+        self.settled = true;
         Ok(())
     }
 
     /// Takes note of a reset: no line in flight will be answered any more.
     pub fn reset(&mut self) {
-        (self.banners, self.jogs) = (0, 0);
+        (self.banners, self.jogs, self.settled) = (0, 0, false);
         self.wanted.clear();
         self.partial.clear();
     }

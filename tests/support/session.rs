@@ -11,6 +11,8 @@ use crate::position_model::{PositionModel, SETTINGS, SWITCHES, number};
 use crate::sender::Sender;
 use crate::side::Side;
 
+/// Longest time in which the greeting of grbl's dialect comes behind the banner, ms.
+const GREETS_MS: u64 = 20;
 /// Lines in flight on each port.
 const IN_FLIGHT: [usize; 2] = [4, 2];
 /// Longest time until the machine comes to rest, ms.
@@ -73,8 +75,11 @@ impl<S: Side> Session<S> {
             }
         }
         self.position_model = PositionModel::at_start(self.side.steps());
-        // This settles TinyG's dialect on the port. In that dialect a reset restarts the board.
-        self.line(0, "{stat:n}")
+        // Behind the banner comes the greeting of grbl's dialect.
+        self.run(GREETS_MS)?;
+        // This settles TinyG's dialect on the ports. In that dialect a reset restarts the board.
+        self.line(0, "{stat:n}")?;
+        self.line(1, "{stat:n}")
     }
 
     /// Plays the actions. Returns those that remain after a reset; `None` if all are done.

@@ -19,8 +19,12 @@
 //! 2-> {sr:n}                  a line is sent on the second port, whose answers are `2<-`
 //! 2cts 1                      the sender on the second port stops the machine by its handshake pin (0: releases it)
 //! greeting                    the greeting is heard, with any version
+//! open                        from here on no port is put into TinyG's dialect (see below)
 //! job examples/square.gcode   sends each line of a file when the line before it has been accepted; none may be refused
 //! ```
+//!
+//! A transcript that expects TinyG's greeting itself is one of TinyG's dialect: right behind that line the player sends
+//! `{}` on the port, which decides the dialect, and hears the answer.
 //!
 //! Automatic reports (`sr`, `qr`), empty lines, `start` and grbl's greeting are ignored unless they are the line
 //! expected next. Any other unexpected line fails the transcript, and so does silence where a line is expected.
@@ -44,6 +48,8 @@ const MOVE_MS: u64 = 120_000;
 const REST_MS: u64 = 200;
 /// Longest wait for outputs, ms.
 const SWITCH_MS: u64 = 30;
+/// Longest time in which grbl's greeting comes behind that of TinyG, ms.
+const GREETS_MS: u64 = 20;
 /// Time at the end in which no unexpected line may come, ms.
 const LAST_MS: u64 = 100;
 
@@ -65,6 +71,7 @@ enum Event {
     Outputs(String),
     Job(String),
     Greeting,
+    Open,
 }
 
 /// A parsed transcript.
@@ -171,6 +178,7 @@ fn parse(line: &str) -> Option<Event> {
         "steps" => steps(rest).map(Event::Steps),
         "outputs" => Some(Event::Outputs(rest.to_string())),
         "greeting" => Some(Event::Greeting),
+        "open" => Some(Event::Open),
         "job" => Some(Event::Job(rest.to_string())),
         _ => None,
     }
@@ -273,7 +281,8 @@ impl Transcript {
         let pulses = self.spindle_pulses().unwrap_or(0);
         side.wire(&self.events.iter().filter_map(near).collect::<Vec<_>>(), pulses);
         let (ears, allowed) = Default::default();
-        let mut player = Player { side, ears, allowed, greeted: false };
+        let mut player =
+            Player { side, ears, allowed, greeted: false, open: false, speaks_aux: false };
         for (line, event) in &self.events {
             player.play(event).map_err(|what| format!("{}:{line}: {what}", self.name))?;
         }
@@ -288,8 +297,12 @@ struct Player<'a, S> {
     /// What each port has sent.
     ears: [Ear; 2],
     allowed: Vec<String>,
-    /// Whether the line that was expected last on the first port was grbl's greeting.
+    /// Whether the last event was `greeting`, and was grbl's in an image without TinyG's dialect.
     greeted: bool,
+    /// Whether the dialect of a port that has greeted is left open.
+    open: bool,
+    /// Whether the second port has been spoken to.
+    speaks_aux: bool,
 }
 
 /// What a port has sent.
@@ -322,6 +335,9 @@ const ALARMS: [&str; 4] =
 /// The greeting on the second port. Transcripts that do not use the port ignore it.
 const GREETING: &str = "{\"r\":{\"fv\":*\"SYSTEM READY\"},\"f\":[1,0,0]}";
 
+/// The answer to `{}`, which is in TinyG's dialect alone.
+const SETTLED: &str = "{\"r\":{},\"f\":[1,0,7]}";
+
 /// The greeting of grbl's dialect, which is ignored unless it is expected.
 const OTHER_GREETING: &str = "Grbl 1.1h ['$' for help]";
 /// The greeting of printing hosts, which is ignored unless it is expected.
@@ -331,13 +347,25 @@ impl<S: Side> Player<'_, S> {
     fn play(&mut self, event: &Event) -> Result<(), String> {
         match event {
             Event::Send(bytes) => self.side.send(bytes),
-            Event::SendAux(bytes) => self.side.send_aux(bytes),
+            Event::SendAux(bytes) => {
+                self.speaks_aux = true;
+                self.side.send_aux(bytes);
+            }
             Event::AuxCts(stop) => self.side.set_aux_cts(*stop),
             Event::Hear(line) => {
-                self.greeted = line == OTHER_GREETING || line == START;
-                return self.hear(0, line);
+                // `greeting` has heard it in an image that has this dialect alone.
+                let greeted = std::mem::take(&mut self.greeted);
+                if greeted && line == OTHER_GREETING {
+                    return Ok(());
+                }
+                self.hear(0, line)?;
+                return self.settle(0, line);
             }
-            Event::HearAux(line) => return self.hear(1, line),
+            Event::HearAux(line) => {
+                self.hear(1, line)?;
+                return self.settle(1, line);
+            }
+            Event::Open => self.open = true,
             Event::Allow(pattern) => self.allowed.push(pattern.clone()),
             Event::Pass(ms) => self.side.run_ms(*ms),
             Event::Baud(baud) => self.side.set_baud(*baud),
@@ -362,15 +390,38 @@ impl<S: Side> Player<'_, S> {
         Ok(())
     }
 
-    /// Waits for the greeting: of TinyG's dialect, or, in an image without that dialect, of the one that it has, which
-    /// may have come already.
+    /// Waits for the greeting: of TinyG's dialect, and the one behind it, or, in an image without that dialect, of the
+    /// one that it has.
     fn greeting(&mut self) -> Result<(), String> {
-        let own = match self.side.first_dialect() {
-            "dialect-grbl" => OTHER_GREETING,
-            "dialect-reprap" => START,
-            _ => return self.wait(0, GREETING, |line| matches(GREETING, line)),
-        };
-        if std::mem::take(&mut self.greeted) { Ok(()) } else { self.hear(0, own) }
+        match self.side.first_dialect() {
+            "dialect-grbl" => {
+                self.hear(0, OTHER_GREETING)?;
+                self.greeted = true;
+                Ok(())
+            }
+            "dialect-reprap" => self.hear(0, START),
+            _ => {
+                self.wait(0, GREETING, |line| matches(GREETING, line))?;
+                self.side.run_ms(GREETS_MS);
+                Ok(())
+            }
+        }
+    }
+
+    /// Puts a port that has said `line` into TinyG's dialect, if the line is its greeting.
+    fn settle(&mut self, port: usize, line: &str) -> Result<(), String> {
+        if self.open || !line.contains("SYSTEM READY") {
+            return Ok(());
+        }
+        self.side.run_ms(GREETS_MS);
+        match port {
+            0 => self.side.send(b"{}\n"),
+            _ => {
+                self.speaks_aux = true;
+                self.side.send_aux(b"{}\n");
+            }
+        }
+        self.hear(port, SETTLED)
     }
 
     /// Sends a file as a sender that waits for each answer.
@@ -425,10 +476,10 @@ impl<S: Side> Player<'_, S> {
 
     fn may_come(&self, port: usize, line: &str) -> bool {
         let line = line.trim_start_matches('\r');
-        // The second port hears of each alarm, whatever the first does.
-        if port == 1
-            && (matches(GREETING, line) || ALARMS.iter().any(|alarm| line.starts_with(alarm)))
-        {
+        // The second port hears of each alarm, whatever the first does, and in grbl's way until its dialect is settled.
+        let is_told = || ALARMS.iter().any(|alarm| line.starts_with(alarm));
+        let is_open = || !self.speaks_aux && line.starts_with("[MSG:");
+        if port == 1 && (matches(GREETING, line) || is_told() || is_open()) {
             return true;
         }
         // Where no dialect is settled yet, each kind of sender gets its own greeting.

@@ -201,7 +201,8 @@ impl Host {
         Ok(machine.cycle() < cycle)
     }
 
-    /// Runs until the banner comes, then a little longer until the line is silent.
+    /// Runs until the banner comes, then a little longer until the line is silent. Then it decides for TinyG's dialect
+    /// on a port whose dialect is undecided, if it is to speak that.
     pub fn boot(&mut self, machine: &mut impl Runs, timeout_ms: u64) -> Result<()> {
         let seen = self.banners;
         let end = machine.cycle() + machine.cycles(timeout_ms);
@@ -210,7 +211,11 @@ impl Host {
                 bail!("{}", self.no_banner(machine, timeout_ms));
             }
         }
-        self.run_for_ms(machine, 50)
+        self.run_for_ms(machine, 50)?;
+        if self.speech == Speech::TinyG {
+            self.ask(machine, "{}", 1_000)?;
+        }
+        Ok(())
     }
 
     fn no_banner(&self, machine: &impl Runs, timeout_ms: u64) -> String {

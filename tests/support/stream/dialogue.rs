@@ -26,6 +26,10 @@ const MODES: [&str; 5] = [
     "uda0:\"0x0\",udb0:\"0x0\"",
 ];
 
+/// The greeting of grbl's dialect, and the longest time in which it comes behind the banner, ms.
+const GRBL: &str = "Grbl 1.1h ['$' for help]";
+const GREETS_MS: u64 = 20;
+
 pub(super) type Outcome<T> = Result<T, String>;
 
 /// A machine, and the senders on its two ports.
@@ -43,6 +47,8 @@ pub struct Dialogue<S> {
     pub(super) heard: [usize; 2],
     pub(super) story: Vec<String>,
     pub(super) banners: usize,
+    /// Whether both ports have been put into TinyG's dialect.
+    pub(super) settled: bool,
     pub(super) acks: [usize; 2],
     /// The value that each port has set for itself.
     pub(super) values: [u16; 2],
@@ -76,6 +82,7 @@ impl<S: Side> Dialogue<S> {
             heard: [0; 2],
             story: Vec::new(),
             banners: 0,
+            settled: false,
             acks: [0; 2],
             values: [0; 2],
             doubt: 0,
@@ -99,10 +106,18 @@ impl<S: Side> Dialogue<S> {
                 return Err("no SYSTEM READY".to_string());
             }
         }
+        // Behind the banner comes the greeting of grbl's dialect.
+        self.run(GREETS_MS)?;
+        // TinyG's dialect on both ports from now on.
+        let id = self.id;
+        self.ports[1].own(id, &format!("{{tid:{id}}}"), self.now);
+        self.id += 1;
         for modes in MODES {
             self.ask(modes)?;
         }
-        self.rest()
+        self.rest()?;
+        self.settled = true;
+        Ok(())
     }
 
     /// Plays a conversation.
@@ -235,6 +250,10 @@ impl<S: Side> Dialogue<S> {
         let line = String::from_utf8_lossy(&std::mem::take(&mut self.partial[port])).to_string();
         self.story.push(format!("{} ms:     {port} heard {line}", self.now));
         if self.banners < 2 && !line.contains("SYSTEM READY") {
+            return Ok(());
+        }
+        // The greeting of grbl's dialect comes behind the banner while no dialect is settled.
+        if !self.settled && ["", GRBL].contains(&line.as_str()) {
             return Ok(());
         }
         match read(&line, self.sums)? {
