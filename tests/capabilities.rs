@@ -80,7 +80,8 @@ fn the_machine_says_that_it_lacks_something() {
         machine.run_ms(300);
         String::from_utf8(machine.received()).expect("ASCII")
     };
-    ask("");
+    // TinyG's dialect from now on.
+    assert!(ask("{}").contains("\"f\":[1,0,"));
     let lacks = format!("\"f\":[1,{},", number(Status::NotBuiltIn));
     assert!(!Capability::Help.is_built_in() || Capability::Text.is_built_in());
     for (capability, line) in [

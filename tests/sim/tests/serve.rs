@@ -20,7 +20,7 @@ impl Drop for Server {
 
 /// Returns the first line that is no automatic report.
 fn next(lines: &mut Lines<BufReader<File>>) -> String {
-    // Reports, and the part of the greeting for senders of the other dialect.
+    // Reports, and the greeting for senders of the other dialect.
     let others = ["{\"sr\":", "{\"qr\":", "Grbl 1.1h"];
     let is_other = |line: &String| {
         line.trim_end().is_empty() || others.iter().any(|other| line.starts_with(other))
@@ -84,6 +84,8 @@ fn it_is_told_whether_the_machine_is_where_the_job_ends() {
         let (mut server, mut port) = serve(&["--speed", "max", "--expect", job.to_str().unwrap()]);
         let mut lines = BufReader::new(port.try_clone().unwrap()).lines();
         assert!(next(&mut lines).contains("SYSTEM READY"));
+        // TinyG's dialect from now on.
+        port.write_all(b"{}\n").unwrap();
         port.write_all(sent.as_bytes()).unwrap();
         while !lines.next().unwrap().unwrap().contains("\"stat\":3") {}
         let (text, ok) = end(&mut server);
