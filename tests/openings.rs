@@ -13,12 +13,31 @@ fn every_sender_finds_its_own() {
     by_sender::all(boot);
 }
 
+#[test]
+fn the_greeting_loses_no_sender() {
+    by_sender::greeting(Machine::boot(115_200).expect("one machine for each thread"));
+}
+
+#[test]
+fn noise_costs_its_line_alone() {
+    let one = |seed| {
+        let play = move || {
+            let boot = || Machine::boot(115_200).expect("one machine for each thread");
+            by_sender::noise(boot, seed..seed + 1);
+        };
+        thread::spawn(play).join().is_err()
+    };
+    let failed: Vec<u64> = (0..300).filter(|seed| one(*seed)).collect();
+    assert!(failed.is_empty(), "{failed:?}");
+}
+
 /// A machine that begins with this value of `dia`. Another machine, in a thread of its own, has stored the value.
 fn boot(dia: u8) -> Machine {
     let set = move || {
         let machine = Machine::boot(115_200).expect("one machine for each thread");
         machine.run_ms(100);
-        machine.send(format!("{{dia:{dia}}}\n").as_bytes());
+        // A is an axis of a printer.
+        machine.send(format!("{{aam:0,dia:{dia}}}\n").as_bytes());
         machine.run_ms(500);
         eeprom::contents()
     };

@@ -369,7 +369,7 @@ const ADVICE: &[(Status, &str, &str)] = &[
     ),
     (
         NotHomed,
-        "G28 or G30 moves an axis that is not homed, and no position was ever stored.",
+        "G28 or G30 moves an axis that has to be homed, or Z, and no position was ever stored.",
         "Home: `{home:1}`. Without a switch set the position by G28.3.",
     ),
     (

@@ -336,9 +336,15 @@ impl State {
         Ok(())
     }
 
+    /// Whether the axis is Z, and not at this place.
+    fn leaves(&self, axis: u8, place: Length) -> bool {
+        axis == Z_AXIS && at(&self.position, axis) != place
+    }
+
     /// Carries out G28 and G30: a traverse to the stored position. With axis words only the named axes move, first to
-    /// where the words say. Without words all axes move. If no position was ever stored, the target is machine zero.
-    /// Machine zero is known only on homed axes, so the line is refused if a linear axis that would move is not homed.
+    /// where the words say. Without words all axes move. If no position was ever stored, the target is machine zero,
+    /// which is known on homed axes. On others without a homing switch it is where they were at the start, as in grbl.
+    /// The line is refused if a linear axis would move there that has such a switch, or if Z would: it could move down.
     #[inline(never)]
     pub(super) fn go_stored(
         &mut self,
@@ -358,7 +364,9 @@ impl State {
         for axis in 0..units::AXES as u8 {
             let named = !block.has(AXES) || block.get(axis).is_some();
             if named && setup.mode(axis) != AxisMode::Disabled {
-                if usize::from(axis) < FIRST_ROTARY && places & 1 << axis == 0 {
+                let is_known = places & 1 << axis != 0 || usize::from(axis) >= FIRST_ROTARY;
+                if !is_known && (setup.homing(axis).is_ok() || self.leaves(axis, at(&stored, axis)))
+                {
                     return Err(Status::NotHomed);
                 }
                 put(&mut self.position, axis, at(&stored, axis));
@@ -379,6 +387,9 @@ impl State {
 pub(super) fn dwell_ms(block: &Block) -> Result<u32, Status> {
     block.get(P).ok_or(Status::PWordMissing)?.milliseconds()
 }
+
+/// The number of the axis Z.
+const Z_AXIS: u8 = 2;
 
 #[small]
 fn at(values: &PerAxis<Length>, axis: u8) -> Length {

@@ -21,7 +21,7 @@ use crate::config::Settings;
 use crate::hal::event::{is_unheard, set_eager};
 use crate::hal::serial::{Flow, USB, is_shared};
 use crate::hal::uart;
-use crate::machine::{self, Alarm};
+use crate::machine::{self, Alarm, Cycle};
 use crate::protocol::Speech;
 use crate::status::Status;
 use crate::units::{Length, PerAxis};
@@ -265,10 +265,11 @@ impl Port {
         self.enquiry.get() || self.news.get().is_some() || self.asks_report()
     }
 
-    /// Whether a byte has requested a status report.
+    /// Whether a byte has requested a status report, and it may be sent: not while the machine homes. Senders take the
+    /// first report after `$H` for the position at which homing has ended.
     #[inline(always)]
     pub fn asks_report(&self) -> bool {
-        self.asked.get() & REPORT != 0
+        self.asked.get() & REPORT != 0 && machine::cycle() != Cycle::Homing
     }
 }
 

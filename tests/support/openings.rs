@@ -64,7 +64,11 @@ const SETTINGS: [&str; 8] = [
     r"^\$130=\d+\.\d{3}$",
 ];
 
-const SENDERS: [Sender; 8] = [
+/// A status report of a machine with three axes: some senders read three numbers, and no more.
+const THREE: &str = r"^<Idle\|MPos:-?[\d.]+,-?[\d.]+,-?[\d.]+\|";
+const HELP: &str = r"^\[HLP:";
+
+const SENDERS: [Sender; 16] = [
     // GrblControllerInitializer: a question until there is a status, an empty line, version and options, settings,
     // modes; then `?` 5 times a second. `isOkResponse` accepts `ok` alone. It gives up 12 s after the port was
     // opened, and 4 s after each line.
@@ -175,6 +179,86 @@ const SENDERS: [Sender; 8] = [
             step(b"\x85", &[], 1_000),
         ],
     },
+    // Its driver for grbl asks for the help text, and reads `[HLP:` as the sign of life. It ends lines by CR.
+    Sender {
+        name: "MeerK40t",
+        steps: &[
+            step(b"$\r", &[HELP, OK], 2_000),
+            step(b"$$\r", &[SETTINGS[0], SETTINGS[7], OK], 2_000),
+            step(b"$I\r", &[VERSION, OPTIONS, OK], 2_000),
+            step(b"G21\rG90\rM5 S0\rG0 X1 Y1\rG1 F600 X0 Y0\r", &[OK, OK, OK, OK, OK], 2_000),
+            step(b"?", &[REPORT], 500),
+        ],
+    },
+    // It asks up to ten times by a byte that grblHAL knows, and then by the usual one.
+    Sender {
+        name: "ioSender",
+        steps: &[
+            step(b"\x87", &[], 250),
+            step(b"\x87\x87", &[], 250),
+            step(b"\x87", &[], 250),
+            step(b"?", &[REPORT], 1_500),
+            step(b"$I\n", &[VERSION, r"^\[OPT:[A-Z0-9+]*Z", OK], 2_000),
+            step(b"$$\n$#\n$G\n", &[SETTINGS[0], OK, r"^\[G54:", OK, MODES, OK], 2_000),
+            step(b"\xA3?", &[REPORT], 500),
+        ],
+    },
+    // The server's code: a blank line, a question, then the version; no reset unless the user wants one.
+    Sender {
+        name: "gSender 1.6",
+        steps: &[
+            step(b"\n", &[OK], 1_000),
+            step(b"?", &[REPORT], 500),
+            step(b"$I\n$$\n$#\n$G\n", &[VERSION, OPTIONS, OK, SETTINGS[0], OK, r"^\[G54:", OK, MODES, OK], 5_000),
+        ],
+    },
+    // stream.py and simple_stream.py of grbl: two line ends, two seconds, all that was heard is dropped, then lines.
+    // Each is counted, comments that were reduced to nothing as well.
+    Sender {
+        name: "stream.py",
+        steps: &[
+            step(b"\r\n\r\n", &[OK, OK], 2_000),
+            step(b"G21\n\nG90 G1 F600 X1\n\nG1 X0\n", &[OK, OK, OK, OK, OK], 2_000),
+            step(b"?", &[REPORT], 500),
+        ],
+    },
+    Sender {
+        name: "pygrbl-streamer",
+        steps: &[
+            step(b"\x18", &[GREETING], 2_000),
+            step(b"$X\n", &[OK], 2_000),
+            step(b"G21\n", &[OK], 2_000),
+            step(b"G1 X1 F600\n", &[OK], 2_000),
+        ],
+    },
+    // gcode-cli, gantrix, gscrib and grbl-link begin with one of these lines.
+    Sender {
+        name: "G-code at once",
+        steps: &[
+            step(b"G21 G90\n", &[OK], 1_000),
+            step(b"$H\n", &["^ALARM:9$", ERROR], 60_000),
+            step(b"$X\n", &[OK], 1_000),
+            step(b"$100=250\n", &[OK], 1_000),
+            step(b"?", &[REPORT], 500),
+        ],
+    },
+    Sender {
+        name: "plotdeck",
+        steps: &[
+            step(b"$I\n", &[VERSION, OK], 1_000),
+            step(b"?", &[THREE], 500),
+            step(b"$H\n?", &[], 500),
+        ],
+    },
+    // What a user of TinyG types at a terminal.
+    Sender {
+        name: "a terminal",
+        steps: &[
+            step(b"h\n", &[r"^\[MSG:.*\{\}.*\]$", OK], 500),
+            step(b"help\r\n", &[r"^\[MSG:.*\{\}.*\]$", OK], 500),
+            step(b"?\n", &[REPORT, OK], 500),
+        ],
+    },
     // Cases that other senders may bring: everything in one write, with errors in it, in CR LF, and with lines that
     // are empty.
     Sender {
@@ -242,6 +326,91 @@ impl<S: Side> Session<S> {
         of_list
             || (self.json && line.starts_with('{'))
             || self.known.iter().any(|one| one.is_match(line))
+    }
+}
+
+/// A greeting, and who knows its machine by it: `G` is grbl's, `J` TinyG's, which is JSON.
+struct Known {
+    name: &'static str,
+    /// Whether the sender works when it has heard these greetings, in this order.
+    works: fn(&str) -> bool,
+}
+
+/// What senders do with greetings, by their sources: each that waits for one or decides by one. All others pass over
+/// lines that they do not know.
+const KNOWN_GREETINGS: [Known; 6] = [
+    // A line with `Grbl`, and its version.
+    Known {
+        name: "UGS, Candle, gSender, LaserGRBL, OpenBuilds, pygrbl-streamer",
+        works: |heard| heard.contains('G'),
+    },
+    // A response with SYSTEM READY before the first line is sent.
+    Known { name: "g2core-api", works: |heard| heard.contains('J') },
+    Known { name: "UGS for TinyG and g2core, after its reset", works: |heard| heard.contains('J') },
+    // The last one of both decides. As a TinyG's sender it counts lines and never asks.
+    Known { name: "lw.comm-server", works: |heard| heard.ends_with('G') },
+    // They need none.
+    Known { name: "CNCjs for TinyG", works: |_| true },
+    Known { name: "gcode-cli, gantrix, gscrib, grbl-link, stream.py", works: |_| true },
+];
+
+/// Of all greetings only this one loses no sender, and it is the one that a machine sends.
+pub fn greeting(mut side: impl Side) {
+    let losers = |heard: &str| {
+        let lost = KNOWN_GREETINGS.iter().filter(|known| !(known.works)(heard));
+        lost.map(|known| known.name).collect::<Vec<_>>()
+    };
+    for other in ["", "G", "J", "GJ"] {
+        assert!(!losers(other).is_empty(), "{other} would do");
+    }
+    assert_eq!(losers("JG"), [""; 0]);
+    (0..200).for_each(|_| side.run_ms(1));
+    let heard = String::from_utf8_lossy(&side.heard()).into_owned();
+    let lines: Vec<&str> = heard.lines().filter(|line| !line.is_empty()).collect();
+    let [json, grbl] = lines[..] else { panic!("{heard}") };
+    assert!(json.starts_with("{\"r\":{\"fv\"") && json.contains("SYSTEM READY"), "{heard}");
+    assert!(Regex::new(GREETING).expect("an expression").is_match(grbl), "{heard}");
+}
+
+/// Bytes that act by themselves, a hold, a reset, a kill, the door; and the one that begins a command: `$H` homes.
+const ACT: [u8; 5] = [b'!', 0x18, 0x04, 0x84, b'$'];
+
+/// Sends some bytes of noise, as a port that was opened at another rate hears them, and a question in the midst of
+/// them. It is answered, and so are the lines behind the line of noise.
+pub fn noise<S: Side>(boot: impl Fn() -> S, seeds: std::ops::Range<u64>) {
+    for seed in seeds {
+        let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
+        let mut random = |below: u64| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_041);
+            (state >> 33) % below
+        };
+        let noise: Vec<u8> = (0..=random(29))
+            .map(|_| random(256) as u8)
+            .filter(|byte| !ACT.contains(byte))
+            .collect();
+        let mut side = boot();
+        let mut ask = |bytes: &[u8], ms: u64| {
+            side.send(bytes);
+            (0..ms).for_each(|_| side.run_ms(1));
+            String::from_utf8_lossy(&side.heard()).into_owned()
+        };
+        ask(b"", 100);
+        let early = ask(&noise, 50);
+        let heard = ask(b"?", 100);
+        assert!(heard.contains("<Idle|"), "seed {seed}: {noise:02X?} ? {heard}");
+        // A return in the noise has ended the line already.
+        let heard = early + &heard + &ask(b"\n", 100);
+        assert!(
+            heard.contains("ok\r\n") || heard.contains("error:"),
+            "seed {seed}: {noise:02X?} {heard}"
+        );
+        let heard = ask(b"$$\n", 200);
+        assert!(
+            heard.starts_with("$0=") && heard.ends_with("ok\r\n"),
+            "seed {seed}: {noise:02X?} {heard}"
+        );
+        let heard = ask(b"G21\n", 100);
+        assert_eq!(heard, "ok\r\n", "seed {seed}: {noise:02X?}");
     }
 }
 

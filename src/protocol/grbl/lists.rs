@@ -134,7 +134,7 @@ pub fn modes(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Option<u
 }
 
 /// Writes part `at` of `$I`, the identity of the machine. The option letters stand for a variable spindle, line
-/// numbers, mist, homing of single axes, a lathe's codes (X1), and overrides in probing. The free blocks and bytes
+/// numbers, mist, homing that sets the position at the switch by its own settings (Z), homing of single axes, a lathe's codes (X1), and overrides in probing. The free blocks and bytes
 /// follow. Returns the next part; `None` after the last.
 #[inline(never)]
 #[small]
@@ -146,7 +146,7 @@ pub fn build(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Option<u
         return Some(1);
     }
     if at == 1 {
-        text(out, text!("[OPT:VNMH"));
+        text(out, text!("[OPT:VNMZH"));
         if Capability::Lathe.is_built_in() {
             text(out, text!("X1"));
         }

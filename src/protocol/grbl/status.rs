@@ -181,7 +181,7 @@ rows! {
     HomingTravel = 5;
     HomingSwitches = 5;
     HomingClosed = 9;
-    NotHomed = 10;
+    NotHomed = 9;
     ProbeFailed = 9;
     ProbeTooShort = 33;
 }

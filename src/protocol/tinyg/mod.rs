@@ -68,11 +68,14 @@ impl Dialect for Tinyg {
     /// JSON, and lines that only TinyG's text mode knows: a `$` followed by text with a lower-case letter.
     fn is_decided_by(line: &[u8]) -> bool {
         let line = line.trim_ascii();
-        match line {
-            [b'{', ..] => true,
-            [b'$', rest @ ..] => rest.iter().any(u8::is_ascii_lowercase),
-            _ => false,
-        }
+        // Noise may begin like such a line.
+        let is_text = line.iter().all(|byte| matches!(byte, b' '..=b'~' | b'\t'));
+        is_text
+            && match line {
+                [b'{', .., b'}'] => true,
+                [b'$', rest @ ..] => rest.iter().any(u8::is_ascii_lowercase),
+                _ => false,
+            }
     }
 
     fn may_be_decided_by(first: u8) -> bool {

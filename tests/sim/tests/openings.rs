@@ -15,6 +15,36 @@ fn every_sender_finds_its_own() {
     by_sender::all(boot);
 }
 
+#[test]
+fn the_greeting_loses_no_sender() {
+    by_sender::greeting(firmware(&MEGA2560_GRBL));
+}
+
+#[test]
+fn noise_costs_its_line_alone() {
+    by_sender::noise(|| boot(0), 0..8);
+}
+
+/// A sender tries a rate that is not the port's, and then the right one.
+#[test]
+fn a_wrong_rate_at_first_costs_a_line() {
+    for rate in [9_600, 57_600, 250_000] {
+        let mut machine = boot(0);
+        machine.heard();
+        let mut ask = |rate: u32, bytes: &[u8]| {
+            machine.set_baud(rate);
+            Side::send(&mut machine, bytes);
+            machine.run_ms(300);
+            String::from_utf8_lossy(&machine.heard()).into_owned()
+        };
+        ask(rate, b"?\n$I\n?");
+        assert!(ask(115_200, b"?").contains("<Idle|"), "{rate}");
+        ask(115_200, b"\n");
+        let heard = ask(115_200, b"$I\n");
+        assert!(heard.starts_with("[VER:") && heard.ends_with("ok\r\n"), "{rate}: {heard}");
+    }
+}
+
 /// A machine that begins with this value of `dia`: it has stored the value and restarted.
 fn boot(dia: u8) -> Machine {
     let mut machine = firmware(&MEGA2560_GRBL);

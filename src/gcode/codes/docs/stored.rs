@@ -12,7 +12,8 @@ pub const PLACES: Section = Section {
             "Go to the first stored position",
             "Moves by rapids to the position that G28.1 has stored. `G28 X1` goes first to X1, then moves X to the stored \
 position. `G28` alone moves all axes straight there. If G28.1 was never sent, the stored position is machine \
-zero. Each of X, Y and Z that G28 moves must then be homed or set by G28.3, else the line is refused with 248. \
+zero. An axis with a homing switch must then be homed or set by G28.3, else the line is refused with 248. Without a \
+switch X and Y go to where they were at the start, as in grbl; Z is refused unless it is there. \
 Once G28.1 was sent, no axis has to be homed, even after a power cut. The motion mode does not change.",
             &[no(NotHomed, &["G28 G91 Z0"])],
         ),
