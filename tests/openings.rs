@@ -19,6 +19,11 @@ fn the_greeting_loses_no_sender() {
 }
 
 #[test]
+fn senders_of_tinyg_find_theirs() {
+    by_sender::of_tinyg(|| Machine::boot(115_200).expect("one machine for each thread"));
+}
+
+#[test]
 fn noise_costs_its_line_alone() {
     let one = |seed| {
         let play = move || {

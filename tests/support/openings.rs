@@ -372,6 +372,56 @@ pub fn greeting(mut side: impl Side) {
     assert!(Regex::new(GREETING).expect("an expression").is_match(grbl), "{heard}");
 }
 
+/// How senders of TinyG's dialect begin: what is sent, what is heard, and how many responses in JSON.
+const OF_TINYG: [(&str, &[(&[u8], &str, usize)]); 6] = [
+    (
+        "CNCjs",
+        &[
+            (b"{ej:1}\n{jv:4}\n{qv:1}\n{sv:1}\n{si:200}\n", "", 5),
+            (b"{spe:n}\n", "", 1),
+            (b"N1G21\n", "", 1),
+        ],
+    ),
+    // An enquiry, whose answer it waits for.
+    (
+        "UGS for g2core",
+        &[(b"\x05", "{\"ack\":true}", 0), (b"{\"ee\":0}\n", "", 1), (b"G21\n", "", 1)],
+    ),
+    (
+        "UGS for TinyG",
+        &[(b"\x18", "SYSTEM READY", 1), (b"{\"ee\":0}\n{\"jv\":4}\n", "", 2), (b"G21\n", "", 1)],
+    ),
+    // Empty lines, which are answered in grbl's dialect: it passes over that.
+    (
+        "bCNC for g2core",
+        &[(b"\n\n", "ok\r\nok\r\n", 0), (b"{sr:{stat:t,line:t}}\n", "", 1), (b"G21\n", "", 1)],
+    ),
+    ("G-code first", &[(b"G21\n", "ok\r\n", 0), (b"{sr:n}\n", "", 1), (b"G21\n", "", 1)]),
+    ("a terminal", &[(b"$xvm\r\n", "[xvm]", 0), (b"?\r\n", "Velocity", 0)]),
+];
+
+/// Plays the openings of TinyG's senders on an open port.
+pub fn of_tinyg<S: Side>(boot: impl Fn() -> S + Sync) {
+    let failed = OF_TINYG.iter().filter(|(name, steps)| {
+        let play = || play_tinyg(boot(), name, steps);
+        thread::scope(|scope| scope.spawn(play).join()).is_err()
+    });
+    assert_eq!(failed.count(), 0);
+}
+
+fn play_tinyg(mut side: impl Side, name: &str, steps: &[(&[u8], &str, usize)]) {
+    (0..200).for_each(|_| side.run_ms(1));
+    side.heard();
+    for (says, hears, responses) in steps {
+        side.send(says);
+        (0..500).for_each(|_| side.run_ms(1));
+        let heard = String::from_utf8_lossy(&side.heard()).into_owned();
+        let said = String::from_utf8_lossy(says);
+        assert!(heard.contains(hears), "{name}: {said:?} {heard}");
+        assert_eq!(heard.matches("{\"r\":{").count(), *responses, "{name}: {said:?} {heard}");
+    }
+}
+
 /// Bytes that act by themselves, a hold, a reset, a kill, the door; and the one that begins a command: `$H` homes.
 const ACT: [u8; 5] = [b'!', 0x18, 0x04, 0x84, b'$'];
 

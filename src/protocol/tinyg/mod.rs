@@ -72,7 +72,9 @@ impl Dialect for Tinyg {
         let is_text = line.iter().all(|byte| matches!(byte, b' '..=b'~' | b'\t'));
         is_text
             && match line {
-                [b'{', .., b'}'] => true,
+                [b'{', b'}'] => true,
+                // In other lines braces are those of a remark.
+                [b'{', names @ .., b'}'] => names.contains(&b':'),
                 [b'$', rest @ ..] => rest.iter().any(u8::is_ascii_lowercase),
                 _ => false,
             }
