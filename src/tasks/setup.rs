@@ -113,6 +113,8 @@ impl Setup for Settings {
         }
     }
 
+    #[inline(never)]
+    #[small]
     fn homing(&self, axis: u8) -> Result<(), Status> {
         homing::of(self, axis).map(|_| ())
     }
