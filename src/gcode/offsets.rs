@@ -336,11 +336,6 @@ impl State {
         Ok(())
     }
 
-    /// Whether the axis is Z, and not at this place.
-    fn leaves(&self, axis: u8, place: Length) -> bool {
-        axis == Z_AXIS && at(&self.position, axis) != place
-    }
-
     /// Carries out G28 and G30: a traverse to the stored position. With axis words only the named axes move, first to
     /// where the words say. Without words all axes move. If no position was ever stored, the target is machine zero,
     /// which is known on homed axes. On others without a homing switch it is where they were at the start, as in grbl.
@@ -359,17 +354,18 @@ impl State {
         }
         self.advance(block, false, setup)?;
         let via = self.position;
-        let places = if tables.is_stored(stored) { u8::MAX } else { self.homed };
+        let known = if tables.is_stored(stored) { u8::MAX } else { self.homed | ROTARY };
+        // Without a switch, machine zero is where the axis was at the start.
+        let may_go = known | (!setup.axes_that_home() & !Z_BIT);
         let stored = tables.row(stored);
         for axis in 0..units::AXES as u8 {
             let named = !block.has(AXES) || block.get(axis).is_some();
             if named && setup.mode(axis) != AxisMode::Disabled {
-                let is_known = places & 1 << axis != 0 || usize::from(axis) >= FIRST_ROTARY;
-                if !is_known && (setup.homing(axis).is_ok() || self.leaves(axis, at(&stored, axis)))
-                {
+                let place = at(&stored, axis);
+                if may_go & 1 << axis == 0 && at(&self.position, axis) != place {
                     return Err(Status::NotHomed);
                 }
-                put(&mut self.position, axis, at(&stored, axis));
+                put(&mut self.position, axis, place);
                 put(&mut self.residue, axis, 0);
             }
         }
@@ -388,8 +384,9 @@ pub(super) fn dwell_ms(block: &Block) -> Result<u32, Status> {
     block.get(P).ok_or(Status::PWordMissing)?.milliseconds()
 }
 
-/// The number of the axis Z.
-const Z_AXIS: u8 = 2;
+/// The bit of Z, and those of the rotary axes.
+const Z_BIT: u8 = 1 << 2;
+const ROTARY: u8 = u8::MAX << FIRST_ROTARY;
 
 #[small]
 fn at(values: &PerAxis<Length>, axis: u8) -> Length {

@@ -69,6 +69,10 @@ pub trait Setup {
     fn extrudes(&self) -> Result<(), Status> {
         Ok(())
     }
+    /// Returns the axes that have a homing switch, as bits.
+    fn axes_that_home(&self) -> u8 {
+        u8::MAX
+    }
     /// Returns `Ok` if an axis can be homed, else the reason why not.
     fn homing(&self, _axis: u8) -> Result<(), Status> {
         Ok(())

@@ -194,7 +194,7 @@ impl Port {
 
     /// Whether the dialect is undecided: the first line that is in one dialect alone will decide.
     pub fn is_undecided(&self) -> bool {
-        matches!(self.choice.get(), Choice::Open | Choice::Begun)
+        Speech::IS_CHOSEN && matches!(self.choice.get(), Choice::Open | Choice::Begun)
     }
 
     /// Whether `?` and bytes above 0x7F are recognised within lines.
@@ -206,8 +206,10 @@ impl Port {
     #[inline(always)]
     pub fn may_decide(&self, first: Option<&u8>) -> bool {
         match self.choice.get() {
-            Choice::Open => true,
-            Choice::Begun => first.is_some_and(|first| Speech::may_be_decided_by(*first)),
+            Choice::Open => Speech::IS_CHOSEN,
+            Choice::Begun if Speech::IS_CHOSEN => {
+                first.is_some_and(|first| Speech::may_be_decided_by(*first))
+            }
             _ => false,
         }
     }
@@ -330,7 +332,9 @@ impl Links {
     #[inline(never)]
     #[small]
     pub fn may_change_dialect(&self, port: &Port, line: &[u8]) -> bool {
-        let others = port.choice.get() == Choice::Said && (port.is_eager() || port.is_plain());
+        let others = Speech::IS_CHOSEN
+            && port.choice.get() == Choice::Said
+            && (port.is_eager() || port.is_plain());
         others && line.first() == Some(&b'{') && !View::of(self, port).is_busy()
     }
 

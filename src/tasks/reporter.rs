@@ -287,7 +287,8 @@ async fn tell(links: &Links, port: &Port, notice: Notice) -> usize {
         Notice::Status | Notice::Exception(_) => port.tx_behind_answers().await,
         _ => port.tx.lock().await,
     };
-    let mut twice = matches!(notice, Notice::Greeting(_)) && port.take_asked(OTHERS);
+    let mut twice =
+        Speech::IS_CHOSEN && matches!(notice, Notice::Greeting(_)) && port.take_asked(OTHERS);
     let mut telling =
         if twice { begin_otherwise(links, port, notice) } else { begin(notice, links, port) };
     // For the whole notice: while it is sent, the port is not answered.

@@ -113,8 +113,10 @@ impl Setup for Settings {
         }
     }
 
-    #[inline(never)]
-    #[small]
+    fn axes_that_home(&self) -> u8 {
+        homing::axes(self)
+    }
+
     fn homing(&self, axis: u8) -> Result<(), Status> {
         homing::of(self, axis).map(|_| ())
     }

@@ -12,10 +12,10 @@ pub const PLACES: Section = Section {
             "Go to the first stored position",
             "Moves by rapids to the position that G28.1 has stored. `G28 X1` goes first to X1, then moves X to the stored \
 position. `G28` alone moves all axes straight there. If G28.1 was never sent, the stored position is machine \
-zero. An axis with a homing switch must then be homed or set by G28.3, else the line is refused with 248. Without a \
-switch X and Y go to where they were at the start, as in grbl; Z is refused unless it is there. \
+zero. An axis with a homing switch, and Z, must then be homed or set by G28.3, or be there already, else the line is \
+refused with 248. X and Y without a switch go to where they were at the start, as in grbl. \
 Once G28.1 was sent, no axis has to be homed, even after a power cut. The motion mode does not change.",
-            &[no(NotHomed, &["G28 G91 Z0"])],
+            &[no(NotHomed, &["G0 Z1", "G28 G91 Z0"])],
         ),
         g(
             281,
@@ -27,7 +27,7 @@ Once G28.1 was sent, no axis has to be homed, even after a power cut. The motion
             300,
             "Go to the second stored position",
             "As G28, with the position of G30.1.",
-            &[no(NotHomed, &["G30 X0"])],
+            &[no(NotHomed, &["G0 X1", "G30 X0"])],
         ),
         g(
             301,
