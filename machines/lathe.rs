@@ -8,7 +8,7 @@ pub const LATHE: MachineProfile = MachineProfile {
     about: "a lathe",
     entries: &[
         set("24", "ma", 255.0),
-        set("y", "am", 0.0),
+        set("ya", "am", 0.0),
         set("ya", "sn", 0.0),
         set("", "gpl", 1.0),
         // Ball screws: 320 steps/mm

@@ -12,6 +12,7 @@ pub const ROUTER: MachineProfile = MachineProfile {
         // The second motor of Y faces the first
         set("4", "ma", 1.0),
         set("4", "po", 1.0),
+        set("a", "am", 0.0),
         set("xy", "vm", 5_000.0),
         set("xy", "fr", 5_000.0),
         set("z", "vm", 500.0),

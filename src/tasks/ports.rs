@@ -267,11 +267,12 @@ impl Port {
         self.enquiry.get() || self.news.get().is_some() || self.asks_report()
     }
 
-    /// Whether a byte has requested a status report, and it may be sent: not while the machine homes. Senders take the
-    /// first report after `$H` for the position at which homing has ended.
+    /// Whether a byte has requested a status report, and it may be sent: not while the machine homes, unless it is held.
+    /// Senders take the first report after `$H` for the position at which homing has ended.
     #[inline(always)]
     pub fn asks_report(&self) -> bool {
-        self.asked.get() & REPORT != 0 && machine::cycle() != Cycle::Homing
+        self.asked.get() & REPORT != 0
+            && (machine::cycle() != Cycle::Homing || machine::is_held())
     }
 }
 
