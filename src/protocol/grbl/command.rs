@@ -59,10 +59,20 @@ pub fn of(line: &[u8]) -> Command {
     let line = trim(line);
     match line {
         b"h" | b"H" | b"help" if cfg!(feature = "dialect-tinyg") => Command::Hint,
-        [] => Command::Nothing,
+        line if is_empty(line) => Command::Nothing,
         [b'$', rest @ ..] => system(rest),
         _ => Command::Gcode,
     }
+}
+
+/// Whether a line has nothing but comments, so that no alarm refuses it.
+#[small]
+pub fn is_empty(line: &[u8]) -> bool {
+    let mut line = trim(line);
+    while let [b'(', text @ ..] = line {
+        line = trim(text.get(comment::length(text) + 1..).unwrap_or(&[]));
+    }
+    matches!(line, [] | [b';', ..])
 }
 
 /// Returns the command of the text behind a `$`. Comments and blanks are ignored.
@@ -261,7 +271,10 @@ mod unit {
 
     #[test]
     fn commands_are_known_by_their_letters() {
-        assert_eq!(of(b"  "), Command::Nothing);
+        for nothing in ["", "  ", "(a)", " (a) (b); c", ";", "(a"] {
+            assert_eq!(of(nothing.as_bytes()), Command::Nothing, "{nothing}");
+        }
+        assert_eq!((of(b"(a) g0"), of(b")")), (Command::Gcode, Command::Gcode));
         assert_eq!(of(b"$"), Command::Help);
         assert_eq!(of(b"$hx"), Command::Home(0));
         assert_eq!(of(b"$N1="), Command::StoreStartup(1));

@@ -88,7 +88,7 @@ impl Dialect for Grbl {
     ) -> Request {
         // A dropped jog, or a dropped empty line, is answered with `ok`, as grbl's senders expect. A dropped line of
         // G-code is answered with an error.
-        let is_gcode = !line.is_empty() && command::jog(line).is_none();
+        let is_gcode = !command::is_empty(line) && command::jog(line).is_none();
         let drops_gcode = is_gcode && status == Status::Terminated;
         Request::refused(if drops_gcode { Status::Alarmed } else { status })
     }
