@@ -515,9 +515,11 @@ impl<T> Interpreter<T> {
         self.state.blamed = axis;
     }
 
-    /// Cancels the motion mode, as G28.2 does.
-    pub fn cancel_motion(&mut self) {
-        self.state.modal.motion = MotionMode::None;
+    /// Cancels the motion mode, as G28.2 does; with `only_cycles` only that of a canned cycle.
+    pub fn cancel_motion(&mut self, only_cycles: bool) {
+        if !only_cycles || self.state.modal.motion.is_cycle() {
+            self.state.modal.motion = MotionMode::None;
+        }
     }
 
     /// Returns the N word of the last line, 0 if the line had none.

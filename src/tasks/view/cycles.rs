@@ -65,7 +65,8 @@ pub(super) fn home(view: &mut View<'_>, axes: u8, ends_alarm: bool) -> Status {
             return status;
         }
     }
-    view.links.model.borrow_mut().cancel_motion();
+    // What ends an alarm is grbl's `$H`, which changes no mode: an axis word behind it needs no G0.
+    view.links.model.borrow_mut().cancel_motion(ends_alarm);
     view.begin(Motion::Home { axes, set: true }, machine::Event::Homing)
 }
 
