@@ -142,10 +142,10 @@ rows! {
     SWordMissing = 28;
     SWordInvalid = 4;
     SpindleMustTurn = 20;
-    ArcSpecification = 34;
+    ArcSpecification = 33;
     ArcAxisMissing = 32;
     ArcOffsetsMissing = 35;
-    ArcRadiusTolerance = 33;
+    ArcRadiusTolerance = 34;
     ArcEndpointIsStart = 33;
     PWordMissing = 28;
     PWordInvalid = 29;
