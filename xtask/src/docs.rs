@@ -4,6 +4,8 @@
 //! that reads like a name of Rust (`Name::method`, `field.other`) must consist of words of the sources. Two
 //! neighbouring words must stand in one file, or be a module and a word in its file. Any other span, such as G-code
 //! or a command, is not checked, nor are fenced blocks.
+//!
+//! The last column of a table that is named `test` must name a transcript or a test in each row.
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -23,6 +25,9 @@ const DOCUMENTS: [&str; 7] = [
 /// Where the sources are.
 const SOURCES: [&str; 9] =
     ["avr-embassy", "src", "boards", "machines", "tests", "xtask", "Cargo.toml", ".cargo", ".ci"];
+
+/// The page with tables that name in each row what shows it, and how many tables it has at least.
+const DIFFERENCES: (&str, usize) = ("docs/protocol.md", 3);
 
 /// A file of the sources: the words of its path, and the words of its text.
 struct Source {
@@ -140,6 +145,82 @@ fn what_the_documents_name_exists() {
         wrong.extend(links.map(|(line, target)| format!("{document}:{line}: link to {target}")));
     }
     assert!(wrong.is_empty(), "named in a document but not there:\n{}", wrong.join("\n"));
+}
+
+/// Returns the rows of each table whose last column is named `test`: the number of the line, and the last cell.
+fn rows_with_tests(text: &str) -> Vec<Vec<(usize, &str)>> {
+    let cell = |line: &'_ str| -> Option<(usize, usize)> {
+        let line = line.strip_suffix('|')?;
+        Some((line.rfind('|')? + 1, line.len()))
+    };
+    let mut tables: Vec<Vec<(usize, &str)>> = Vec::new();
+    let mut within = false;
+    for (number, line) in (1..).zip(text.lines()) {
+        let last = cell(line).and_then(|(from, to)| line.get(from..to)).map(str::trim);
+        match last {
+            Some("test") => {
+                within = true;
+                tables.push(Vec::new());
+            }
+            Some(last) if within && !last.starts_with("---") => {
+                tables.last_mut().expect("a table").push((number, last));
+            }
+            Some(_) => {}
+            None => within = false,
+        }
+    }
+    tables
+}
+
+/// The names of all functions in these files that are tests.
+fn tests(files: &[PathBuf]) -> HashSet<String> {
+    let mut names = HashSet::new();
+    for file in files.iter().filter(|file| file.extension().is_some_and(|e| e == "rs")) {
+        let text = std::fs::read_to_string(file).unwrap_or_default();
+        let mut marked = false;
+        for line in text.lines().map(str::trim) {
+            if line == "#[test]" {
+                marked = true;
+            } else if let Some(rest) = line.strip_prefix("fn ") {
+                if std::mem::take(&mut marked) {
+                    names.extend(rest.split(['(', '<']).next().map(str::to_owned));
+                }
+            } else if !line.starts_with(['#', '/']) {
+                marked = false;
+            }
+        }
+    }
+    names
+}
+
+/// Whether a cell names at least one transcript or test, and nothing else.
+fn names_tests(cell: &str, tests: &HashSet<String>) -> bool {
+    let is_there = |name: &str| match name.ends_with(".txt") {
+        true => root().join("tests/transcripts").join(name).is_file(),
+        false => tests.contains(name),
+    };
+    let mut parts = cell.split('`');
+    let between = parts.clone().step_by(2).all(|text| text.trim_matches([' ', ',']).is_empty());
+    parts.next();
+    let names: Vec<&str> = parts.step_by(2).collect();
+    between && !names.is_empty() && names.into_iter().all(is_there)
+}
+
+#[test]
+fn each_difference_names_its_test() {
+    let (page, least) = DIFFERENCES;
+    let mut files = Vec::new();
+    collect(&root().join("tests"), &mut files);
+    let tests = tests(&files);
+    let text = std::fs::read_to_string(root().join(page)).expect(page);
+    let tables = rows_with_tests(&text);
+    assert!(tables.len() >= least && tables.iter().all(|rows| !rows.is_empty()), "{page}");
+    let wrong = tables.iter().flatten().filter(|(_, cell)| !names_tests(cell, &tests));
+    let wrong: Vec<_> = wrong.map(|(line, cell)| format!("{page}:{line}: {cell}")).collect();
+    assert!(wrong.is_empty(), "no transcript or test:\n{}", wrong.join("\n"));
+    for cell in ["", "-", "`no-such.txt`", "`no_such_test`", "grbl.txt", "`grbl.txt` and more"] {
+        assert!(!names_tests(cell, &tests), "{cell}");
+    }
 }
 
 #[test]
