@@ -209,6 +209,22 @@ impl LinePool {
         }
     }
 
+    /// Gives the line that has come last the class that it has in the dialect which it has selected.
+    #[cold]
+    #[inline(never)]
+    #[small]
+    pub fn classify_newest(&mut self) {
+        let is_control = self.classify(self.newest()) == Class::Control;
+        if let Some(last) = self.entries.len().checked_sub(1)
+            && let Some(entry) = self.entries.get_mut(last)
+            && is_control
+            && entry.class == Class::Data
+        {
+            entry.class = Class::Control;
+            self.controls += 1;
+        }
+    }
+
     /// Returns the number of free slots, the slot for the line that is coming in included.
     pub fn free(&self) -> u8 {
         SLOTS.saturating_sub(self.entries.len()) as u8

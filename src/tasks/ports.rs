@@ -271,8 +271,7 @@ impl Port {
     /// Senders take the first report after `$H` for the position at which homing has ended.
     #[inline(always)]
     pub fn asks_report(&self) -> bool {
-        self.asked.get() & REPORT != 0
-            && (machine::cycle() != Cycle::Homing || machine::is_held())
+        self.asked.get() & REPORT != 0 && (machine::cycle() != Cycle::Homing || machine::is_held())
     }
 }
 

@@ -279,6 +279,7 @@ impl Intake {
     fn decide(&self, pool: &mut LinePool, links: &Links) {
         links.decide_by(self.port, pool.newest());
         self.speak(pool);
+        pool.classify_newest();
     }
 
     /// Whether the next byte lies before the cut and is dropped. The reader then takes it alone, not as part of a run

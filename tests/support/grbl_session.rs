@@ -44,6 +44,8 @@ struct Sent {
     bytes: usize,
     /// The distance that the line moves X if it is accepted; `None` if that is unknown.
     way: Option<f64>,
+    /// Whether the line homes. Meanwhile no `?` is answered.
+    homes: bool,
 }
 
 /// A sender's side of a conversation, and the known state of the machine.
@@ -223,7 +225,8 @@ impl<S: Side> Session<S> {
             acting.for_each(|(_, acting)| self.act(*acting));
             self.side.send(&[byte]);
         }
-        self.in_flight.push_back(Sent { bytes, way });
+        let homes = line.get(..2).is_some_and(|begin| begin.eq_ignore_ascii_case("$H"));
+        self.in_flight.push_back(Sent { bytes, way, homes });
         match line {
             "$C" => self.settle(),
             _ => self.run(0),
@@ -276,7 +279,10 @@ impl<S: Side> Session<S> {
     /// its answer.
     fn waits(&self) -> Option<u64> {
         let before = self.before.min(RING) as u64 * 10 / 115;
-        self.asked.filter(|_| !self.resets).map(|at| (self.ms - at).saturating_sub(before))
+        let homes = self.in_flight.iter().any(|sent| sent.homes);
+        self.asked
+            .filter(|_| !self.resets && !homes)
+            .map(|at| (self.ms - at).saturating_sub(before))
     }
 
     fn hear(&mut self) -> Outcome<()> {
@@ -308,6 +314,7 @@ impl<S: Side> Session<S> {
                 (self.resets, self.greets) = (false, false);
                 self.doubt();
                 self.in_flight.clear();
+                self.asked = self.asked.map(|_| self.ms);
                 self.asked = self.asked.map(|_| self.ms);
             }
             _ if line.starts_with("error:") => {
@@ -344,6 +351,9 @@ impl<S: Side> Session<S> {
         let Some(sent) = self.in_flight.pop_front() else {
             return Err("an answer to nothing".to_string());
         };
+        if sent.homes {
+            self.asked = self.asked.map(|_| self.ms);
+        }
         if taken {
             self.x = self.x.zip(sent.way).map(|(x, way)| x + way);
         }
