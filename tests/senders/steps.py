@@ -1,5 +1,5 @@
-"""The steps of a test of a sender in Python. They are reported as in `steps.js`, a line each: `step`, `passed` or
-`failed`, the name and details, separated by tabs."""
+"""The steps of a test of a sender in Python. They are reported as in `steps.js`, a line each: `step`, `passed`, `failed`
+or `not offered`, the name and details, separated by tabs."""
 
 import os
 import sys
@@ -55,6 +55,17 @@ def ensure(condition, text):
         raise AssertionError(text)
 
 
+# The position of the plate when Z has been homed at its top.
+PLATE = -51.8
+
+
+def contact(line):
+    """Checks the result of a probing, such as `[PRB:0.000,0.000,-51.800:1]`, and returns it."""
+    z = float(line.replace(":", ",").split(",")[3])
+    ensure(abs(z - PLATE) < 0.01 and line.endswith(":1]"), line)
+    return line
+
+
 _stop = None
 
 
@@ -85,6 +96,30 @@ def session(*, connect, settings, jog, home, probe, stop, close, start, hold, fi
     step("hold", 120, hold)
     step("finish", 600, finish)
     step("close", 20, close)
+
+
+def whole_session(*, connect, close, start, finish, hold=None, **offered):
+    """Runs all steps, with two reconnections. `offered` and `hold` are the steps that a sender may lack; a missing one is
+    reported as not offered. `cancel` ends a job, and `reset` resets the board in the middle of a move."""
+    step("connect", 30, connect)
+    for name in ["settings", "jog", "home", "probe", "cancel", "reset"]:
+        maybe(name, 180, offered.pop(name, None))
+    ensure(not offered, f"no step is called {list(offered)}")
+    for _ in range(2):
+        step("close", 20, close)
+        step("reconnect", 30, connect)
+    step("stream", 30, start)
+    maybe("hold", 120, hold)
+    step("finish", 600, finish)
+    step("close", 20, close)
+
+
+def maybe(name, seconds, run):
+    """Runs a step if the sender has a function for it."""
+    if run:
+        step(name, seconds, run)
+    else:
+        tell("not offered", name, "")
 
 
 def leave(code):

@@ -1,5 +1,5 @@
 //! Which of the many cases the tests on boards run: all of them, or a share that changes with the commit. The tests read it
-//! in `tests/sim/tests/common/share.rs`.
+//! in `tests/sim/tests/common/share.rs`. The same number chooses the senders of the short tests.
 
 use std::process::Command;
 
@@ -17,10 +17,15 @@ pub fn choose(command: &mut Command, long: bool) {
         command.env("KERF_LONG", "1");
         return;
     }
-    let given = std::env::var(COMMIT).ok();
-    let number = given.unwrap_or_else(|| number(&commit()).to_string());
+    let number = number();
     println!("a share of the cases, by the commit: {COMMIT}={number} chooses it again");
-    command.env(COMMIT, number);
+    command.env(COMMIT, number.to_string());
+}
+
+/// Returns the number that chooses the shares: that in `KERF_COMMIT`, or that of the commit.
+pub fn number() -> u64 {
+    let given = std::env::var(COMMIT).ok().and_then(|given| given.parse().ok());
+    given.unwrap_or_else(|| of_hash(&commit()))
 }
 
 /// Returns the hash of the commit.
@@ -30,19 +35,19 @@ fn commit() -> String {
 }
 
 /// Returns the number of a hash; 0 outside of a repository.
-fn number(hash: &str) -> u64 {
+fn of_hash(hash: &str) -> u64 {
     let digits = hash.get(..DIGITS).unwrap_or_default();
     u64::from_str_radix(digits, 16).unwrap_or(0)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::number;
+    use super::of_hash;
 
     #[test]
     fn a_hash_is_a_number() {
-        assert_eq!(number("000000ff66f1564b56cca0af7ff2b7c7c31566d8"), 0xFF);
-        assert_eq!(number("ffffffff66f1564b56cca0af7ff2b7c7c31566d8"), 0xFFFF_FFFF);
-        assert_eq!([number(""), number("fatal: x")], [0, 0]);
+        assert_eq!(of_hash("000000ff66f1564b56cca0af7ff2b7c7c31566d8"), 0xFF);
+        assert_eq!(of_hash("ffffffff66f1564b56cca0af7ff2b7c7c31566d8"), 0xFFFF_FFFF);
+        assert_eq!([of_hash(""), of_hash("fatal: x")], [0, 0]);
     }
 }

@@ -1,7 +1,7 @@
 //! `cargo xtask test`: everything that must pass before a merge.
 
 mod beside;
-mod cases;
+pub mod cases;
 
 use std::path::Path;
 use std::process::Command;

@@ -27,6 +27,7 @@ use anyhow::{Result, ensure};
 use clap::{Args, ValueEnum};
 
 use crate::boards::Board;
+use crate::checks::cases;
 use crate::machines::Machine;
 use crate::process::root;
 use crate::setup::{self, Scope};
@@ -37,13 +38,13 @@ use session::Session;
 /// `cargo xtask senders`
 #[derive(Args, Default)]
 pub struct SendersArgs {
-    /// Only this sender
+    /// Only these senders
     #[arg(long, value_enum)]
-    sender: Option<Sender>,
+    sender: Vec<Sender>,
     /// The G-code file that they send
     #[arg(long, value_name = "JOB")]
     job: Option<PathBuf>,
-    /// The board; of the emulated ones only pico-cnc, which is not for printing hosts
+    /// The board: pico-cnc, which is emulated, or mega2560-grbl; neither is for printing hosts
     #[arg(long, value_enum)]
     board: Option<Board>,
     /// Install the senders and run none
@@ -54,7 +55,7 @@ pub struct SendersArgs {
     brief: bool,
 }
 
-/// A sender that has a driver.
+/// A sender that has a driver. The short tests run each second one, so neighbours in this list are alike.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
 enum Sender {
     Cncjs,
@@ -63,6 +64,11 @@ enum Sender {
     BcncGrbl,
     BcncG2core,
     GrblStreamer,
+    PygrblStreamer,
+    GrblLink,
+    Plotdeck,
+    Gantrix,
+    StreamPy,
     Printcore,
     CncjsMarlin,
     Octoprint,
@@ -72,33 +78,33 @@ enum Sender {
 impl Sender {
     /// Returns its name.
     fn name(self) -> &'static str {
-        match self {
-            Sender::Cncjs => "cncjs",
-            Sender::CncjsGrbl => "cncjs-grbl",
-            Sender::G2coreApi => "g2core-api",
-            Sender::BcncGrbl => "bcnc-grbl",
-            Sender::BcncG2core => "bcnc-g2core",
-            Sender::GrblStreamer => "grbl-streamer",
-            Sender::Printcore => "printcore",
-            Sender::CncjsMarlin => "cncjs-marlin",
-            Sender::Octoprint => "octoprint",
-            Sender::MarlinHost => "marlin-host",
-        }
+        self.row().0
     }
 
     /// Returns its driver, and the driver's further argument besides port and job.
     fn driver(self) -> (&'static str, Option<&'static str>) {
+        let (_, script, word) = self.row();
+        (script, word)
+    }
+
+    /// Returns its name, its driver and the driver's further argument.
+    fn row(self) -> (&'static str, &'static str, Option<&'static str>) {
         match self {
-            Sender::Cncjs => ("cncjs.js", None),
-            Sender::CncjsGrbl => ("cncjs-grbl.js", None),
-            Sender::G2coreApi => ("g2core-api.js", None),
-            Sender::BcncGrbl => ("bcnc.py", Some("GRBL1")),
-            Sender::BcncG2core => ("bcnc.py", Some("G2Core")),
-            Sender::GrblStreamer => ("grbl-streamer.py", None),
-            Sender::Printcore => ("printcore.py", None),
-            Sender::CncjsMarlin => ("cncjs-marlin.js", None),
-            Sender::Octoprint => ("octoprint-server.py", None),
-            Sender::MarlinHost => ("marlin-host.py", None),
+            Sender::Cncjs => ("cncjs", "cncjs.js", None),
+            Sender::CncjsGrbl => ("cncjs-grbl", "cncjs-grbl.js", None),
+            Sender::G2coreApi => ("g2core-api", "g2core-api.js", None),
+            Sender::BcncGrbl => ("bcnc-grbl", "bcnc.py", Some("GRBL1")),
+            Sender::BcncG2core => ("bcnc-g2core", "bcnc.py", Some("G2Core")),
+            Sender::GrblStreamer => ("grbl-streamer", "grbl-streamer.py", None),
+            Sender::PygrblStreamer => ("pygrbl-streamer", "pygrbl-streamer.py", None),
+            Sender::GrblLink => ("grbl-link", "grbl-link.py", None),
+            Sender::Plotdeck => ("plotdeck", "plot-deck.py", None),
+            Sender::Gantrix => ("gantrix", "gantrix-laser.py", None),
+            Sender::StreamPy => ("stream-py", "stream-py.py", None),
+            Sender::Printcore => ("printcore", "printcore.py", None),
+            Sender::CncjsMarlin => ("cncjs-marlin", "cncjs-marlin.js", None),
+            Sender::Octoprint => ("octoprint", "octoprint-server.py", None),
+            Sender::MarlinHost => ("marlin-host", "marlin-host.py", None),
         }
     }
 }
@@ -123,11 +129,21 @@ impl Sender {
     }
 }
 
-/// Runs all senders with half of the normal job and a third of the print, because the conversations are tested. Whole
-/// jobs are tested with the simulator.
+/// One in this many senders runs in the short tests.
+const SHARE: usize = 2;
+
+/// Runs a share of the senders, which changes with the commit, with half of the normal job and a third of the print,
+/// because the conversations are tested. Whole jobs are tested with the simulator.
 pub fn run_short() -> Result<()> {
     let job = Some(root().join("examples/engraving.gcode"));
-    run(&SendersArgs { job, brief: true, ..Default::default() })
+    let sender = share(cases::number());
+    run(&SendersArgs { sender, job, brief: true, ..Default::default() })
+}
+
+/// Returns the share that a number chooses. The shares of consecutive numbers together are all senders.
+fn share(number: u64) -> Vec<Sender> {
+    let first = (number % SHARE as u64) as usize;
+    Sender::value_variants().iter().copied().skip(first).step_by(SHARE).collect()
 }
 
 /// Runs all senders with whole jobs.
@@ -143,7 +159,7 @@ pub fn run_emulated(all: bool) -> Result<()> {
     for &sender in senders.filter(|sender| all || some.contains(sender)) {
         let job = Some(root().join("examples/square.gcode"));
         let board = Some(Board::PicoCnc);
-        run(&SendersArgs { sender: Some(sender), job, board, ..Default::default() })?;
+        run(&SendersArgs { sender: vec![sender], job, board, ..Default::default() })?;
     }
     Ok(())
 }
@@ -158,9 +174,13 @@ pub fn run(args: &SendersArgs) -> Result<()> {
     if args.install {
         return Ok(());
     }
-    let mut senders = args.sender.map_or(Sender::value_variants().to_vec(), |one| vec![one]);
+    let mut senders = args.sender.clone();
+    if senders.is_empty() {
+        senders = Sender::value_variants().to_vec();
+    }
     if let Some(board) = args.board {
-        ensure!(board == Board::PicoCnc, "senders have boards of their own, or pico-cnc");
+        let known = [Board::default(), Board::PicoCnc];
+        ensure!(known.contains(&board), "senders run at {} or {}", known[0], known[1]);
         senders.retain(|sender| !sender.prints());
         ensure!(!senders.is_empty(), "a host of printers is not for {board}");
     }
@@ -182,4 +202,19 @@ pub fn run(args: &SendersArgs) -> Result<()> {
     let results = pool::run(&pairs, at_once(), session);
     ensure!(table::show(&results), "a sender cannot work with the firmware");
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_are_all_senders_together_and_have_hosts_of_both_kinds() {
+        let shares = [41, 42].map(share);
+        assert_eq!(shares.concat().len(), Sender::value_variants().len());
+        for share in shares {
+            assert!(share.iter().any(|sender| sender.prints()), "{share:?}");
+            assert!(share.iter().any(|sender| !sender.prints()), "{share:?}");
+        }
+    }
 }

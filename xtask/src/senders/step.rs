@@ -10,10 +10,13 @@ pub enum Outcome {
     Failed,
     /// The firmware does not support this yet.
     NotYet,
+    /// The sender has no function for this step. It counts neither as passed nor as failed.
+    NotOffered,
 }
 
 impl Outcome {
-    const ALL: [Outcome; 3] = [Outcome::Passed, Outcome::Failed, Outcome::NotYet];
+    const ALL: [Outcome; 4] =
+        [Outcome::Passed, Outcome::Failed, Outcome::NotYet, Outcome::NotOffered];
 
     /// Returns the name that the drivers write.
     pub fn name(self) -> &'static str {
@@ -21,6 +24,7 @@ impl Outcome {
             Outcome::Passed => "passed",
             Outcome::Failed => "failed",
             Outcome::NotYet => "not yet",
+            Outcome::NotOffered => "not offered",
         }
     }
 }

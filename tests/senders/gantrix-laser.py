@@ -1,0 +1,114 @@
+"""The framework gantrix with its laser: gantrix-laser.py PORT JOB
+
+It sends a line, and waits for its `ok`, before it sends the next. Its own jobs begin with `$H`."""
+
+import importlib.metadata
+import sys
+import threading
+import time
+
+from steps import ensure, main, step, until, whole_session  # first: redirects what the library prints
+from gantrix.design.text import layout_text
+from gantrix.job import Job
+from gantrix.tools.laser import LaserTool
+from gantrix.transport import GrblError, GrblTransport
+
+PORT, JOB = sys.argv[1:]
+
+gantry = GrblTransport(PORT)
+done = 0
+
+
+def connect():
+    """Opens the port and lets the framework send its own first lines: two empty ones, M5, $X."""
+    gantry.connect()
+    return "M5 and $X answered"
+
+
+def close():
+    gantry.disconnect()
+    time.sleep(0.3)  # The simulated board checks from time to time whether the port is open.
+    return "M5 answered, port closed"
+
+
+def home():
+    gantry.home()
+    return "$H answered"
+
+
+def rest():
+    """Waits for the end of all motion: a pause is answered when it is over."""
+    gantry.send("G4 P0.1", timeout=60)
+
+
+def engrave(**more):
+    """Engraves a text as `gantrix text` does. Returns how many of its lines are done."""
+    global done
+    done = 0
+
+    def count(line, _):
+        global done
+        done = line
+
+    placed, _ = layout_text("A")
+    laser = LaserTool(power=600, speed=3000)
+    Job(gantry, laser, placed, height=10, line_gap=1, on_progress=count, **more).run()
+    return done
+
+
+def cancel():
+    """Engraves a text, and cancels a second one in the middle. A job ends with the `ok` of its last move, and `$H` is
+    refused in motion, so the second job begins when the machine is at rest."""
+    whole = engrave()
+    rest()
+    some = engrave(should_cancel=lambda: done > 3)
+    rest()
+    ensure(0 < some < whole, f"cancelled at {some} of {whole}")
+    return f"{whole} lines of a text; cancelled at {some}"
+
+
+def reset():
+    """Calls the emergency stop while another thread waits for the end of a move, and connects again."""
+    told = []
+
+    def wait():
+        try:
+            for line in ["G91", "G1 X20 F60", "G4 P0"]:
+                gantry.send(line)
+        except GrblError as error:
+            told.append(str(error))
+
+    waiting = threading.Thread(target=wait, daemon=True)
+    waiting.start()
+    time.sleep(2)
+    gantry.emergency_stop()
+    until(lambda: told)
+    ensure("reset" in told[0], told[0])
+    gantry.disconnect()
+    gantry.connect()
+    gantry.send("G90")
+    return f"it is told: {told[0]}; unlocked by connecting again"
+
+
+def start():
+    return "line by line"
+
+
+def finish():
+    with open(JOB, encoding="ascii") as job:
+        lines = [line.split("(")[0].split(";")[0].strip() for line in job]
+    lines = [line for line in lines if line and line != "%"]
+    for line in lines:
+        gantry.send(line, timeout=60)
+    rest()
+    return f"{len(lines)} lines answered"
+
+
+def test():
+    step("start", 10, lambda: f"gantrix {importlib.metadata.version('gantrix')}, Python {sys.version.split()[0]}")
+    whole_session(
+        connect=connect, home=home, cancel=cancel, reset=reset, close=close, start=start, finish=finish
+    )
+
+
+main(test)
