@@ -5,7 +5,7 @@ greet with `Grbl`."""
 
 import sys
 
-from steps import contact, ensure, main, step, until, whole_session  # first: redirects what the library prints
+from steps import contact, ensure, main, step, whole_session  # first: redirects what the library prints
 import no_images
 
 no_images.install()
@@ -13,11 +13,26 @@ import logging  # noqa: E402
 import time  # noqa: E402
 
 import gscrib  # noqa: E402
+from gscrib.writers import printrun_writer  # noqa: E402
 
 PORT, JOB = sys.argv[1:]
 
 logging.basicConfig(level=logging.DEBUG, stream=sys.stderr, format="%(message)s")
 builder = None
+
+
+class Patient(printrun_writer.printcore):
+    """Waits for the board, which DTR resets, and hears its greeting before the `ok` to the first line. Without the first
+    wait that line is lost. Without the second the `ok` may come before the library's other thread has begun. The library
+    then waits for ever."""
+
+    def _listen_until_online(self):
+        time.sleep(1)
+        super()._listen_until_online()
+        time.sleep(0.2)
+
+
+printrun_writer.printcore = Patient
 
 
 def connect():
@@ -32,10 +47,6 @@ def close():
     builder.teardown()
     time.sleep(0.3)  # The simulated board checks from time to time whether the port is open.
     return "port closed"
-
-
-def place():
-    return [builder.get_parameter(axis) for axis in "XYZ"]
 
 
 def settings():
@@ -55,11 +66,21 @@ def jog():
     return "X by 2 mm and back, by G91 and G1"
 
 
-def probe():
+def rest():
+    """Waits for the end of all motion: a pause is answered when it is over."""
+    builder.sleep(0.1)
+
+
+def home():
+    """Homes by grbl's own line, because `auto_home` sends G28."""
+    rest()
     builder.write("$H")
+    return "$H answered"
+
+
+def probe():
     builder.probe("towards", z=-70, F=800)
-    until(lambda: place()[2] is not None)
-    z = place()[2]
+    z = builder.get_writer(0).get_parameter("Z")
     contact(f"[PRB:0,0,{z}:1]")
     builder.write("G0 Z0")
     return f"contact at {z}"
@@ -75,14 +96,21 @@ def finish():
     lines = [line for line in lines if line and line != "%"]
     for line in lines:
         builder.write(line)
-    builder.write("G4 P0.1")
+    rest()
     return f"{len(lines)} lines answered"
 
 
 def test():
     step("start", 10, lambda: f"gscrib {gscrib.__version__}, Python {sys.version.split()[0]}")
     whole_session(
-        connect=connect, settings=settings, jog=jog, probe=probe, close=close, start=start, finish=finish
+        connect=connect,
+        settings=settings,
+        jog=jog,
+        home=home,
+        probe=probe,
+        close=close,
+        start=start,
+        finish=finish,
     )
 
 
