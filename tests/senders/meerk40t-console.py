@@ -102,8 +102,28 @@ def jog():
 
 
 def home():
+    """Homes by `$H`, which the console calls physical, and then by G28, which goes to machine zero."""
     answer("physical_home", r"ok / \d+ -- \$H")
-    return f"{report()}"
+    there = report()
+    answer("home", r"ok / \d+ -- G28")
+    idle_at(0)
+    return f"{there}; G28 answered"
+
+
+PLAN = ["plan copy preprocess validate blob preopt optimize", "plan spool"]
+
+
+def design():
+    """Burns a square and a circle that the console draws. Each is a layer with a speed of its own, in mm/s."""
+    said = hear()
+    enter("rect 10mm 210mm 10mm 8mm engrave -s 12.5", "circle 30mm 214mm 4mm engrave -s 10", *PLAN)
+    until(lambda: said(r"M5$") and said(r"ok / 0 -- M5"))
+    until(lambda: report()[0] == "Idle")
+    ensure(not said("ERROR"), said("ERROR"))
+    enter("operation* delete", "element* delete")
+    answer("grbl G0 X0 Y0", r"ok / \d+ -- G0 X0 Y0")
+    idle_at(0)
+    return "a square and a circle by M4, G0 and G1 with S"
 
 
 def stop(command):
@@ -131,7 +151,7 @@ def start():
     with open(JOB, encoding="ascii") as job, open("job.nc", "w", encoding="ascii", newline="\r\n") as copy:
         copy.write(job.read())
     said = hear()
-    enter(f"load {os.path.abspath('job.nc')}", "plan copy preprocess validate blob preopt optimize", "plan spool")
+    enter(f"load {os.path.abspath('job.nc')}", *PLAN)
     until(lambda: said(".*Spooled Plan"))
     return "counting characters"
 
@@ -165,6 +185,7 @@ def test():
         settings=settings,
         jog=jog,
         home=home,
+        design=design,
         cancel=lambda: stop("estop"),
         reset=lambda: stop("soft_reset"),
         close=close,

@@ -98,11 +98,16 @@ def session(*, connect, settings, jog, home, probe, stop, close, start, hold, fi
     step("close", 20, close)
 
 
-def whole_session(*, connect, close, start, finish, hold=None, **offered):
+def whole_session(*, connect, close, start, finish, hold=None, design=None, **offered):
     """Runs all steps, with two reconnections. `offered` and `hold` are the steps that a sender may lack; a missing one is
-    reported as not offered. `cancel` ends a job, and `reset` resets the board in the middle of a move."""
+    reported as not offered. `design` runs a job that the sender itself draws, `cancel` ends a job, and `reset` resets the
+    board in the middle of a move."""
     step("connect", 30, connect)
-    for name in ["settings", "jog", "home", "probe", "cancel", "reset"]:
+    for name in ["settings", "jog", "home", "probe"]:
+        maybe(name, 180, offered.pop(name, None))
+    if design:
+        step("design", 180, design)
+    for name in ["cancel", "reset"]:
         maybe(name, 180, offered.pop(name, None))
     ensure(not offered, f"no step is called {list(offered)}")
     for _ in range(2):
