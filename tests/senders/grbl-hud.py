@@ -9,7 +9,7 @@ import sys
 import threading
 import time
 
-from steps import contact, ensure, main, step, until, whole_session
+from steps import contact, ensure, kept, main, stands, step, until, whole_session
 
 PORT, JOB = sys.argv[1:]
 FAR = 40
@@ -99,14 +99,7 @@ def setting():
 
 
 def settings():
-    before = setting()
-    enter("$110=700")
-    close()
-    connect()
-    ensure(setting() == 700, "the new value is not kept")
-    enter(f"$110={before:.3f}")
-    ensure(setting() == before, "the old value is not taken")
-    return f"{before}, written 700, kept over a reset, written back"
+    return kept(setting, lambda value: enter(f"$110={value}"), close, connect)
 
 
 def jog():
@@ -181,15 +174,7 @@ def start():
 def hold():
     until(lambda: state() == "Run")
     time.sleep(1)
-    enter("!")
-    until(lambda: state() == "Hold")
-    time.sleep(0.5)
-    there = place()
-    time.sleep(1)
-    ensure(state() == "Hold" and place() == there, "it moves in hold")
-    enter("~")
-    until(lambda: state() == "Run")
-    return f"stands at {there}, goes on"
+    return stands(lambda: (enter("!"), time.sleep(1)), lambda: enter("~"), state, place)
 
 
 def finish():

@@ -7,7 +7,7 @@ import importlib.metadata
 import sys
 import time
 
-from steps import ensure, main, step, until, whole_session  # first: redirects what the library prints
+from steps import ensure, kept, main, stands, step, until, whole_session  # first: redirects what the library prints
 import serial
 from grbl_link.interface import Grbl
 from grbl_link.messages import AlarmMessage, ErrorMessage, OKMessage, StatusMessage, WelcomeMessage
@@ -77,14 +77,7 @@ def setting():
 
 
 def settings():
-    before = setting()
-    send("$110=700")
-    close()
-    connect()
-    ensure(setting() == 700, "the new value is not kept")
-    send(f"$110={before:.3f}")
-    ensure(setting() == before, "the old value is not taken")
-    return f"{before}, written 700, kept over a reset, written back"
+    return kept(setting, lambda value: send(f"$110={value}"), close, connect)
 
 
 def jog():
@@ -145,14 +138,7 @@ def answered():
 
 def hold():
     until(lambda: answered() > len(sent) / 10 and state() == "Run")
-    grbl.send(b"!")
-    until(lambda: state() == "Hold:0")
-    there = grbl.status["MPos"]
-    time.sleep(1)
-    ensure(state() == "Hold:0" and grbl.status["MPos"] == there, "it moves in hold")
-    grbl.send(b"~")
-    until(lambda: state() == "Run")
-    return "stands in Hold:0, goes on"
+    return stands(lambda: grbl.send(b"!"), lambda: grbl.send(b"~"), state, lambda: grbl.status["MPos"])
 
 
 def finish():

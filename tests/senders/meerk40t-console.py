@@ -8,7 +8,7 @@ import sys
 import threading
 import time
 
-from steps import ensure, main, step, until, whole_session
+from steps import ensure, kept, main, stands, step, until, whole_session
 
 PORT, JOB = sys.argv[1:]
 FAR = 40
@@ -83,14 +83,7 @@ def setting():
 
 
 def settings():
-    before = setting()
-    answer("grbl $110=700", r"ok / \d+ -- \$110")
-    close()
-    connect()
-    ensure(setting() == 700, "the new value is not kept")
-    answer(f"grbl $110={before:.3f}", r"ok / \d+ -- \$110")
-    ensure(setting() == before, "the old value is not taken")
-    return f"{before}, written 700, kept over a reset, written back"
+    return kept(setting, lambda value: answer(f"grbl $110={value}", r"ok / \d+ -- \$110"), close, connect)
 
 
 def jog():
@@ -161,14 +154,7 @@ def hold():
         lines = len(file.readlines())
     begin = len(heard)
     until(lambda: heard[begin:].count("ok") > lines / 10 and report()[0] == "Run")
-    enter("pause")
-    until(lambda: report()[0] == "Hold:0")
-    there = report()
-    time.sleep(1)
-    ensure(report() == there, "it moves in hold")
-    enter("resume")
-    until(lambda: report()[0] == "Run")
-    return f"stands at {there}, goes on"
+    return stands(lambda: enter("pause"), lambda: enter("resume"), lambda: report()[0], lambda: report()[1])
 
 
 def finish():

@@ -4,7 +4,7 @@ import importlib.metadata
 import sys
 import time
 
-from steps import PLATE, contact, ensure, main, step, until, whole_session  # first: redirects what the library prints
+from steps import PLATE, contact, ensure, kept, main, stands, step, until, whole_session  # first: redirects what the library prints
 from plotdeck.core.controller import MachineController
 from plotdeck.core.streamer import StreamerState
 
@@ -81,14 +81,7 @@ def setting():
 
 
 def settings():
-    before = setting()
-    do(lambda: deck.set_setting(110, "700"))
-    close()
-    connect()
-    ensure(setting() == 700, "the new value is not kept")
-    do(lambda: deck.set_setting(110, f"{before:.3f}"))
-    ensure(setting() == before, "the old value is not taken")
-    return f"{before}, written 700, kept over a reset, written back"
+    return kept(setting, lambda value: do(lambda: deck.set_setting(110, value)), close, connect)
 
 
 def jog():
@@ -165,14 +158,8 @@ def start():
 
 def hold():
     until(lambda: not_refused() and deck.streamer.sent > deck.streamer.total / 10 and state() == "Run")
-    deck.pause()
-    until(lambda: state() == "Hold" and deck.status.substate == "0")
-    there = deck.status.mpos
-    time.sleep(1)
-    ensure(state() == "Hold" and deck.status.mpos == there, "it moves in hold")
-    deck.resume()
-    until(lambda: state() == "Run")
-    return "stands in Hold:0, goes on"
+    detailed = lambda: f"{state()}:{deck.status.substate}" if deck.status.substate else state()
+    return stands(deck.pause, deck.resume, detailed, lambda: deck.status.mpos)
 
 
 def finish():

@@ -5,7 +5,7 @@ import sys
 import threading
 import time
 
-from steps import contact, ensure, main, step, until, whole_session  # first: redirects what the library prints
+from steps import contact, ensure, kept, main, stands, step, until, whole_session  # first: redirects what the library prints
 from pygrbl_streamer import GrblStreamer, State
 
 PORT, JOB = sys.argv[1:]
@@ -63,14 +63,7 @@ def setting():
 
 
 def settings():
-    before = setting()
-    send("$110=700")
-    close()
-    connect()
-    ensure(setting() == 700, "the new value is not kept")
-    send(f"$110={before:.3f}")
-    ensure(setting() == before, "the old value is not taken")
-    return f"{before}, written 700, kept over a reset, written back"
+    return kept(setting, lambda value: send(f"$110={value}"), close, connect)
 
 
 def jog():
@@ -144,14 +137,7 @@ def hold():
         lines = len(file.readlines())
     begin = len(heard)
     until(lambda: len(heard) > begin + lines / 10 and ask() == "Run")
-    grbl.pause()
-    until(lambda: ask() == "Hold:0")
-    there = place()
-    time.sleep(1)
-    ensure(ask() == "Hold:0" and place() == there, "it moves in hold")
-    grbl.resume()
-    until(lambda: ask() == "Run")
-    return "stands in Hold:0, goes on"
+    return stands(grbl.pause, grbl.resume, ask, place)
 
 
 def finish():

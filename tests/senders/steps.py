@@ -55,6 +55,30 @@ def ensure(condition, text):
         raise AssertionError(text)
 
 
+def kept(read, write, close, connect):
+    """Stores another value of a setting, checks that it is kept over a reset, and stores the value of before."""
+    before = read()
+    write("700")
+    close()
+    connect()
+    ensure(read() == 700, "the new value is not kept")
+    write(f"{before:.3f}")
+    ensure(read() == before, "the old value is not taken")
+    return f"{before}, written 700, kept over a reset, written back"
+
+
+def stands(pause, resume, state, place):
+    """Pauses, checks that the machine stands for a second, and resumes."""
+    pause()
+    until(lambda: state() in ("Hold", "Hold:0"))
+    there = place()
+    time.sleep(1)
+    ensure(state() in ("Hold", "Hold:0") and place() == there, "it moves in hold")
+    resume()
+    until(lambda: state() == "Run")
+    return f"stands in Hold at {there}, goes on"
+
+
 # The position of the plate when Z has been homed at its top.
 PLATE = -51.8
 
@@ -102,7 +126,7 @@ def whole_session(*, connect, close, start, finish, hold=None, design=None, **of
     """Runs all steps, with two reconnections. `offered` and `hold` are the steps that a sender may lack; a missing one is
     reported as not offered. `design` runs a job that the sender itself draws, `cancel` ends a job, and `reset` resets the
     board in the middle of a move."""
-    step("connect", 30, connect)
+    step("connect", 60, connect)
     for name in ["settings", "jog", "home", "probe"]:
         maybe(name, 180, offered.pop(name, None))
     if design:
@@ -111,12 +135,12 @@ def whole_session(*, connect, close, start, finish, hold=None, design=None, **of
         maybe(name, 180, offered.pop(name, None))
     ensure(not offered, f"no step is called {list(offered)}")
     for _ in range(2):
-        step("close", 20, close)
-        step("reconnect", 30, connect)
+        step("close", 30, close)
+        step("reconnect", 60, connect)
     step("stream", 30, start)
     maybe("hold", 120, hold)
     step("finish", 600, finish)
-    step("close", 20, close)
+    step("close", 30, close)
 
 
 def maybe(name, seconds, run):
