@@ -4,7 +4,7 @@ import importlib.metadata
 import sys
 import time
 
-from steps import PLATE, contact, ensure, kept, main, stands, step, until, whole_session  # first: redirects what the library prints
+from steps import MANY, PLATE, contact, ensure, kept, main, stands, step, until, whole_session  # first: redirects what the library prints
 from plotdeck.core.controller import MachineController
 from plotdeck.core.streamer import StreamerState
 
@@ -118,7 +118,7 @@ def probe():
 def in_move():
     del ended[:]
     greeting = hear("Grbl")
-    ensure(deck.run_text(f"G90\nG1 X{FAR} F60\n" + "G1 X1\nG1 X0\n" * 200), "the job does not start")
+    ensure(deck.run_text("\n".join(["G90", f"G1 X{FAR} F60", *MANY])), "the job does not start")
     until(lambda: state() == "Run" and x() > 1)
     return greeting
 

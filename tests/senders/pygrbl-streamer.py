@@ -5,7 +5,7 @@ import sys
 import threading
 import time
 
-from steps import contact, ensure, kept, main, stands, step, until, whole_session  # first: redirects what the library prints
+from steps import MANY, contact, ensure, kept, main, stands, step, until, whole_session  # first: redirects what the library prints
 from pygrbl_streamer import GrblStreamer, State
 
 PORT, JOB = sys.argv[1:]
@@ -95,7 +95,7 @@ def stream(run):
 
 
 def in_move():
-    stream(lambda: grbl.stream([f"G1 X{FAR} F60", *["G1 X1", "G1 X0"] * 200]))
+    stream(lambda: grbl.stream([f"G1 X{FAR} F60", *MANY]))
     until(lambda: ask() == "Run" and place()[0] > 1)
 
 

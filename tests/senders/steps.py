@@ -79,6 +79,9 @@ def stands(pause, resume, state, place):
     return f"stands in Hold at {there}, goes on"
 
 
+# Lines of a job that no board takes whole into its queue.
+MANY = ["G1 X1", "G1 X0"] * 1500
+
 # The position of the plate when Z has been homed at its top.
 PLATE = -51.8
 
