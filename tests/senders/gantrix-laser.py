@@ -74,8 +74,8 @@ def cancel():
 
 
 def reset():
-    """Calls the emergency stop while another thread waits for the end of a move. Then unlocks, because a new connection
-    begins with M5, which is refused in an alarm of a board that DTR does not reset."""
+    """Calls the emergency stop while another thread waits for the end of a move. Then unlocks: a new connection begins
+    with M5, which is refused in an alarm if DTR has not reset the board."""
     told = []
 
     def wait():

@@ -131,7 +131,7 @@ def probe():
 
 
 def cancel():
-    """Types `softstop` in a job. The program drops its own lines and sends M2; the board carries out those that it has."""
+    """Types `softstop` in a job. The program drops its own lines and sends M2. The board runs those that it has."""
     with open("there-and-back.nc", "w", encoding="ascii") as job:
         job.write("\n".join(["F600", *MANY]))
     answer("stream there-and-back.nc", "yes/no")

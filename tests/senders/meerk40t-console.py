@@ -139,7 +139,7 @@ said = None
 
 
 def start():
-    """Loads the job and spools it. A file without CR counts as one line, which never fits, so each line ends with CR LF."""
+    """Loads the job and spools it. A file without CR counts as one line, which never fits, so lines end with CR LF."""
     global said
     with open(JOB, encoding="ascii") as job, open("job.nc", "w", encoding="ascii", newline="\r\n") as copy:
         copy.write(job.read())

@@ -4,7 +4,8 @@ import importlib.metadata
 import sys
 import time
 
-from steps import MANY, PLATE, contact, ensure, kept, main, stands, step, until, whole_session  # first: redirects what the library prints
+# First, because it redirects what the library prints.
+from steps import MANY, PLATE, contact, ensure, kept, main, stands, step, until, whole_session
 from plotdeck.core.controller import MachineController
 from plotdeck.core.streamer import StreamerState
 
@@ -55,7 +56,7 @@ def do(done):
 
 
 def connect():
-    """Opens the port. plotdeck reads positions of three numbers only, so a fourth axis is switched off in its console."""
+    """Opens the port. plotdeck reads positions of three numbers only, so its console switches a fourth axis off."""
     report = hear("<")
     deck.connect(PORT)
     until(lambda: deck.connected and report() and state() == "Idle")
@@ -159,7 +160,9 @@ def start():
 def hold():
     until(lambda: not_refused() and deck.streamer.sent > deck.streamer.total / 10 and state() == "Run")
     detailed = lambda: f"{state()}:{deck.status.substate}" if deck.status.substate else state()
-    return stands(deck.pause, deck.resume, detailed, lambda: deck.status.mpos)
+    # When all lines have been answered the job counts as done, and the buttons for the machine itself are left.
+    buttons = (deck.pause, deck.resume) if deck.streamer.is_active else (deck.hold, deck.cycle_start)
+    return stands(*buttons, detailed, lambda: deck.status.mpos)
 
 
 def finish():

@@ -5,7 +5,8 @@ import sys
 import threading
 import time
 
-from steps import MANY, contact, ensure, kept, main, stands, step, until, whole_session  # first: redirects what the library prints
+# First, because it redirects what the library prints.
+from steps import MANY, contact, ensure, kept, main, stands, step, until, whole_session
 from pygrbl_streamer import GrblStreamer, State
 
 PORT, JOB = sys.argv[1:]
