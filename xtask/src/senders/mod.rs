@@ -223,4 +223,40 @@ mod tests {
             assert!(share.iter().any(|sender| !sender.prints()), "{share:?}");
         }
     }
+
+    /// The packages of the tested programs, and how their rows in docs/senders.md begin.
+    const PROGRAMS: [(&str, &str); 14] = [
+        ("bCNC", "bCNC"),
+        ("cncjs", "CNCjs"),
+        ("g2core-api", "g2core-api"),
+        ("gantrix", "gantrix"),
+        ("grbl-link", "grbl-link"),
+        ("grbl-streamer", "grbl-streamer"),
+        ("grblhud", "grblhud"),
+        ("gscrib", "gscrib"),
+        ("marlin-host", "marlin-host"),
+        ("meerk40t", "MeerK40t"),
+        ("OctoPrint", "OctoPrint"),
+        ("plotdeck", "plotdeck"),
+        ("printrun", "printcore"),
+        ("pygrbl-streamer", "pygrbl-streamer"),
+    ];
+
+    #[test]
+    fn the_page_names_the_versions_that_are_tested() {
+        let read = |name: &str| std::fs::read_to_string(root().join(name)).unwrap();
+        let lists = ["requirements.txt", "requirements-octoprint.txt", "package.json"];
+        let pinned: String = lists.map(|list| read(&format!("tests/senders/{list}"))).concat();
+        let page = read("docs/senders.md");
+        for (package, row) in PROGRAMS {
+            let marks = [format!("\n{package}=="), format!("\"{package}\": \"")];
+            let rest = marks.iter().find_map(|mark| pinned.split_once(mark.as_str()));
+            let (_, rest) = rest.unwrap_or_else(|| panic!("{package} is not pinned"));
+            let version = rest.split(['\n', '"']).next().unwrap();
+            let names = |line: &str| {
+                line.starts_with(&format!("| {row}")) && line.contains(&format!("| {version} |"))
+            };
+            assert!(page.lines().any(names), "no row of {package} {version}");
+        }
+    }
 }
