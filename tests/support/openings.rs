@@ -372,8 +372,11 @@ pub fn greeting(mut side: impl Side) {
     assert!(Regex::new(GREETING).expect("an expression").is_match(grbl), "{heard}");
 }
 
-/// How senders of TinyG's dialect begin: what is sent, what is heard, and how many responses in JSON.
-const OF_TINYG: [(&str, &[(&[u8], &str, usize)]); 6] = [
+/// What is sent, what is heard, and how many responses in JSON.
+type Said = (&'static [u8], &'static str, usize);
+
+/// How senders of TinyG's dialect begin.
+const OF_TINYG: [(&str, &[Said]); 6] = [
     (
         "CNCjs",
         &[
@@ -409,7 +412,7 @@ pub fn of_tinyg<S: Side>(boot: impl Fn() -> S + Sync) {
     assert_eq!(failed.count(), 0);
 }
 
-fn play_tinyg(mut side: impl Side, name: &str, steps: &[(&[u8], &str, usize)]) {
+fn play_tinyg(mut side: impl Side, name: &str, steps: &[Said]) {
     (0..200).for_each(|_| side.run_ms(1));
     side.heard();
     for (says, hears, responses) in steps {

@@ -21,6 +21,11 @@ fn the_greeting_loses_no_sender() {
 }
 
 #[test]
+fn senders_of_tinyg_find_theirs() {
+    by_sender::of_tinyg(|| boot(0));
+}
+
+#[test]
 fn noise_costs_its_line_alone() {
     by_sender::noise(|| boot(0), 0..8);
 }
