@@ -13,7 +13,7 @@ fn is_on(machine: &Machine, pin: Pin) -> bool {
 /// Runs until the first step, instruction by instruction. Returns how many cycles before it `enable` came on.
 fn lead(board: &'static Board, line: &str, enable: Pin) -> u64 {
     let (mut machine, mut host) = booted(board);
-    set(&mut machine, &mut host, "{1pm:3,2pm:3,3pm:3,4pm:3}");
+    set(&mut machine, &mut host, "{1pm:3,2pm:3,3pm:3,4pm:3,aam:1}");
     assert!(!is_on(&machine, enable));
     machine.send(format!("{line}\n").as_bytes());
     let (end, mut on) = (machine.cycle() + machine.cycles(1_000), None);
@@ -40,7 +40,7 @@ fn power_comes_before_the_first_step() {
 #[test]
 fn a_motor_that_stands_still_stays_off() {
     let (mut machine, mut host) = booted(&RAMPS14_CNC);
-    set(&mut machine, &mut host, "{1pm:3,2pm:3,3pm:2,4pm:0,mt:0.2}");
+    set(&mut machine, &mut host, "{1pm:3,2pm:3,3pm:2,4pm:0,mt:0.2,aam:1}");
     set(&mut machine, &mut host, "g1 f500 y1 a1");
     machine.run_for_ms(60).unwrap();
     let on = |machine: &Machine| {
