@@ -79,7 +79,15 @@ impl<S: Side> Session<S> {
         self.run(GREETS_MS)?;
         // This settles TinyG's dialect on the ports. In that dialect a reset restarts the board.
         self.line(0, "{stat:n}")?;
-        self.line(1, "{stat:n}")
+        self.line(1, "{stat:n}")?;
+        while self.ports.iter().any(|port| port.in_flight() > 0) {
+            self.run(2)?;
+            waited += 2;
+            if waited > 3_000 {
+                return Err("a port is not answered".to_string());
+            }
+        }
+        Ok(())
     }
 
     /// Plays the actions. Returns those that remain after a reset; `None` if all are done.
