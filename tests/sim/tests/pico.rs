@@ -256,7 +256,7 @@ fn a_stuck_chip_is_bitten_and_says_so() {
     assert!(!board.is_high(PICO_CNC.outputs[0].unwrap()));
     board.run_for_ms(300).unwrap();
     let said = String::from_utf8(board.receive_from(USB)).unwrap();
-    assert!(said.contains("SYSTEM READY") && said.contains("\"er\""), "{said}");
+    assert!(said.contains("SYSTEM READY") && said.contains("ALARM:3\r\n"), "{said}");
     host = Host::new(LINES_IN_FLIGHT);
     assert_eq!(value(&mut board, &mut host, "rst"), 3.0);
 }

@@ -19,9 +19,18 @@ const OFF_CYCLES: u64 = 42;
 /// Status of a line of which a part was lost.
 const BUFFER_FULL: i64 = 13;
 
-/// A machine that can go this fast, with a log of its steps.
-fn fast() -> (Machine, Host) {
+/// A machine that speaks TinyG's dialect on both ports.
+fn both() -> (Machine, Host) {
     let (mut machine, mut host) = booted(&MEGA2560_GRBL);
+    machine.send_to(AUX, b"{}\n");
+    host.run_for_ms(&mut machine, 50).unwrap();
+    machine.receive_from(AUX);
+    (machine, host)
+}
+
+/// Such a machine that can go this fast, with a log of its steps.
+fn fast() -> (Machine, Host) {
+    let (mut machine, mut host) = both();
     for line in ["{xvm:2000}", "{xfr:2000}", "{sv:0}"] {
         set(&mut machine, &mut host, line);
     }
@@ -273,7 +282,7 @@ fn who_heeds_xoff_loses_nothing_while_the_other_port_asks() {
     let lines: String = (0..LINES).map(|n| format!("N{n} g1 f1200 x{}.25\n", n % 3)).collect();
     // A share has each port once.
     for &(port, lag) in share_of(&[(0, 0), (0, 4), (0, 12), (1, 12), (1, 0), (1, 4)], 3) {
-        let (mut machine, mut host) = booted(&MEGA2560_GRBL);
+        let (mut machine, mut host) = both();
         set(&mut machine, &mut host, "{xjm:5000,sv:2,si:100,jv:4}");
         let _ = machine.receive_from(1);
         let mut sender = Heeds::new(port, lag, &lines);

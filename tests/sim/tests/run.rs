@@ -111,5 +111,6 @@ fn steps_are_kept_on_demand() {
     let log = m.recorder().log();
     assert_eq!(log.len(), 80);
     assert!(log.iter().all(|s| s.motor == 0 && s.positive));
-    assert!(log.windows(2).all(|w| w[1].cycle - w[0].cycle > 600));
+    // The first step comes as soon as its interrupt is enabled, at any time of the timer's period.
+    assert!(log[1..].windows(2).all(|w| w[1].cycle - w[0].cycle > 600));
 }

@@ -46,6 +46,8 @@ pub struct Dialect {
     pub answer: fn(&str) -> Option<Result<(), String>>,
     /// The version of Kerf.
     pub version: Question<String>,
+    /// The line that makes a port whose dialect is undecided speak it; `None` if no line is needed.
+    pub opening: Option<&'static str>,
     /// Values that the test stores, and restores.
     pub stored: &'static [Stored],
     /// The requests that switch check mode on and off; `None` if the dialect has none.

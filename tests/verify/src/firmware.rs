@@ -144,7 +144,11 @@ impl<'l, 'b, B: Board> Kerf<'l, 'b, B> {
 
     async fn greeting(&mut self) -> Result<(), String> {
         self.line.until(START, self.dialect.is_greeting).await?;
-        self.line.pass(SETTLE).await
+        self.line.pass(SETTLE).await?;
+        if let Some(line) = self.dialect.opening {
+            self.ask(line).await?;
+        }
+        Ok(())
     }
 
     pub(crate) async fn restart(&mut self) -> Result<(), String> {

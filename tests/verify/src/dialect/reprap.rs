@@ -23,6 +23,7 @@ pub static REPRAP: Dialect = Dialect {
         request: "M115",
         find: |lines| between(lines, "FIRMWARE_NAME:Kerf ", &[' ']),
     },
+    opening: None,
     stored: &[offset!("X"), offset!("Y"), offset!("Z")],
     check_mode: None,
     dwell: |ms| format!("G4 P{ms}"),

@@ -61,6 +61,7 @@ pub static TINYG: Dialect = Dialect {
         request: "{kerf:n}",
         find: |lines| value(lines, "kerf").map(|text| text.trim_matches('"').into()),
     },
+    opening: Some("{}"),
     stored: &[word!("uda0"), word!("uda1"), word!("udb0"), word!("udd3")],
     check_mode: Some(["{chk:1}", "{chk:0}"]),
     dwell: |ms| format!("g4 p{}", f64::from(ms) / 1_000.0),
