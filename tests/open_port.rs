@@ -127,7 +127,6 @@ fn a_reset_keeps_the_position_and_is_an_alarm_in_motion() {
 /// A sender that speaks as soon as it has heard its greeting is not greeted twice, or it would take the second greeting
 /// for a restart.
 #[test]
-#[ignore = "a defect that is still to be mended"]
 fn a_line_right_behind_its_greeting_is_no_cause_of_another() {
     let mut wrong = Vec::new();
     for (delay, opens) in (0..40).flat_map(|delay| [(delay, false), (delay, true)]) {
@@ -156,7 +155,6 @@ fn a_line_right_behind_its_greeting_is_no_cause_of_another() {
 
 /// Where a line begins with a brace, nothing in it is grbl's.
 #[test]
-#[ignore = "a defect that is still to be mended"]
 fn a_question_mark_in_the_first_line_of_json_is_text() {
     let machine = booted();
     let heard = say(&machine, "{\"uda0\":\"?\",xvm:n}\n");
@@ -207,7 +205,6 @@ fn the_first_request_overtakes_and_its_alarm_acts_at_once() {
 
 /// What needs a machine at rest is done by the first line, too.
 #[test]
-#[ignore = "a defect that is still to be mended"]
 fn the_first_request_finds_the_machine_at_rest() {
     let lines = ["{chk:1}", "{defa:1}", "{mch:1}", "{jogx:1}", "{test:1}", "$chk=1", "$defa=1"];
     let mut wrong = Vec::new();

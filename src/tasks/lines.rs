@@ -255,6 +255,14 @@ impl LinePool {
         self.partial > 0 || self.fault.is_some()
     }
 
+    /// Whether the line that is coming in is text that begins with a brace.
+    #[inline(never)]
+    #[small]
+    pub fn is_in_braces(&self) -> bool {
+        let text = self.slice(self.end.into(), self.partial);
+        text.first() == Some(&b'{') && text.iter().all(|byte| matches!(byte, b' '..=b'~'))
+    }
+
     /// Returns the greatest length of a control line that may overtake, without its end.
     pub fn reserve(&self) -> u8 {
         self.reserve

@@ -247,10 +247,11 @@ impl Intake {
     /// Acts on a line that has come whole. `looked`: the line has been searched for alarms while it was in the ring.
     #[inline(always)]
     fn ended(&mut self, pool: &mut LinePool, looked: bool, links: &Links) {
-        self.scan.serve(links, pool, looked);
+        // First, because what has been selected says what the line is.
         if self.port.is_undecided() && self.port.may_decide(pool.newest().first()) {
             self.decide(pool, links);
         }
+        self.scan.serve(links, pool, looked);
         if machine::is_alarmed() && pool.ends_with_control() {
             // They came before a line that may overtake them, and may end the alarm.
             pool.refuse();
@@ -266,7 +267,8 @@ impl Intake {
     fn speak(&self, pool: &mut LinePool) {
         let speech = self.port.speech.get();
         pool.keep_empty(speech.answers_empty());
-        pool.keep_order(speech.is_in_order());
+        let in_braces = self.port.is_undecided() && pool.is_in_braces();
+        pool.keep_order(speech.is_in_order() && !in_braces);
         if Speech::HAS_PLAIN {
             pool.keep_plain(speech.is_plain());
         }

@@ -7,7 +7,7 @@
 //! lines that wait. Thread mode. Cost: 15 cycles for each byte that waits.
 //!
 //! On a port whose dialect is undecided ([`Port::is_undecided`]) a `?` at the beginning of a line decides it, and
-//! acts.
+//! acts. In a line that begins with a brace, and behind it, nothing acts until the line has decided.
 
 use kerf_macros::small;
 
@@ -39,6 +39,10 @@ const ASKS: u8 = b'?';
 #[inline(never)]
 #[small]
 pub fn pick(links: &Links, port: &Port, ring: &mut Window<'_>) -> u8 {
+    let undecided = port.is_undecided();
+    if undecided && port.lines.borrow().is_in_braces() {
+        return 0;
+    }
     let mut within = port.lines.borrow().is_within_line();
     let waiting = ring.len();
     // If there is a cut, the slots of the bytes must not change.
@@ -48,6 +52,10 @@ pub fn pick(links: &Links, port: &Port, ring: &mut Window<'_>) -> u8 {
         let byte = ring.get(n);
         // The slot of a mark counts until the control task has acted on its character.
         closes &= byte >= MARKS || byte == GO || (byte == CUT && !flags::has(Event::Realtime));
+        if undecided && byte == b'{' && !within {
+            // A line that may select a dialect in which these bytes are text.
+            break;
+        }
         if port.waits_for_question() && byte == ASKS && !within {
             decide(links, port);
         }

@@ -256,7 +256,13 @@ fn begin(notice: Notice, links: &Links, port: &Port) -> Telling {
     if matches!(notice, Notice::Enquiry) && port.is_undecided() {
         return begin_otherwise(links, port, notice);
     }
-    Telling::begin(notice, port.speech.get(), &mut View::of(links, port))
+    let speech = port.speech.get();
+    let greets =
+        Speech::IS_CHOSEN && matches!(notice, Notice::Greeting(_)) && !speech.is_in_order();
+    // A line may have decided since the greeting before this one was begun.
+    let speech =
+        if greets { Speech::at_start(&links.settings.borrow(), port.number) } else { speech };
+    Telling::begin(notice, speech, &mut View::of(links, port))
 }
 
 /// Puts the next part. Returns whether there is more.

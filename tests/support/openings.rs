@@ -425,8 +425,9 @@ fn play_tinyg(mut side: impl Side, name: &str, steps: &[Said]) {
     }
 }
 
-/// Bytes that act by themselves, a hold, a reset, a kill, the door; and the one that begins a command: `$H` homes.
-const ACT: [u8; 5] = [b'!', 0x18, 0x04, 0x84, b'$'];
+/// Bytes that act by themselves, a hold, a reset, a kill, the door; and those that begin a command: `$H` homes, and a
+/// question in braces is text.
+const ACT: [u8; 6] = [b'!', 0x18, 0x04, 0x84, b'$', b'{'];
 
 /// Sends some bytes of noise, as a port that was opened at another rate hears them, and a question in the midst of
 /// them. It is answered, and so are the lines behind the line of noise.

@@ -174,6 +174,9 @@ export class SimulatedBoard extends Board {
   }
 }
 
+/// Longest time from TinyG's greeting to that of grbl on the same port.
+const SECOND_GREETING_MS = 500;
+
 /// A real board behind Web Serial.
 export class SerialBoard extends Board {
   name = 'Real board';
@@ -183,8 +186,10 @@ export class SerialBoard extends Board {
   #reader;
   #sender;
   #borrower;
-  /// The dialect of the last greeting: `tinyg` or `grbl`. A port whose dialect is open greets in both, TinyG's last.
+  /// The dialect of the last greeting: `tinyg` or `grbl`. A port whose dialect is open greets in both, grbl's last,
+  /// and the page speaks TinyG's there.
   greeted;
+  #readyAt = 0;
 
   /// Asks the user for a port and opens it. A board resets when its port is opened.
   static async open(baudRate = 115_200) {
@@ -226,9 +231,11 @@ export class SerialBoard extends Board {
     this.hear(text);
     const sender = this.#sender;
     const lines = this.#jobLines.add(text);
-    if (lines.some((line) => line.startsWith('Grbl '))) this.greeted = 'grbl';
+    const isSecond = Date.now() - this.#readyAt < SECOND_GREETING_MS;
+    if (lines.some((line) => line.startsWith('Grbl ')) && !isSecond) this.greeted = 'grbl';
     if (lines.some((line) => parse(line)?.r?.msg === 'SYSTEM READY')) {
       this.greeted = 'tinyg';
+      this.#readyAt = Date.now();
       this.#end('the machine has started anew');
       this.forget();
       this.tell('booted');

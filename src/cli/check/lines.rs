@@ -47,6 +47,8 @@ const SLEEPS: &str = "it puts the machine to sleep: the lines behind it would be
 const RESTORES: &str = "it restores defaults: the job behind it is not the one that is tried here";
 const ALARMS: &str = "it raises an alarm: the lines behind it would be refused";
 const RESTARTS: &str = "it restarts the machine: the lines behind it may be lost";
+const BRACES: &str =
+    "error:1, and at rest it selects TinyG's dialect: the sender would not know the answers";
 /// Names that end or change what the lines behind them do, with the reason. They are not sent.
 const STOPS: [(&str, &str); 7] = [
     ("alarm", ALARMS),
@@ -193,7 +195,7 @@ fn kind(line: &str, dialect: Dialect) -> Kind {
         _ if code.starts_with('$') => kind_of_names([text_pair(&code)].into_iter()),
         Dialect::TinyG if code.starts_with('H') => Kind::Untried("help, no G-code"),
         Dialect::TinyG if code.starts_with('{') => kind_of_json(line),
-        _ if code.starts_with('{') => Kind::Beside,
+        _ if code.starts_with('{') && code.ends_with('}') => Kind::Stops(BRACES),
         _ => match has(&code, "G28.2") || has(&code, "G28.4") {
             true => Kind::Homes(named(&code)),
             false if code.contains("G38.") => Kind::Alone,
