@@ -221,27 +221,12 @@ pub fn jog(block: &[u8]) -> Option<&[u8]> {
     is_jog.then(|| behind_equals(block))
 }
 
-/// Whether a line is valid in this dialect alone. Not `$H`, `$X` and `$x=v`, which TinyG's text mode answers with a
-/// hint.
+/// Whether a line is a command of this dialect alone: in lower case it is one of TinyG.
 #[inline(never)]
 #[small]
 pub fn is_own(line: &[u8]) -> bool {
-    match of(line) {
-        Command::Settings
-        | Command::Offsets
-        | Command::Build
-        | Command::Startup
-        | Command::StoreStartup(_)
-        | Command::Sleep
-        | Command::Restore(_)
-        | Command::BadJog => true,
-        // In lower case these are commands of TinyG.
-        Command::Modes | Command::Check => {
-            without_comment(line).last().is_some_and(u8::is_ascii_uppercase)
-        }
-        Command::Gcode => jog(line).is_some(),
-        _ => false,
-    }
+    let line = trim(line);
+    line.first() == Some(&b'$') && !line.iter().any(u8::is_ascii_lowercase)
 }
 
 /// Returns the name in a [`Command::Named`].
@@ -316,12 +301,12 @@ mod unit {
 
     #[test]
     fn what_only_grbl_says() {
-        for own in ["$$", "$I", "$G", "$#", "$N", "$C", "$J=X1F1", "$SLP"] {
+        for own in
+            ["$$", "$I", "$G", "$#", "$N", "$C", "$J=X1F1", "$SLP", "$", "$H", "$X", "$100=250"]
+        {
             assert!(is_own(own.as_bytes()), "{own}");
         }
-        for other in
-            ["", "g0x1", "$", "$g", "$1sa", "$xvm=1", "{sr:n}", "$H", "$X", "$100=250", "$stat"]
-        {
+        for other in ["", "g0x1", "$g", "$1sa", "$xvm=1", "{sr:n}", "$stat", "G0 ($X)"] {
             assert!(!is_own(other.as_bytes()), "{other}");
         }
     }

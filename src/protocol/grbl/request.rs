@@ -193,7 +193,7 @@ impl Request {
                 Step::At(0)
             }
             Command::Hint => {
-                message(out, text!("grbl's dialect - $ for help, {} for TinyG's"));
+                message(out, text!("$ for help, {} for TinyG"));
                 Step::Done
             }
             Command::Named(from) if by_name::find(command::name(line, from)).is_none() => {
