@@ -225,7 +225,7 @@ pub fn jog(block: &[u8]) -> Option<&[u8]> {
 #[inline(never)]
 #[small]
 pub fn is_own(line: &[u8]) -> bool {
-    let line = trim(line);
+    let line = without_comment(line);
     line.first() == Some(&b'$') && !line.iter().any(u8::is_ascii_lowercase)
 }
 
@@ -301,9 +301,21 @@ mod unit {
 
     #[test]
     fn what_only_grbl_says() {
-        for own in
-            ["$$", "$I", "$G", "$#", "$N", "$C", "$J=X1F1", "$SLP", "$", "$H", "$X", "$100=250"]
-        {
+        for own in [
+            "$$",
+            "$I",
+            "$G",
+            "$#",
+            "$N",
+            "$C",
+            "$J=X1F1",
+            "$SLP",
+            "$",
+            "$H",
+            "$X",
+            "$100=250",
+            "$X (home)",
+        ] {
             assert!(is_own(own.as_bytes()), "{own}");
         }
         for other in ["", "g0x1", "$g", "$1sa", "$xvm=1", "{sr:n}", "$stat", "G0 ($X)"] {

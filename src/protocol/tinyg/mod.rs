@@ -75,7 +75,10 @@ impl Dialect for Tinyg {
                 [b'{', b'}'] => true,
                 // In other lines braces are those of a remark.
                 [b'{', names @ .., b'}'] => names.contains(&b':'),
-                [b'$', rest @ ..] => rest.iter().any(u8::is_ascii_lowercase),
+                [b'$', rest @ ..] => {
+                    let mut code = rest.iter().take_while(|byte| !matches!(byte, b'(' | b';'));
+                    code.any(u8::is_ascii_lowercase)
+                }
                 _ => false,
             }
     }
