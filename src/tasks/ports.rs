@@ -335,7 +335,8 @@ impl Links {
         let others = Speech::IS_CHOSEN
             && port.choice.get() == Choice::Said
             && (port.is_eager() || port.is_plain());
-        others && line.first() == Some(&b'{') && !View::of(self, port).is_busy()
+        let rests = || machine::cycle() == Cycle::Lines && !View::of(self, port).is_busy();
+        others && line.first() == Some(&b'{') && rests()
     }
 
     /// Sets the dialect of a port. The port does not wait for a decision any more.

@@ -46,9 +46,12 @@ def connect():
     threading.Thread(target=read, args=[keyboard], daemon=True).start()
     until(lambda: state() == "Idle")
     report = answer("?", r"<Idle.*?>")
-    # The program shows the last number of a position as Z.
-    ensure(not re.search(r"MPos:[^,|]+,[^,|]+,[^,|]+,", report), f"Z is another axis in {report}")
-    return f"{state()} at {place()}"
+    told = ""
+    if re.search(r"MPos:[^,|]+,[^,|]+,[^,|]+,", report):
+        # The program shows the last number of a position as Z. Without a fourth axis that is Z.
+        told = f", Z is wrong with {report}: $aam=0"
+        enter("$aam=0")
+    return f"{state()} at {place()}{told}"
 
 
 def close():

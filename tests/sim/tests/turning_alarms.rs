@@ -311,9 +311,9 @@ fn refused(lathe: &mut Lathe, line: &str, exception: u16, error: &str) {
         }
     }
     // A report may show the alarm just before the line is answered.
-    lathe.run_for_ms(20);
+    lathe.run_for_ms(100);
     let told = if lathe.grbl { lathe.told(0, error) } else { lathe.told(exception, "") };
-    assert_eq!(told, 1, "{line}, {error}: {:?}", lathe.exceptions());
+    assert_eq!(told, 1, "{line}, {error}: {:?} {:?}", lathe.exceptions(), lathe.all_heard());
     let status = lathe.status();
     assert_eq!(status.state, "Alarm", "{line}, {error}");
     assert_eq!(lathe.machine.recorder().steps(), steps, "{line}, {error}: it moves");

@@ -329,6 +329,11 @@ impl Lathe {
         self.heard.iter().filter(is_one).map(String::as_str).collect()
     }
 
+    /// Returns all that was heard.
+    pub fn all_heard(&self) -> &[String] {
+        &self.heard
+    }
+
     /// Forgets what was heard.
     pub fn forget(&mut self) {
         self.heard.clear();
