@@ -41,8 +41,7 @@ fn boot(dia: u8) -> Machine {
     let set = move || {
         let machine = Machine::boot(115_200).expect("one machine for each thread");
         machine.run_ms(100);
-        // A is an axis of a printer.
-        machine.send(format!("{{aam:0,dia:{dia}}}\n").as_bytes());
+        machine.send(format!("{{dia:{dia}}}\n").as_bytes());
         machine.run_ms(500);
         eeprom::contents()
     };

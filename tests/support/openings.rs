@@ -246,6 +246,8 @@ const SENDERS: [Sender; 16] = [
         name: "plotdeck",
         steps: &[
             step(b"$I\n", &[VERSION, OK], 1_000),
+            // What docs/senders.md tells its users to type.
+            step(b"$aam=0\n", &[OK], 1_000),
             step(b"?", &[THREE], 500),
             step(b"$H\n?", &[], 500),
         ],
