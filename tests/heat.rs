@@ -54,7 +54,7 @@ impl Printer {
         Some(printer)
     }
 
-    /// The same, in the dialect that its first line will decide.
+    /// A printer whose hot end has this temperature at power-up, and whose port no line has decided yet.
     pub fn open_at(degrees: f64) -> Option<Self> {
         if !Capability::Printer.is_built_in() {
             return None;

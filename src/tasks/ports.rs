@@ -75,7 +75,7 @@ pub enum Choice {
     Said = 2,
     /// Nothing has decided, and no line has come: the first line that is in one dialect alone will decide.
     Open = 3,
-    /// The same, after lines that exist in several dialects.
+    /// Nothing has decided, but lines have come, which several dialects have in common.
     Begun = 4,
 }
 
@@ -212,11 +212,6 @@ impl Port {
             }
             _ => false,
         }
-    }
-
-    /// Whether a `?` at the beginning of a line decides the dialect.
-    pub fn waits_for_question(&self) -> bool {
-        Speech::HAS_QUESTION && self.is_undecided()
     }
 
     /// Whether a printing host speaks on the port.

@@ -201,9 +201,7 @@ impl Intake {
                 return Left::Full;
             }
             let next = self.received.waiting().first().copied();
-            let decides =
-                next == Some(b'?') && self.port.waits_for_question() && !pool.is_within_line();
-            if decides || next.is_some_and(|next| pool.leaves(next)) {
+            if next.is_some_and(|next| pool.leaves(next)) {
                 // The byte has come after the ring was searched for such bytes.
                 return Left::Bytes;
             }

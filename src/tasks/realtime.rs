@@ -39,7 +39,7 @@ const ASKS: u8 = b'?';
 #[inline(never)]
 #[small]
 pub fn pick(links: &Links, port: &Port, ring: &mut Window<'_>) -> u8 {
-    let undecided = port.is_undecided();
+    let mut undecided = port.is_undecided();
     if undecided && port.lines.borrow().is_in_braces() {
         return 0;
     }
@@ -52,12 +52,15 @@ pub fn pick(links: &Links, port: &Port, ring: &mut Window<'_>) -> u8 {
         let byte = ring.get(n);
         // The slot of a mark counts until the control task has acted on its character.
         closes &= byte >= MARKS || byte == GO || (byte == CUT && !flags::has(Event::Realtime));
-        if undecided && byte == b'{' && !within {
-            // A line that may select a dialect in which these bytes are text.
-            break;
-        }
-        if port.waits_for_question() && byte == ASKS && !within {
-            decide(links, port);
+        if undecided && !within {
+            if byte == b'{' {
+                // A line that may select a dialect in which these bytes are text.
+                break;
+            }
+            if byte == ASKS {
+                decide(links, port);
+                undecided = false;
+            }
         }
         // What is taken out of a line does not begin one.
         within = match byte {

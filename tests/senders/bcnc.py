@@ -3,14 +3,12 @@
 import sys
 import time
 
-from steps import ensure, main, session, step, until  # first: redirects what bCNC prints
+from steps import PLATE, ensure, main, session, step, until  # first: redirects what bCNC prints
 from bcnc_sender import Bcnc, VERSION
 
 PORT, JOB, CONTROLLER = sys.argv[1:]
 GRBL = CONTROLLER == "GRBL1"
 FAR = 40
-# The position of the plate when Z has been homed at its top.
-PLATE = -51.8
 
 bcnc = Bcnc(PORT, CONTROLLER)
 

@@ -2,12 +2,11 @@
 
 It sends a line, and waits for its `ok`, before it sends the next. Its own jobs begin with `$H`."""
 
-import importlib.metadata
 import sys
 import threading
 import time
 
-from steps import ensure, main, step, until, whole_session  # first: redirects what the library prints
+from steps import ensure, main, started, until, whole_session  # first: redirects what the library prints
 from gantrix.design.text import layout_text
 from gantrix.job import Job
 from gantrix.tools.laser import LaserTool
@@ -111,7 +110,7 @@ def finish():
 
 
 def test():
-    step("start", 10, lambda: f"gantrix {importlib.metadata.version('gantrix')}, Python {sys.version.split()[0]}")
+    started("gantrix")
     whole_session(
         connect=connect,
         home=home,

@@ -1,6 +1,5 @@
 """The program grblhud, operated by its keyboard: grbl-hud.py PORT JOB"""
 
-import importlib.metadata
 import os
 import pty
 import re
@@ -9,7 +8,7 @@ import sys
 import threading
 import time
 
-from steps import MANY, contact, ensure, kept, main, stands, step, until, whole_session
+from steps import MANY, contact, ensure, kept, main, stands, started, until, whole_session
 
 PORT, JOB = sys.argv[1:]
 FAR = 40
@@ -184,7 +183,7 @@ def finish():
 
 
 def test():
-    step("start", 10, lambda: f"grblhud {importlib.metadata.version('grblhud')}, Python {sys.version.split()[0]}")
+    started("grblhud")
     whole_session(
         connect=connect,
         settings=settings,

@@ -3,11 +3,10 @@
 It runs with its default protocol, one line after the other, because its other one, which counts characters, drops the
 lines that do not fit."""
 
-import importlib.metadata
 import sys
 import time
 
-from steps import ensure, kept, main, stands, step, until, whole_session  # first: redirects what the library prints
+from steps import ensure, kept, main, stands, started, until, whole_session  # first: redirects what the library prints
 import serial
 from grbl_link.interface import Grbl
 from grbl_link.messages import AlarmMessage, ErrorMessage, OKMessage, StatusMessage, WelcomeMessage
@@ -148,7 +147,7 @@ def finish():
 
 
 def test():
-    step("start", 10, lambda: f"grbl-link {importlib.metadata.version('grbl-link')}, Python {sys.version.split()[0]}")
+    started("grbl-link")
     whole_session(
         connect=connect,
         settings=settings,

@@ -1,16 +1,13 @@
 """The library grbl-streamer: grbl-streamer.py PORT JOB"""
 
-import importlib.metadata
 import sys
 import time
 
-from steps import ensure, main, session, step, until  # first: redirects what the library prints
+from steps import contact, ensure, main, session, started, until  # first: redirects what the library prints
 import grbl_streamer
 
 PORT, JOB = sys.argv[1:]
 FAR = 40
-# The position of the plate when Z has been homed at its top.
-PLATE = -51.8
 
 heard = []
 errors = []
@@ -171,10 +168,7 @@ def probe():
     said = hear()
     send(["G38.2 Z-70 F800"])
     # The library's own `$#` also lists the last contact, so a line without contact may come first.
-    result = until(lambda: said("[PRB:", ":1]"))
-    at = float(result.split(",")[2])
-    ensure(abs(at - PLATE) < 0.01, result)
-    return result
+    return contact(until(lambda: said("[PRB:", ":1]")))
 
 
 def stop():
@@ -231,8 +225,7 @@ def finish():
 
 
 def test():
-    version = importlib.metadata.version("grbl-streamer")
-    step("start", 10, lambda: f"grbl-streamer {version}, Python {sys.version.split()[0]}")
+    started("grbl-streamer")
     session(
         connect=connect,
         settings=settings,

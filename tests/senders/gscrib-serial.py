@@ -5,7 +5,7 @@ greet with `Grbl`."""
 
 import sys
 
-from steps import contact, ensure, main, step, whole_session  # first: redirects what the library prints
+from steps import contact, main, started, whole_session  # first: redirects what the library prints
 import no_images
 
 no_images.install()
@@ -101,7 +101,7 @@ def finish():
 
 
 def test():
-    step("start", 10, lambda: f"gscrib {gscrib.__version__}, Python {sys.version.split()[0]}")
+    started("gscrib")
     whole_session(
         connect=connect,
         settings=settings,

@@ -3,12 +3,11 @@
 It has one line in flight and gives up at each `Error:`. So lines of slicers that the board does not support must not be
 answered with an error."""
 
-import importlib.metadata
 import sys
 import threading
 import time
 
-from steps import ensure, main, step, until  # first: redirects what the library prints
+from steps import ensure, main, started, step, until  # first: redirects what the library prints
 import printing
 from marlin_host import MarlinHost, SerialTransport
 
@@ -127,8 +126,7 @@ def close():
 
 
 def test():
-    version = importlib.metadata.version("marlin-host")
-    step("start", 10, lambda: f"marlin-host {version}, Python {sys.version.split()[0]}")
+    started("marlin-host")
     step("connect", 30, connect)
     step("temperatures", 20, temperatures)
     step("settings", 20, lambda: printing.settings(ask))

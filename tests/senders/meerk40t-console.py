@@ -1,6 +1,5 @@
 """MeerK40t's console with its driver for grbl: meerk40t-console.py PORT JOB"""
 
-import importlib.metadata
 import os
 import re
 import subprocess
@@ -8,7 +7,7 @@ import sys
 import threading
 import time
 
-from steps import ensure, kept, main, stands, step, until, whole_session
+from steps import ensure, kept, main, stands, started, until, whole_session
 
 PORT, JOB = sys.argv[1:]
 FAR = 40
@@ -165,7 +164,7 @@ def finish():
 
 
 def test():
-    step("start", 10, lambda: f"MeerK40t {importlib.metadata.version('meerk40t')}, Python {sys.version.split()[0]}")
+    started("meerk40t")
     whole_session(
         connect=connect,
         settings=settings,

@@ -1,11 +1,10 @@
 """plotdeck's machine controller, without its window: plot-deck.py PORT JOB"""
 
-import importlib.metadata
 import sys
 import time
 
 # First, because it redirects what the library prints.
-from steps import MANY, PLATE, contact, ensure, kept, main, stands, step, until, whole_session
+from steps import MANY, PLATE, contact, ensure, kept, main, stands, started, until, whole_session
 from plotdeck.core.controller import MachineController
 from plotdeck.core.streamer import StreamerState
 
@@ -174,7 +173,7 @@ def finish():
 
 
 def test():
-    step("start", 10, lambda: f"plotdeck {importlib.metadata.version('plotdeck')}, Python {sys.version.split()[0]}")
+    started("plotdeck")
     whole_session(
         connect=connect,
         settings=settings,

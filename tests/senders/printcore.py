@@ -2,11 +2,10 @@
 
 The line to the simulated board damages one in a hundred of the lines with a number. Damaged lines are sent again."""
 
-import importlib.metadata
 import sys
 import time
 
-from steps import ensure, main, step, until  # first: redirects what the library prints
+from steps import ensure, main, started, step, until  # first: redirects what the library prints
 import printing
 from printrun.gcoder import LightGCode
 from printrun.printcore import printcore
@@ -136,8 +135,7 @@ def close():
 
 
 def test():
-    version = importlib.metadata.version("printrun")
-    step("start", 10, lambda: f"printrun {version}, Python {sys.version.split()[0]}")
+    started("printrun")
     step("connect", 30, connect)
     step("temperatures", 20, temperatures)
     step("settings", 20, lambda: printing.settings(ask))

@@ -1,12 +1,11 @@
 """The library pygrbl-streamer: pygrbl-streamer.py PORT JOB"""
 
-import importlib.metadata
 import sys
 import threading
 import time
 
 # First, because it redirects what the library prints.
-from steps import MANY, contact, ensure, kept, main, stands, step, until, whole_session
+from steps import MANY, contact, ensure, kept, main, stands, started, until, whole_session
 from pygrbl_streamer import GrblStreamer, State
 
 PORT, JOB = sys.argv[1:]
@@ -148,8 +147,7 @@ def finish():
 
 
 def test():
-    version = importlib.metadata.version("pygrbl-streamer")
-    step("start", 10, lambda: f"pygrbl-streamer {version}, Python {sys.version.split()[0]}")
+    started("pygrbl-streamer")
     whole_session(
         connect=connect,
         settings=settings,

@@ -1,6 +1,7 @@
 """The steps of a test of a sender in Python. They are reported as in `steps.js`, a line each: `step`, `passed`, `failed`
 or `not offered`, the name and details, separated by tabs."""
 
+import importlib.metadata
 import os
 import sys
 import threading
@@ -39,6 +40,11 @@ def step(name, seconds, run):
         leave(1)
     watchdog.cancel()
     tell("passed", name, details)
+
+
+def started(package):
+    """Reports which version of the sender is tested. A sender that is not installed fails here."""
+    step("start", 10, lambda: f"{package} {importlib.metadata.version(package)}, Python {sys.version.split()[0]}")
 
 
 def until(condition):

@@ -7,7 +7,7 @@ import re
 import sys
 import time
 
-from steps import ensure, main, step, whole_session
+from steps import ensure, main, started, whole_session
 import serial
 
 PORT, JOB = sys.argv[1:]
@@ -64,7 +64,7 @@ def finish():
 
 
 def test():
-    step("start", 10, lambda: f"pyserial {serial.__version__}, Python {sys.version.split()[0]}")
+    started("pyserial")
     whole_session(connect=connect, close=close, start=start, finish=finish)
 
 

@@ -27,7 +27,7 @@ pub fn with<T: Send + 'static>(
     })
 }
 
-/// The same, with a machine whose dialect is undecided.
+/// Does something with a machine that has these EEPROM contents and has been sent nothing, in a thread of its own.
 pub fn with_open<T: Send + 'static>(
     contents: impl AsRef<[u8]>,
     run: impl FnOnce(&mut Sender) -> T + Send + 'static,

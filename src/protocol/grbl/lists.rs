@@ -134,8 +134,8 @@ pub fn modes(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Option<u
 }
 
 /// Writes part `at` of `$I`, the identity of the machine. The option letters stand for a variable spindle, line
-/// numbers, mist, homing that sets the position at the switch by its own settings (Z), homing of single axes, a lathe's codes (X1), and overrides in probing. The free blocks and bytes
-/// follow. Returns the next part; `None` after the last.
+/// numbers, mist, homing of single axes, a lathe's codes (X1), and overrides in probing. Z tells senders that homing
+/// sets the origin at the switch. The free blocks and bytes follow. Returns the next part; `None` after the last.
 #[inline(never)]
 #[small]
 pub fn build(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Option<u8> {

@@ -12,7 +12,7 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use object::{Object, ObjectSymbol, SymbolKind};
 
 use super::link::Link;
@@ -56,23 +56,18 @@ pub fn link(link: &Link, program: &Program, elf: &Path, chip: &Chip) -> Result<(
     if layout.code.at(CALLED - 2).or(layout.code.at(CALLED - 4)).is_none() {
         return Ok(());
     }
-    let mut tried = bail_without_place();
+    let mut failure = anyhow!("no function can have the jump at 0x20000");
     for place in layout.candidates(program).into_iter().take(PLACES) {
-        tried = settle(link, program, place, elf, chip);
-        if tried.is_ok() {
-            break;
+        match settle(link, program, place, elf, chip) {
+            Ok(()) => return Ok(()),
+            Err(error) => failure = error,
         }
     }
-    tried
-}
-
-fn bail_without_place() -> Result<()> {
-    bail!("no function can have the jump at 0x20000")
+    Err(failure)
 }
 
 /// Links a program with the jump at a place, and corrects the place until the jump is at the address.
-fn settle(link: &Link, program: &Program, place: Place, elf: &Path, chip: &Chip) -> Result<()> {
-    let mut place = place;
+fn settle(link: &Link, program: &Program, mut place: Place, elf: &Path, chip: &Chip) -> Result<()> {
     for _ in 0..TRIES {
         link.image(&with_jump(program, &place).text(), elf, chip)?;
         let Some(found) = nearest_jump(&Code::load(elf)?) else { bail!("the jump is lost") };
