@@ -21,6 +21,9 @@ const APART: u64 = 4;
 /// rounded differently. Where one of them falls into the next clock of the timer that measures them, its time differs by
 /// 4 us, and the axes follow another speed. One cycle has been measured with one image, 794 with the next.
 const APART_IN_THREADS: u64 = 1_600;
+/// The longest difference between the times when the test sees the machine at rest, cycles: a millisecond. The test asks, and
+/// the byte that answers may leave one simulator an instruction later than the other. Where the last step was is held above.
+const APART_AT_REST: u64 = 16_000;
 /// Cycles in a microsecond.
 const US: u64 = 16;
 /// Longest time from the edge of a limit switch to the last step, at 50,000 steps a second (docs/safety.md, A1), us.
@@ -191,13 +194,22 @@ fn play(board: &mut impl Bench, script: &Script) -> Told {
     rest(board, &mut host);
     told.ended = board.cycle();
     let answered = host.take_answered().into_iter().filter(|line| line.number != POLL);
-    told.answers = answered.map(|line| (line.text, line.response.raw)).collect();
+    told.answers = answered.map(|line| (line.text, told_alike(line.response.raw))).collect();
     told.others = host.take_reports().iter().map(ToString::to_string).collect();
     told.others.extend(host.strays().iter().cloned());
     (told.steps, told.totals) = board.counted();
     told.times = board.recorded();
     assert_eq!(board.bitten(), 0, "the watchdog has bitten");
     told
+}
+
+/// Returns an answer without its number of free blocks: a block may end just before the answer in one simulator, and just
+/// behind it in the other.
+fn told_alike(answer: String) -> String {
+    match answer.rsplit_once(',') {
+        Some((told, _)) if answer.contains("\"f\":[") => told.into(),
+        _ => answer,
+    }
 }
 
 /// Runs until the machine says twice that nothing moves.
@@ -240,7 +252,7 @@ fn agree(name: &str, first: &Told, second: &Told, most: u64) {
         (second.ended - second.began) as f64 / 16e6
     );
     assert!(apart <= most, "{name}: steps {apart} cycles apart");
-    assert!(ends <= most, "{name}: ends {ends} cycles apart");
+    assert!(ends <= APART_AT_REST, "{name}: ends {ends} cycles apart");
 }
 
 /// The bracket: each part of it, such as a hole, begins with a comment. Without `KERF_LONG=1` every third part.
