@@ -64,8 +64,22 @@ impl Filling {
         let _ = either!(self, ring => ring.push(byte));
     }
 
-    fn push_all(&mut self, bytes: impl Iterator<Item = u8>) {
-        either!(self, ring => ring.push_all(bytes));
+    /// Queues bytes, as many as there is room for.
+    fn push_run(&mut self, mut bytes: &[u8]) {
+        loop {
+            let count = either!(self, ring => ring.fill(|vacant| {
+                let count = vacant.len().min(bytes.len());
+                match (vacant.get_mut(..count), bytes.get(..count)) {
+                    (Some(vacant), Some(now)) => vacant.write_copy_of_slice(now),
+                    _ => &mut [],
+                }
+            }));
+            bytes = bytes.get(usize::from(count)..).unwrap_or_default();
+            // Once more if the vacant slots lie at both ends of the ring.
+            if count == 0 || bytes.is_empty() {
+                return;
+            }
+        }
     }
 
     fn newest(&self) -> u8 {
@@ -79,6 +93,22 @@ impl Filling {
         }
     }
 
+    /// Marks the loss of bytes. Returns how many lines have ended in them.
+    fn lose(&mut self, bytes: &[u8]) -> u16 {
+        let mut ends = 0;
+        if bytes.is_empty() {
+            return ends;
+        }
+        let mut newest = if self.is_full() { mark(self.newest()) } else { 0 };
+        for byte in bytes {
+            let (mark, is_end) = lose(newest, *byte);
+            newest = mark;
+            ends += u16::from(is_end);
+        }
+        self.mark(newest);
+        ends
+    }
+
     /// Puts a mark where there is room, else replaces the newest byte by it.
     fn mark(&mut self, mark: u8) {
         // SAFETY: the reader has a view of the ring.
@@ -88,10 +118,52 @@ impl Filling {
     }
 }
 
-/// Bytes of a packet that are handled at once with interrupts off, which takes some microseconds.
-const AT_ONCE: usize = 32;
-/// Like [`AT_ONCE`], for bytes that are looked at one by one.
-const ONE_BY_ONE: usize = 8;
+/// The bytes of a packet that wait for room in the ring. The next packet is read only when none waits, so they never lie
+/// across the end of the array.
+struct Behind {
+    bytes: [u8; PACKET],
+    /// The first byte that waits, and the end of the last.
+    from: usize,
+    to: usize,
+}
+
+impl Behind {
+    const fn new() -> Self {
+        Self { bytes: [0; PACKET], from: 0, to: 0 }
+    }
+
+    fn waiting(&self) -> &[u8] {
+        self.bytes.get(self.from..self.to).unwrap_or_default()
+    }
+
+    fn is_empty(&self) -> bool {
+        self.from == self.to
+    }
+
+    /// Adds bytes. All bytes of one packet have room.
+    fn add(&mut self, bytes: &[u8]) {
+        if self.is_empty() {
+            (self.from, self.to) = (0, 0);
+        }
+        let to = self.to + bytes.len();
+        if let Some(vacant) = self.bytes.get_mut(self.to..to) {
+            vacant.copy_from_slice(bytes);
+            self.to = to;
+        }
+    }
+
+    /// Drops the first bytes.
+    fn drop_first(&mut self, count: usize) {
+        self.from = (self.from + count).min(self.to);
+    }
+}
+
+/// Bytes of a packet that are queued at once with interrupts off, in 3 us. A limit switch waits for them.
+const AT_ONCE: usize = 8;
+/// Like [`AT_ONCE`], for bytes that are looked at one by one: 150 cycles each.
+const ONE_BY_ONE: usize = 2;
+/// Like [`AT_ONCE`], for bytes to send: 30 cycles each.
+const SENT_AT_ONCE: usize = 8;
 /// How many sums of override requests are kept: more than a packet of 64 bytes can fill.
 const ASKED: usize = 8;
 /// Percent beyond which one more character might not fit.
@@ -127,7 +199,7 @@ struct Line {
     /// Whether `!`, `~`, `%` and bytes above 0x7F are text.
     plain: bool,
     /// Of USB: bytes that the receive ring had no room for.
-    behind: Deque<u8, PACKET>,
+    behind: Behind,
 }
 
 impl Line {
@@ -149,7 +221,7 @@ impl Line {
             rate: baud::DEFAULT,
             heard_at: 0,
             plain: false,
-            behind: Deque::new(),
+            behind: Behind::new(),
         }
     }
 }
@@ -326,10 +398,19 @@ impl Line {
     /// Marks the loss of a byte.
     fn lose(&mut self, byte: u8) {
         let Some(ring) = self.rx.as_mut() else { return };
-        let begun = if ring.is_full() { mark(ring.newest()) } else { 0 };
-        let (mark, is_end) = lose(begun, byte);
-        ring.mark(mark);
-        self.lost_ends = self.lost_ends.wrapping_add(is_end.into());
+        self.lost_ends = self.lost_ends.wrapping_add(ring.lose(&[byte]));
+        flags::set(Event::Received);
+    }
+
+    /// Queues the bytes that wait, or marks the loss of those that have no room.
+    fn queue_waiting(&mut self) {
+        let Some(ring) = self.rx.as_mut() else { return };
+        let waiting = self.behind.waiting();
+        let (now, lost) = waiting.split_at(ring.free().min(waiting.len()));
+        ring.push_run(now);
+        self.lost_ends = self.lost_ends.wrapping_add(ring.lose(lost));
+        self.queued = self.queued.wrapping_add(now.len() as u8);
+        self.behind.drop_first(PACKET);
         flags::set(Event::Received);
     }
 
@@ -406,47 +487,45 @@ impl Line {
             Came::Nothing => {}
             Came::Mark(GO) if waits => self.realtime |= realtime::UNPLACED,
             Came::Mark(mark) => {
-                while let Some(byte) = self.behind.pop_front() {
-                    self.queue(byte, true);
-                }
+                self.queue_waiting();
                 self.place(mark);
             }
             Came::Text if waits => {
                 self.last = byte;
                 // There is room for a packet: the next one is read only after the last one has been queued.
-                let _ = self.behind.push_back(byte);
+                self.behind.add(&[if byte < MARKS { STRAY } else { byte }]);
             }
             Came::Text => self.queue(byte, true),
         }
     }
 
-    /// Handles a run of text that has come by USB, in which no byte acts. Returns its length. Cost: 20 cycles a byte.
-    fn bring_text(&mut self, bytes: &[u8]) -> usize {
-        let count = bytes.iter().take_while(|byte| is_text(**byte)).count();
-        let text = bytes.get(..count).unwrap_or_default();
-        let (Some(last), Some(ring)) = (text.last(), self.rx.as_mut()) else { return 0 };
+    /// Queues text that has come by USB, in which no byte acts.
+    fn bring_text(&mut self, text: &[u8]) {
+        let (Some(last), Some(ring)) = (text.last(), self.rx.as_mut()) else { return };
         (self.heard_at, self.last) = (time::millis(), *last);
-        let room = if self.behind.is_empty() { ring.free().min(count) } else { 0 };
+        let room = if self.behind.is_empty() { ring.free().min(text.len()) } else { 0 };
         let (now, later) = text.split_at(room);
-        ring.push_all(now.iter().copied());
+        ring.push_run(now);
         self.queued = self.queued.wrapping_add(room as u8);
         // There is room for a packet: the next one is read only after the last one has been queued.
-        self.behind.extend(later.iter().copied().take(PACKET - self.behind.len()));
+        self.behind.add(later);
         flags::set(Event::Received);
-        count
     }
 
-    /// Queues some of the bytes that wait, as far as there is room. Returns whether the last one was among them.
-    fn go_on(&mut self) -> bool {
-        let Some(ring) = self.rx.as_mut() else { return false };
-        let count = ring.free().min(AT_ONCE).min(self.behind.len());
-        let cleaned = |byte| if byte < MARKS { STRAY } else { byte };
-        ring.push_all((0..count).map_while(|_| self.behind.pop_front()).map(cleaned));
-        self.queued = self.queued.wrapping_add(count as u8);
-        if count > 0 {
-            flags::set(Event::Received);
+    /// Queues some of the bytes that wait, as far as there is room. Returns whether others wait; `None` if none was
+    /// queued.
+    fn go_on(&mut self) -> Option<bool> {
+        let ring = self.rx.as_mut()?;
+        let waiting = self.behind.waiting();
+        let count = ring.free().min(AT_ONCE).min(waiting.len());
+        if count == 0 {
+            return None;
         }
-        count > 0 && self.behind.is_empty()
+        ring.push_run(waiting.get(..count).unwrap_or_default());
+        self.behind.drop_first(count);
+        self.queued = self.queued.wrapping_add(count as u8);
+        flags::set(Event::Received);
+        Some(!self.behind.is_empty())
     }
 
     /// Takes the next bytes to send that are contiguous in the ring. Returns how many; 0 also if a byte is to be sent
@@ -538,24 +617,26 @@ pub fn set_plain(port: u8, plain: bool) {
 pub(super) fn bring(packet: &[u8]) -> bool {
     let mut left = packet;
     while !left.is_empty() {
-        let head = left.get(..AT_ONCE).unwrap_or(left);
-        let mut count = with(USB, |line| line.bring_text(head));
-        if count == 0 {
-            let few = left.get(..ONE_BY_ONE).unwrap_or(left);
-            let some = few.iter().position(|byte| is_text(*byte)).unwrap_or(few.len()).max(1);
-            let few = few.get(..some).unwrap_or(few);
-            with(USB, |line| few.iter().for_each(|byte| line.bring(*byte)));
-            count = few.len();
-        }
-        left = left.get(count..).unwrap_or_default();
+        let text = left.iter().take(AT_ONCE).take_while(|byte| is_text(**byte)).count();
+        let others = left.iter().take(ONE_BY_ONE).take_while(|byte| !is_text(**byte)).count();
+        let (now, later) = left.split_at(text.max(others));
+        with(USB, |line| match text {
+            0 => now.iter().for_each(|byte| line.bring(*byte)),
+            _ => line.bring_text(now),
+        });
+        left = later;
     }
     with(USB, |line| line.behind.is_empty())
 }
 
 /// Queues bytes that have come by USB when there was no room. Thread mode, each turn.
 pub fn go_on() {
-    if with(USB, Line::go_on) {
-        usb::ROOM.signal(());
+    for _ in 0..PACKET / AT_ONCE {
+        match with(USB, Line::go_on) {
+            Some(true) => {}
+            Some(false) => return usb::ROOM.signal(()),
+            None => return,
+        }
     }
 }
 
@@ -578,7 +659,7 @@ pub fn take_closed() -> bool {
 pub(super) fn take(packet: &mut [u8]) -> usize {
     let mut count = 0;
     while let Some(to) = packet.get_mut(count..).filter(|to| !to.is_empty()) {
-        let most = to.len().min(AT_ONCE);
+        let most = to.len().min(SENT_AT_ONCE);
         let to = to.get_mut(..most).unwrap_or_default();
         let taken = with(USB, |line| match line.take_run(to) {
             0 => to.iter_mut().map_while(|byte| line.next().map(|next| *byte = next)).count(),

@@ -2,7 +2,7 @@
 //
 // `quicken` returns a function that runs instructions until so many cycles have passed or one comes that is not for it, and says how many cycles it
 // took. Memory, registers and flags alone change meanwhile: whoever calls looks at the clock, the PIO and interrupts between two sprints. An instruction
-// takes the cycles that it takes in rp2040js; `cures.test.mjs` holds each against it.
+// takes the cycles that it takes in rp2040js, and what it waits for flash; `cures.test.mjs` holds each against it.
 
 const RAM = 0x20000000;
 // The highest byte of addresses in flash.
@@ -44,7 +44,7 @@ for (const [number, bits] of ROWS) {
 // How many bits are set in a byte.
 const COUNT = Uint8Array.from({ length: 256 }, (_, byte) => [...byte.toString(2)].filter((bit) => bit === '1').length);
 
-export function quicken(mcu) {
+export function quicken(mcu, cache) {
   const { core } = mcu;
   const view = (bytes, View) => new View(bytes.buffer, bytes.byteOffset, bytes.length / View.BYTES_PER_ELEMENT);
   const r = new Int32Array(core.registers.buffer, core.registers.byteOffset, 16);
@@ -56,9 +56,11 @@ export function quicken(mcu) {
   const isRam = (at, mask) => (at - RAM) >>> 0 < bytes && (at & mask) === 0;
   const isMemory = (at, mask) => ((at - RAM) >>> 0 < bytes || at >>> 24 === FLASH) && (at & mask) === 0;
   const isFlash = (at) => at >>> 24 === FLASH;
-  const load32 = (at) => (isFlash(at) ? flash32[(at & 0xffffff) >> 2] : ram32[(at - RAM) >> 2]);
-  const load16 = (at) => (isFlash(at) ? flash16[(at & 0xffffff) >> 1] : ram16[(at - RAM) >> 1]);
-  const load8 = (at) => (isFlash(at) ? flash8[at & 0xffffff] : ram8[at - RAM]);
+  // Cycles that the present instruction waits for flash.
+  let waits = 0;
+  const load32 = (at) => (isFlash(at) ? (waits += cache.touch(at), flash32[(at & 0xffffff) >> 2]) : ram32[(at - RAM) >> 2]);
+  const load16 = (at) => (isFlash(at) ? (waits += cache.touch(at), flash16[(at & 0xffffff) >> 1]) : ram16[(at - RAM) >> 1]);
+  const load8 = (at) => (isFlash(at) ? (waits += cache.touch(at), flash8[at & 0xffffff]) : ram8[at - RAM]);
 
   return (limit) => {
     let { N: n, Z: z, C: c, V: v } = core;
@@ -66,7 +68,7 @@ export function quicken(mcu) {
     let spent = 0;
     sprint: while (spent < limit) {
       let op;
-      if (isFlash(pc)) op = flash16[(pc & 0xffffff) >> 1];
+      if (isFlash(pc)) op = load16(pc);
       else if ((pc - RAM) >>> 0 < bytes) op = ram16[(pc - RAM) >> 1];
       else break;
       let cycles = 1;
@@ -332,7 +334,7 @@ export function quicken(mcu) {
         }
         case 64: next = pc + 4 + ((op << 21 >> 21) << 1); cycles = 2; break; // B
         case 65: { // BL
-          const low = isFlash(next) ? flash16[(next & 0xffffff) >> 1] : ram16[(next - RAM) >> 1];
+          const low = load16(next);
           if ((low & 0xd000) !== 0xd000) break sprint;
           const sign = op >> 10 & 1;
           const i1 = 1 ^ low >> 13 & 1 ^ sign;
@@ -345,8 +347,12 @@ export function quicken(mcu) {
         default: break sprint;
       }
       pc = next;
-      spent += cycles;
+      spent += cycles + waits;
+      waits = 0;
     }
+    // An instruction that is left to others has waited all the same.
+    spent += waits;
+    waits = 0;
     r[PC] = pc;
     core.N = n; core.Z = z; core.C = c; core.V = v;
     core.cycles += spent;

@@ -2,14 +2,15 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { CLOCK_HZ, Machine } from './machine.mjs';
+import { Cache } from './xip.mjs';
 import { Motors, Spindle } from './pins.mjs';
 
 const RAM_END = 0x20042000;
 const CODE = 0x200;
 const HANDLER = 0x300;
 
-// A machine that runs Thumb code, with another one for all interrupts.
-function machine(code, handler = [0x4770]) {
+// A machine that runs Thumb code, with another one for all interrupts. Flash is free, if nothing else is said.
+function machine(code, handler = [0x4770], miss = 0) {
   return new Machine(undefined, (flash) => {
     const words = new DataView(flash.buffer, flash.byteOffset);
     const vectors = 0x100;
@@ -17,7 +18,7 @@ function machine(code, handler = [0x4770]) {
     for (let i = 1; i < 48; i++) words.setUint32(vectors + 4 * i, 0x10000000 + (i === 1 ? CODE : HANDLER) | 1, true);
     code.forEach((op, i) => words.setUint16(CODE + 2 * i, op, true));
     handler.forEach((op, i) => words.setUint16(HANDLER + 2 * i, op, true));
-  });
+  }, new Cache(miss));
 }
 
 const LOOP = [0xe7fe]; // b .
@@ -363,4 +364,40 @@ test('the sensors of a spindle see their marks at its speed', () => {
   m.spindle.turn(-300);
   m.run(CLOCK_HZ);
   assert.deepEqual([falls(5).length, falls(6).length], [8, 30]);
+});
+
+test('a line of flash costs its price once, until two others of its set have been read', () => {
+  const cache = new Cache(50);
+  const [a, b, c] = [0x10000000, 0x10002000, 0x10004000];
+  const costs = (at) => cache.touch(at);
+  assert.deepEqual([a, a + 4, a + 7, a + 8].map(costs), [50, 0, 0, 50]);
+  assert.deepEqual([b, a, b, a].map(costs), [50, 0, 0, 0]);
+  // The one that was used least recently goes.
+  assert.deepEqual([c, a, b].map(costs), [50, 0, 50]);
+  cache.flush();
+  assert.deepEqual([a, b].map(costs), [50, 50]);
+  assert.equal(cache.waited, 350);
+});
+
+test('code in flash waits for its lines, and for numbers there', () => {
+  // Twice around four instructions in a line: only the first time waits. ldr r0, [pc] reads the next line.
+  const spent = (code, miss) => { const m = machine(code, undefined, miss); m.run(1); return (n) => { m.run(n); return m.cache.waited; }; };
+  assert.equal(spent([0xbf00, 0xbf00, 0xbf00, 0xe7fb], 50)(1000), 50);
+  assert.equal(spent([0x4801, 0xbf00, 0xbf00, 0xe7fb, 0x1234, 0x5678], 50)(1000), 100);
+  assert.equal(spent([0xbf00, 0xbf00, 0xbf00, 0xe7fb], 0)(1000), 0);
+});
+
+test('an alarm of the timer goes off when the count is its value', () => {
+  const m = machine(SLEEP);
+  m.run(77);
+  const { core } = m.mcu;
+  let seen;
+  const enter = core.exceptionEntry;
+  core.exceptionEntry = (n) => { seen ??= m.mcu.readUint32(0x40054028); enter(n); };
+  core.enabledInterrupts = 1;
+  m.mcu.writeUint32(0x40054038, 1);
+  const due = m.mcu.readUint32(0x40054028) + 10;
+  m.mcu.writeUint32(0x40054010, due);
+  m.run(128 * 20);
+  assert.equal(seen, due);
 });

@@ -8,6 +8,7 @@ import { Pio } from './pio.mjs';
 import { bootRom } from './rom.mjs';
 import { Uart } from './uart.mjs';
 import { Computer, Usb } from './usb.mjs';
+import { Cache } from './xip.mjs';
 
 // The system clock of Kerf's image.
 export const CLOCK_HZ = 128e6;
@@ -21,6 +22,8 @@ const EXIT = 11;
 // The CPU runs for so many cycles at most before others are looked at.
 const SPRINT = 10_000;
 const WATCHDOG = 0x40058;
+const TIMER = 0x40054;
+const ALARM0 = 0x10;
 // Ends whose rates differ by more do not understand each other.
 const GARBLES = 0.045;
 // Bits of a frame: start, eight, stop.
@@ -31,10 +34,33 @@ const USB = 0x50110;
 export const USB_PORT = 2;
 const UARTS = [[0x40034, 'UART0', 20], [0x40038, 'UART1', 21]];
 
-// XIP_CTRL, which rp2040js lacks: never streaming.
+const XIP_FLUSH = 4;
+
+// XIP_CTRL, which rp2040js lacks: never streaming. What is written to one register empties the cache.
 class XipControl extends BasePeripheral {
+  constructor(mcu, name, cache) {
+    super(mcu, name);
+    this.cache = cache;
+  }
   readUint32() { return 0; }
-  writeUint32() {}
+  writeUint32(offset) { if (offset === XIP_FLUSH) this.cache.flush(); }
+}
+
+// An alarm of the timer goes off when the count becomes its value; that of rp2040js up to a microsecond before, so that who looks at the count then sees
+// that it is not due.
+function goOffInTime({ clock, peripherals }) {
+  const timer = peripherals[TIMER];
+  const write = timer.writeUint32.bind(timer);
+  timer.writeUint32 = (offset, value) => {
+    if (offset < ALARM0 || offset >= ALARM0 + 4 * timer.alarms.length) return write(offset, value);
+    const alarm = timer.alarms[(offset - ALARM0) / 4];
+    const now = clock.nanos / 1000;
+    const whole = Math.floor(now);
+    const left = ((value - whole) >>> 0) || 2 ** 32;
+    alarm.armed = true;
+    alarm.targetMicros = value;
+    alarm.clockAlarm.schedule((left - (now - whole)) * 1000);
+  };
 }
 
 // A sender: bytes that are under way to a port, one behind the other.
@@ -98,8 +124,9 @@ function symbol(elf, part) {
 
 export class Machine {
   // With an ELF in its flash, or what `load` puts there.
-  constructor(elf, load = (flash) => loadElf(readFileSync(elf), flash)) {
+  constructor(elf, load = (flash) => loadElf(readFileSync(elf), flash), cache = new Cache()) {
     this.load = load;
+    this.cache = cache;
     this.cycle = 0;
     this.edgeListeners = [];
     this.byteListeners = [];
@@ -118,6 +145,8 @@ export class Machine {
     // Bytes that have been heard.
     this.said = 0;
     this.asleep = 0;
+    // For how many cycles interrupts were off at most, and where that ended.
+    this.masked = { cycles: 0, pc: 0 };
     // Cycles of each exception's handler by itself, by its number; 0 is thread mode.
     this.spent = new Array(48).fill(0);
     this.boot();
@@ -157,7 +186,8 @@ export class Machine {
     const mcu = new RP2040();
     this.mcu = mcu;
     mcu.logger = new ConsoleLogger(LogLevel.Error, true);
-    mcu.peripherals[0x14000] = new XipControl(mcu, 'XIP_CTRL');
+    this.cache.flush();
+    mcu.peripherals[0x14000] = new XipControl(mcu, 'XIP_CTRL', this.cache);
     mcu.loadBootrom(bootRom());
     if (sram) mcu.sram.set(sram);
     if (before) mcu.flash.set(before.flash);
@@ -183,9 +213,10 @@ export class Machine {
       pin.addListener((state) => this.changed(gpio, state));
       pin.setInputValue(this.inputs.get(gpio) ?? true);
     }
+    goOffInTime(mcu);
     this.endAborts();
     this.timeInterrupts();
-    this.sprint = quicken(mcu);
+    this.sprint = quicken(mcu, this.cache);
     mcu.core.VTOR = VECTORS;
     mcu.core.reset();
     mcu.core.PC = (mcu.core.PC & ~1) >>> 0;
@@ -294,6 +325,22 @@ export class Machine {
     return Math.ceil(Math.min(due - cycle, alarm));
   }
 
+  // One instruction by the core of rp2040js: all that mask interrupts are among those.
+  single() {
+    const { core } = this.mcu;
+    const waits = core.PC >>> 24 === FLASH >>> 24 ? this.cache.touch(core.PC) : 0;
+    const [wasMasked, pc] = [core.PM, core.PC];
+    const spent = waits + core.executeInstruction();
+    if (core.PM && !wasMasked) this.maskedAt = this.cycle;
+    if (!core.PM && wasMasked) this.unmask(this.cycle + spent - this.maskedAt, pc);
+    return spent;
+  }
+
+  // Interrupts were off for so many cycles, up to this instruction.
+  unmask(cycles, pc) {
+    if (cycles > this.masked.cycles) this.masked = { cycles, pc };
+  }
+
   // Sleeps until something is due, or runs up to there.
   step(end) {
     const { mcu } = this;
@@ -310,7 +357,7 @@ export class Machine {
     } else {
       if (core.interruptsUpdated) core.checkForInterrupts();
       const level = core.IPSR;
-      spent = this.sprint(Math.min(this.untilDue(end), SPRINT)) || core.executeInstruction();
+      spent = this.sprint(Math.min(this.untilDue(end), SPRINT)) || this.single();
       spent += this.extra;
       this.extra = 0;
       this.spent[level] += spent;

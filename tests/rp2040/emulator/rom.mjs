@@ -7,6 +7,7 @@ const NOP = 0x140;
 const ERASE = 0x150;
 const PROGRAM = 0x180;
 const COPY = 0x1a0;
+const FLUSH = 0x1c0;
 const FUNCTIONS = 0x200;
 const DATA = 0x280;
 
@@ -58,8 +59,15 @@ export function bootRom() {
   ]);
   // r0 to, r1 from, r2 count: a word each, from the last one on.
   put(COPY, [0x3a04, 0x588b, 0x5083, 0x2a00, 0xd1fa, 0x4770]);
+  put(FLUSH, [
+    0x2014, // movs r0, #0x14
+    0x0600, // lsls r0, r0, #24
+    0x2101, // movs r1, #1
+    0x6041, // str r1, [r0, #4]
+    0x4770, // bx lr
+  ]);
   const code = (name) => name.charCodeAt(0) | name.charCodeAt(1) << 8;
-  const functions = { IF: NOP, EX: NOP, FC: NOP, CX: NOP, RE: ERASE, RP: PROGRAM, MC: COPY, C4: COPY };
+  const functions = { IF: NOP, EX: NOP, FC: FLUSH, CX: NOP, RE: ERASE, RP: PROGRAM, MC: COPY, C4: COPY };
   put(FUNCTIONS, [...Object.entries(functions).flatMap(([name, at]) => [code(name), at | 1]), 0, 0]);
   put(DATA, [0, 0]);
   return new Uint32Array(rom.buffer);

@@ -11,7 +11,7 @@ use kerf_sim::emulated::{Emulated, Near, job};
 use kerf_sim::job::{Options, lines_of};
 use kerf_sim::{AUX, Host, LINES_IN_FLIGHT, Runs, USB};
 
-use crate::common::share::share_of;
+use crate::common::share::{is_long, share_of};
 use crate::common::{image, kerf_sim};
 use crate::side::Side;
 use crate::transcript::{self, Transcript};
@@ -316,36 +316,88 @@ fn an_skr_pico_heats() {
 }
 
 /// Longest time from the edge of a limit switch to the last step, us: two samples, the entry of the interrupt, which
-/// may find others, and the step under way. Of edges at 1,067 moments of a millisecond three took longer than 10 us,
-/// 11.2 at most: there the interrupt waits for another one, and the step under way has just begun.
+/// may find others, and the step under way.
 const STOP_US: f64 = 12.0;
 
-#[test]
-#[ignore = "needs the emulator, which `cargo xtask test` installs"]
-fn a_limit_stops_at_once_and_steps_are_counted() {
-    for wait_us in [0, 3, 7, 10, 11, 15, 19, 23, 27, 31, 170, 411, 772, 783] {
-        let (mut board, mut host) = booted();
-        for line in ["{x:{vm:2340,jm:1e5,ac:2000},y:{vm:2340,jm:1e5,ac:2000},sv:0}", "{xsn:2}"] {
-            set(&mut board, &mut host, line);
+/// Moments of the edge in a millisecond, us. `KERF_LONG=1` tries 300.
+fn moments() -> Vec<u64> {
+    match is_long() {
+        true => (0..900).step_by(3).collect(),
+        false => vec![0, 3, 7, 10, 11, 15, 19, 23, 27, 31, 170, 411, 772, 783],
+    }
+}
+
+/// A board whose X switch is a limit, and moves of 60 and 40 mm as one line or as lines of 0.05 mm.
+fn stops_at_once(is_streamed: bool) {
+    let mut slowest = 0.0_f64;
+    let (mut board, mut host) = booted();
+    for line in ["{x:{vm:2340,jm:1e5,ac:2000},y:{vm:2340,jm:1e5,ac:2000},sv:0}", "{xsn:2}"] {
+        set(&mut board, &mut host, line);
+    }
+    for wait_us in moments() {
+        if is_streamed {
+            let lines = (1..=1_200).map(|n| {
+                let at = f64::from(n) * 0.05;
+                format!("g1 f2340 x{at:.3} y{:.3}\n", at * 2.0 / 3.0)
+            });
+            board.send_to(USB, lines.collect::<String>().as_bytes());
+        } else {
+            board.send_to(USB, b"g0 x60 y40\n");
         }
-        set(&mut board, &mut host, "g0 x60 y40");
-        host.run_for_ms(&mut board, 200).unwrap();
+        board.run_for_ms(200).unwrap();
         let until = board.cycle() + wait_us * 128;
         host.run_until(&mut board, until).unwrap();
         let edge = board.cycle();
         board.drive(PICO_CNC.inputs[0].unwrap(), false);
-        host.run_for_ms(&mut board, 100).unwrap();
+        board.run_for_ms(100).unwrap();
         let after = board.last_step().unwrap().saturating_sub(edge) as f64 / 128.0;
-        println!("{after:.1} us, {:?}", Emulated::steps(&board));
-        assert!(after <= STOP_US, "{after} us");
+        slowest = slowest.max(after);
+        assert!(after <= STOP_US, "{after} us, {wait_us} us behind a millisecond");
         board.drive(PICO_CNC.inputs[0].unwrap(), true);
-        host.run_for_ms(&mut board, 100).unwrap();
+        // What was sent comes to its end: it is refused.
+        board.run_for_ms(700).unwrap();
+        board.receive_from(USB);
         set(&mut board, &mut host, "{clear:1}");
         assert_counted(&mut board, &mut host);
         set(&mut board, &mut host, "g0 x0 y0");
-        host.run_for_ms(&mut board, 3_000).unwrap();
+        host.run_for_ms(&mut board, 600).unwrap();
         assert_eq!(Emulated::steps(&board), [0; 4], "back from where it stood");
     }
+    println!("{slowest:.1} us");
+}
+
+#[test]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
+fn a_limit_stops_at_once_and_steps_are_counted() {
+    stops_at_once(false);
+}
+
+#[test]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
+fn a_limit_stops_as_soon_while_lines_are_streamed() {
+    stops_at_once(true);
+}
+
+/// The longest time for which interrupts are off, us. Switches, steps and bytes wait for as long.
+const MASKED_US: f64 = 5.0;
+
+#[test]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
+fn interrupts_are_never_off_for_long() {
+    let (mut board, mut host) = booted();
+    set(&mut board, &mut host, "{x:{vm:20000,fr:20000,ac:3000},si:50}");
+    board.forget_masked();
+    let lines = (1..=1_500).map(|n| format!("g1 f20000 x{:.2}\n", f64::from(n) * 0.05));
+    board.send_to(USB, lines.collect::<String>().as_bytes());
+    board.run_for_ms(100).unwrap();
+    // Bytes that act, within lines and between them, and what does not fit.
+    for bytes in [&b"!"[..], b"~", b"{fb:n}\n$$\n", b"\x91\x90\x05", &[b'x'; 400], b"\n?\n%"] {
+        board.send_to(USB, bytes);
+        board.run_for_ms(50).unwrap();
+    }
+    let masked = board.masked() / 128.0;
+    println!("interrupts were off for {masked:.2} us at most");
+    assert!(masked > 0.1 && masked <= MASKED_US, "{masked} us");
 }
 
 #[test]

@@ -27,6 +27,8 @@ rows! {
     jitter_of_the_leading_motor = "jitter";
     jitter_of_another_motor = "jitter-minor";
     lines_in_a_second = "lines";
+    lines_of_two_axes = "lines-xy";
+    lines_of_three_axes_and_a_speed = "lines-xyzf";
     moves_of_a_tenth = "spiral-0.1";
     moves_of_a_tenth_under_a_jerk_limit = "spiral-0.1-jerk";
     share_of_exec = "exec";

@@ -5,6 +5,7 @@
 //! driven here are collected, and passed with the next request to run.
 
 pub mod even;
+pub mod heat;
 pub mod job;
 pub(crate) mod process;
 
@@ -30,6 +31,7 @@ struct Request {
     #[serde(skip_serializing_if = "Option::is_none")]
     panic: Option<String>,
     reset: bool,
+    unmasked: bool,
     sense: Vec<(u8, u16)>,
     send: Vec<(usize, String)>,
     now: Vec<(usize, u8)>,
@@ -153,6 +155,8 @@ struct Answer {
     shares: Vec<(u8, f64)>,
     #[serde(default)]
     asleep: f64,
+    #[serde(default)]
+    masked: f64,
     #[serde(default)]
     spent: Vec<f64>,
     #[serde(default)]
@@ -371,6 +375,16 @@ impl Emulated {
     /// Cycles that the CPU has slept.
     pub fn asleep(&self) -> f64 {
         self.answer.asleep
+    }
+
+    /// The longest time for which interrupts were off since [`Emulated::forget_masked`], cycles.
+    pub fn masked(&self) -> f64 {
+        self.answer.masked
+    }
+
+    /// Forgets how long interrupts were off.
+    pub fn forget_masked(&mut self) {
+        self.request.unmasked = true;
     }
 
     /// Cycles of an exception's handler, without the handlers that interrupt it. Exception 0 is thread mode, 16 the

@@ -29,7 +29,7 @@ pub fn share(all: u64, every: usize) -> impl Iterator<Item = u64> {
     (0..all).skip(first).step_by(every)
 }
 
-fn is_long() -> bool {
+pub fn is_long() -> bool {
     wanted("KERF_LONG").is_some_and(|long| long > 0)
 }
 
