@@ -8,6 +8,7 @@ use proptest::prelude::*;
 use proptest::sample::select;
 
 use crate::alarm_model::{ASIDE, BYTES, CAUSES, Cause, Class, LINES, Model, Op, PANIC};
+use crate::apart::apart;
 use crate::seeds;
 
 /// Plays sequences on one machine, which recovers in between.
@@ -78,4 +79,33 @@ fn conversation() -> impl Strategy<Value = Vec<Op>> {
 #[test]
 fn an_alarm_ends_by_what_ends_it() {
     seeds::try_all(60, |seed| seeds::smallest(seed, &conversation(), |ops| play(&[ops])));
+}
+
+/// Returns what is heard behind the alarm of a homing that fails, while the sender asks all the time, at first after `ms`.
+fn heard_behind_a_failed_homing(ms: u64) -> String {
+    let machine = Machine::boot(115_200).expect("one machine for each thread");
+    machine.run_ms(100);
+    machine.send(b"$I\n$130=5\n");
+    machine.run_ms(200 + ms);
+    machine.send(b"$HX\n");
+    machine.received();
+    let mut heard = String::new();
+    while !heard.contains("error:") && heard.len() < 20_000 {
+        machine.send(b"?");
+        machine.run_ms(8);
+        heard += &String::from_utf8(machine.received()).unwrap();
+    }
+    machine.send(b"?");
+    machine.run_ms(50);
+    heard += &String::from_utf8(machine.received()).unwrap();
+    heard.split_once("ALARM:9\r\n").expect("an alarm").1.to_string()
+}
+
+#[test]
+fn no_report_behind_the_alarm_of_a_failed_homing_says_idle() {
+    for ms in 0..8 {
+        let behind = apart(move || heard_behind_a_failed_homing(ms));
+        assert!(behind.contains("error:9\r\n") && behind.contains("<Alarm|"), "{behind}");
+        assert!(!behind.contains("<Idle|"), "{ms}: {behind}");
+    }
 }

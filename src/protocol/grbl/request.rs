@@ -341,10 +341,11 @@ fn threads(machine: &mut impl Machine) -> bool {
 #[inline(never)]
 #[small]
 fn refusal(machine: &mut impl Machine) -> Option<u8> {
-    if !threads(machine) {
-        return None;
-    }
-    let pass = machine.value(Value::Pass);
+    if threads(machine) { refusal_of(machine.value(Value::Pass)) } else { None }
+}
+
+/// As [`refusal`], for the value of [`Value::Pass`], which tells a refusal once.
+fn refusal_of(pass: i32) -> Option<u8> {
     let refusals = [Status::NoIndex, Status::NoSync, Status::WrongWay, Status::VelocityExceeded];
     refusals.into_iter().find(|status| *status as i32 == pass).map(error_number)
 }
@@ -353,10 +354,11 @@ fn refusal(machine: &mut impl Machine) -> Option<u8> {
 #[inline(never)]
 #[small]
 fn begins(machine: &mut impl Machine) -> Step {
-    if machine.value(Value::Pass) == Status::Ok as i32 {
+    let pass = machine.value(Value::Pass);
+    if pass == Status::Ok as i32 {
         return Step::Done;
     }
-    if let Some(number) = refusal(machine) {
+    if let Some(number) = refusal_of(pass) {
         return Step::Error(number);
     }
     let waits = machine.value(Value::Working) != 0 && machine.value(Value::Check) == 0;
@@ -451,16 +453,13 @@ fn home(at: u8, axis: u8, machine: &mut impl Machine) -> Step {
         if done == 1 {
             return Step::Done;
         }
+        // After a failed homing the position is unknown.
+        machine.alarm(Alarm::Alarm, Status::HomingFailed);
         return Step::Later(FAILED);
     }
     if at >= FAILED {
         // Gives the reporter time to send the cause first.
-        if at < TOLD {
-            return Step::Later(at + 1);
-        }
-        // After a failed homing the position is unknown.
-        machine.alarm(Alarm::Alarm, Status::HomingFailed);
-        return Step::Error(LOCKED);
+        return if at < TOLD { Step::Later(at + 1) } else { Step::Error(LOCKED) };
     }
     let axes = if axis == ALL { ALL } else { 1 << axis };
     match machine.home(axes, true) {

@@ -32,7 +32,7 @@ use super::square::Second;
 use crate::capability::Capability;
 use crate::gcode::command::{Feed, Motion};
 use crate::hal::inputs;
-use crate::machine::Event;
+use crate::machine::{Alarm, Event};
 use crate::motion::block::QueuedAction;
 use crate::status::Status;
 use crate::tasks::alarm;
@@ -374,15 +374,21 @@ impl Planner {
         if !self.is_flushed() {
             model.set_position(&self.position);
         }
-        if let Some(status) = failure {
+        if failure.is_some() {
             model.blame(at.axis);
-            // What ended the cycle in a flush is reported when the flush is over.
-            if !self.is_flushed() {
-                alarm::announce(links, status, alarm::NO_PORT);
-            }
         }
         drop(model);
-        // In a flush, the cycle ends with the flush, when the position is known.
+        // What ended the cycle in a flush is reported when the flush is over, and so is the end of the cycle: only then
+        // is the position known.
+        let told = failure.filter(|_| !self.is_flushed());
         self.enter(Event::Done);
+        match told {
+            // The answer to the line would begin this alarm, but a report may come first.
+            Some(status) if links.feeder().is_eager() => {
+                alarm::raise_for(links, Alarm::Alarm, status)
+            }
+            Some(status) => alarm::announce(links, status, alarm::NO_PORT),
+            None => {}
+        }
     }
 }
