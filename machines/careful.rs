@@ -16,8 +16,7 @@ pub const CAREFUL: MachineProfile = MachineProfile {
         // Z is 0 at the top, where it homes
         set("z", "tn", -75.0),
         set("z", "tm", 0.0),
-        // A rotary table: words are degrees
-        set("a", "am", 1.0),
+        // A, if it is switched on (`am`), is a rotary table: words are degrees
         set("abc", "vm", 7_200.0),
         set("abc", "fr", 7_200.0),
         set("abc", "ac", 400.0),

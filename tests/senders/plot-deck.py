@@ -60,13 +60,9 @@ def connect():
     deck.connect(PORT)
     until(lambda: deck.connected and report() and state() == "Idle")
     do(deck.request_info)
-    told = f"firmware {deck.firmware}"
-    if deck.status.mpos is None:
-        # It accepts exactly three numbers.
-        told += f", no position from {deck.status.raw}: $aam=0"
-        do(lambda: deck.send_line("$aam=0"))
+    # It accepts exactly three numbers.
     until(lambda: deck.status.mpos)
-    return f"{told}, at {deck.status.mpos}"
+    return f"firmware {deck.firmware}, at {deck.status.mpos}"
 
 
 def close():

@@ -5,9 +5,9 @@ use super::group;
 group! {
     /// The groups `x` to `c`. B and C, which never home, lack the rows with `HOMING`.
     axis: [i32; AXES], DEFAULT.axis => {
-        AM "am": int(0, 3).with(MODE | IDLE), [1, 1, 1, 3, 0, 0],
+        AM "am": int(0, 3).with(MODE | IDLE), [1, 1, 1, crate::capability::Capability::Printer.is_built_in() as i32, 0, 0],
             bare(text!("axis mode")),
-            "0 disabled, 1 standard, 2 inhibited: the position counts, the motors do not move, 3 radius: axis words are lengths, which `ra` converts to angles.";
+            "0 disabled, 1 standard, 2 inhibited: the position counts, the motors do not move, 3 radius: axis words are lengths, which `ra` converts to angles. A is on by default only where it may be an extruder, on boards with heaters.";
         VM "vm": fixed(3, 0, POSITIVE).with(UNIT), [800_000, 800_000, 800_000, 230_400_000, 3_600_000, 3_600_000],
             length(text!("velocity maximum"), SPEED),
             "Maximum velocity of rapid moves (G0). Kerf lowers a value that the motors cannot follow, and a message says so.";
