@@ -136,7 +136,7 @@ def probe():
     bcnc.sendGCode("G38.2 Z-70 F800")
     if GRBL:
         # bCNC's own `$#` also lists the last contact, so a line without contact may come first.
-        at = float(until(lambda: heard("[PRB:", ":1]")).split(",")[2])
+        at = float(until(lambda: heard("[PRB:", ":1]")).split(",")[2].split(":")[0])
     else:
         at = until(lambda: heard('{"prb":') or heard('{"r":{"prb":'))
         at = float(at.split('"z":')[1].split(",")[0].split("}")[0])

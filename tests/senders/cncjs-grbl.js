@@ -17,6 +17,7 @@ const PLATE = -51.8;
 const status = () => server.controller.status || {};
 const state = () => status().activeState;
 const x = () => Number((status().mpos || {}).x);
+const z = () => Number((status().mpos || {}).z);
 
 /// The lines that come from the board from now on.
 function hear() {
@@ -124,6 +125,9 @@ async function stop() {
   await until(() => state() === 'Idle');
   await sleep(1000);
   ensure(there === x(), `the position was ${there} in ${before}, and is ${x()}`);
+  // To where a job begins on a board that a later connection does not reset.
+  for (const line of ['G0 Z0', 'G0 X0']) server.command('gcode', line);
+  await until(() => x() === 0 && z() === 0 && state() === 'Idle');
   return `${before}, ${heard('ALARM:') || 'no alarm'}, at X ${there} of ${FAR}`;
 }
 

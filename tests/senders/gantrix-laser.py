@@ -74,7 +74,8 @@ def cancel():
 
 def reset():
     """Calls the emergency stop while another thread waits for the end of a move. Then unlocks: a new connection begins
-    with M5, which is refused in an alarm if DTR has not reset the board."""
+    with M5, which is refused in an alarm if DTR has not reset the board. Goes back to 0, from where the job is counted on
+    such a board."""
     told = []
 
     def wait():
@@ -90,8 +91,9 @@ def reset():
     gantry.emergency_stop()
     until(lambda: told)
     ensure("reset" in told[0], told[0])
-    for line in ["$X", "G90"]:
+    for line in ["$X", "G90", "G0 X0 Y0"]:
         gantry.send(line)
+    rest()
     return f"it is told: {told[0]}; unlocked"
 
 

@@ -45,12 +45,9 @@ def connect():
     threading.Thread(target=read, args=[keyboard], daemon=True).start()
     until(lambda: state() == "Idle")
     report = answer("?", r"<Idle.*?>")
-    told = ""
-    if re.search(r"MPos:[^,|]+,[^,|]+,[^,|]+,", report):
-        # The program shows the last number of a position as Z. Without a fourth axis that is Z.
-        told = f", Z is wrong with {report}: $aam=0"
-        enter("$aam=0")
-    return f"{state()} at {place()}{told}"
+    # The program shows the last number of a position as Z.
+    ensure(not re.search(r"MPos:[^,|]+,[^,|]+,[^,|]+,", report), f"Z is another axis in {report}")
+    return f"{state()} at {place()}"
 
 
 def close():
@@ -109,8 +106,9 @@ def jog():
 
 
 def home():
+    """Homes. No report is sent meanwhile, so the state may be Idle throughout: a list comes when homing is over."""
     enter("$H")
-    until(lambda: state() == "Home")
+    setting()
     until(lambda: state() == "Idle")
     return f"at {place()}"
 

@@ -12,6 +12,8 @@ import printing
 from marlin_host import MarlinHost, SerialTransport
 
 PORT, JOB = sys.argv[1:]
+# More moves there and back than any board has room for.
+PAIRS = 600
 FAR = 40
 
 # Lines that slicers send besides moves, and that this board does not support.
@@ -98,7 +100,7 @@ def heat():
 def pause():
     """Pauses in the middle of a print: the machine comes to rest, and then continues."""
     done = []
-    print_it = lambda: done.extend(host.stream(printing.there_and_back(50)))
+    print_it = lambda: done.extend(host.stream(printing.there_and_back(PAIRS)))
     thread = threading.Thread(target=print_it, daemon=True)
     thread.start()
     time.sleep(0.3)
@@ -108,7 +110,7 @@ def pause():
     ensure(thread.is_alive() and place() == at, f"it goes on, at {place()}")
     host.resume()
     until(lambda: not thread.is_alive())
-    ensure(len(done) == 102, f"{len(done)} lines")
+    ensure(len(done) == 2 * PAIRS + 2, f"{len(done)} lines")
     host.send("M400")
     return f"stood at {at}, went on, at {place()}"
 

@@ -4,8 +4,9 @@ use std::fmt::{self, Display, Formatter};
 use std::path::Path;
 
 use anyhow::Result;
+use kerf::boards::Board;
 use kerf_sim::emulated::{Emulated, Talks};
-use kerf_sim::job::{read_lines, read_setup};
+use kerf_sim::job::{Lines, read_lines, read_setup};
 use kerf_sim::oracle::Setup;
 use kerf_sim::{Host, Machine, by_name, oracle, print};
 
@@ -34,10 +35,7 @@ impl Arrival {
         let lines = read_lines(job)?;
         Host::new(1).run_for_ms(machine, SETTLE_MS)?;
         let setup = setup_of(twin)?;
-        let expected = match print::is_print(machine.board(), &lines) {
-            true => print::end_of(&lines, &setup)?,
-            false => oracle::run(lines.iter().map(|(n, l)| (*n, l.as_str())), &setup)?.steps,
-        };
+        let expected = end_of(machine.board(), &lines, &setup)?;
         let motors = machine.recorder().motors().iter();
         let ends: Vec<_> = motors.map(|motor| (motor.position, motor.steps)).collect();
         Ok(Self::at(&setup, &ends, &expected))
@@ -55,8 +53,7 @@ impl Arrival {
         let mut host = Host::new(1);
         host.boot(board, BOOT_MS)?;
         let setup = read_setup(board, &mut host)?;
-        let expected = oracle::run(lines.iter().map(|(n, l)| (*n, l.as_str())), &setup)?.steps;
-        Ok(Self::at(&setup, &ends, &expected))
+        Ok(Self::at(&setup, &ends, &end_of(board.board(), &lines, &setup)?))
     }
 
     /// Pairs each motor's setup with its end position and its steps in both directions, and with the position that is
@@ -75,6 +72,14 @@ impl Arrival {
     pub fn is_exact(&self) -> bool {
         self.0.iter().all(|motor| motor.steps == motor.expected)
     }
+}
+
+/// Returns the steps of each motor at the end of a job, by an independent reading of it.
+fn end_of(board: &Board, lines: &Lines, setup: &Setup) -> Result<Vec<i64>> {
+    if print::is_print(board, lines) {
+        return print::end_of(lines, setup);
+    }
+    Ok(oracle::run(lines.iter().map(|(n, l)| (*n, l.as_str())), setup)?.steps.to_vec())
 }
 
 /// Asks a machine that has just been started for its motors and axes.

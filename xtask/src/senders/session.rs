@@ -62,7 +62,7 @@ impl Session<'_> {
     }
 
     fn attempt(&self, tell: &mut impl FnMut(Step)) -> Result<()> {
-        let damage = self.sender.damage();
+        let damage = self.sender.damage(self.board);
         let board = Board::start(self.program, self.elf, self.board.name(), self.job, damage)?;
         let mut driver = Driver::start(self, &board.port)?;
         let end = Instant::now() + LIMIT;
@@ -98,6 +98,8 @@ impl Driver {
         };
         let mut command = Command::new(&program);
         command.arg(install::drivers().join(script)).arg(port).arg(session.job).args(word);
+        // The driver of a line that damages what is sent checks that it has.
+        command.args(session.sender.damage(session.board).map(|_| "damaged"));
         command.current_dir(session.folder);
         // A driver gives up when its standard input ends. That happens when this program ends, for whatever reason.
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).process_group(0);

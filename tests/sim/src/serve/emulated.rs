@@ -10,6 +10,7 @@ use std::time::Instant;
 use anyhow::Result;
 use kerf::boards::Board;
 use kerf::boards::inputs::{ENDS, PROBE};
+use kerf_sim::emulated::heat::Heat;
 use kerf_sim::emulated::{Emulated, Near, Talks, job};
 use kerf_sim::mechanics::{Axis, Build};
 use kerf_sim::{Runs, USB};
@@ -24,6 +25,7 @@ const BACKLOG: usize = 256;
 
 struct Server {
     board: Emulated,
+    heat: Heat,
     pty: Pty,
     speed: Speed,
     peer: Peer,
@@ -86,6 +88,7 @@ impl Server {
         }
         Ok(Server {
             anchor: (Instant::now(), emulated.cycle()),
+            heat: Heat::of(&mut emulated),
             board: emulated,
             pty,
             speed: args.speed,
@@ -114,8 +117,7 @@ impl Server {
             self.board.send_to(USB, &bytes);
         }
         let until = self.until();
-        let ms = until.saturating_sub(self.board.cycle()) / self.board.cycles(1);
-        self.board.run_for_ms(ms)?;
+        self.heat.run_until(&mut self.board, until)?;
         let answer = self.board.receive_from(USB);
         self.rests &= answer.is_empty() && self.board.totals() == totals;
         match is_open {
