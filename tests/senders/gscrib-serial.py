@@ -44,6 +44,8 @@ def connect():
 
 
 def close():
+    # At rest: a board that does not reset takes a new program for another sender only then.
+    builder.write("G4 P0.1")
     builder.teardown()
     time.sleep(0.3)  # The simulated board checks from time to time whether the port is open.
     return "port closed"

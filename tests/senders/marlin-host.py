@@ -100,7 +100,7 @@ def heat():
 def pause():
     """Pauses in the middle of a print: the machine comes to rest, and then continues."""
     done = []
-    print_it = lambda: done.extend(host.stream(printing.there_and_back(PAIRS)))
+    print_it = lambda: done.extend(host.stream(printing.there_and_back(PAIRS, way=0.05)))
     thread = threading.Thread(target=print_it, daemon=True)
     thread.start()
     time.sleep(0.3)

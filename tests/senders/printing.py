@@ -26,6 +26,6 @@ def settle(send, ask, name="all carried out"):
     ask(f"M118 {name}", name)
 
 
-def there_and_back(moves):
+def there_and_back(moves, way=0.5):
     """Returns the lines of a print that ends where it begins."""
-    return ["G91"] + ["G1 X0.5 F1200", "G1 X-0.5"] * moves + ["G90"]
+    return ["G91"] + [f"G1 X{way} F1200", f"G1 X-{way}"] * moves + ["G90"]
