@@ -59,6 +59,16 @@ impl Mark {
     /// The firmware is about to reset because a task, exec or the step interrupt hangs.
     pub const STARVED: Mark = Mark(0x4BC3);
 
+    /// No mark: the next start is that of a new image.
+    #[cfg(target_arch = "arm")]
+    pub const NONE: Mark = Mark(0);
+
+    /// Whether this firmware has left the mark.
+    #[cfg(any(target_arch = "arm", test))]
+    pub fn is_ours(self) -> bool {
+        self == Self::ASKED || self == Self::STARVED || self.cause().is_some()
+    }
+
     /// Returns the mark of a running firmware that was started by `cause`.
     pub fn running(cause: Cause) -> Mark {
         Mark(Self::RUNNING | cause as u16)
@@ -126,9 +136,11 @@ mod tests {
             let cause = Cause::from_number(number);
             assert_eq!(cause as u8, number);
             assert_eq!(Mark::running(cause).cause(), Some(cause));
+            assert!(Mark::running(cause).is_ours());
         }
         for mark in [Mark::ASKED, Mark::STARVED, Mark(0), Mark(0xFFFF), Mark(Mark::RUNNING | 5)] {
             assert_eq!(mark.cause(), None);
+            assert_eq!(mark.is_ours(), mark == Mark::ASKED || mark == Mark::STARVED);
         }
     }
 }

@@ -30,11 +30,13 @@ fn left() -> Mark {
 }
 
 /// Stores the cause of the reset. First thing at start-up.
+///
+/// The boot loader in ROM starts a new image by the watchdog, too. Only a mark of this firmware makes a fault of it.
 pub(super) fn begin() {
     off();
     let reason = WATCHDOG.reason().read();
     let chip = VREG_AND_CHIP_RESET.chip_reset().read();
-    let bits = if reason.timer() || reason.force() {
+    let bits = if (reason.timer() || reason.force()) && left().is_ours() {
         WATCHDOG_BIT
     } else if chip.had_por() {
         POWER_ON
@@ -84,6 +86,7 @@ pub fn boot() -> ! {
     cortex_m::interrupt::disable();
     super::panic::make_safe();
     off();
+    leave(Mark::NONE);
     embassy_rp::rom_data::reset_to_usb_boot(0, 0);
     loop {
         cortex_m::asm::nop();

@@ -1,7 +1,7 @@
 // node bridge.mjs: an emulated board for a program that talks to it over standard input and output. Each line of the input is a request in JSON, each line of
 // the output its answer:
 //
-//   {"board": {"elf": "file", "motors": [[step, dir], ...]}, "cut": true, "stick": true, "panic": "file", "reset": true, "sense": [[channel, value]], "send": [[port, "hex"]], "now": [[port, byte]], "usb": {"open": bool, "reads": bool}, "unmasked": true, "baud": [[port, rate]], "drive": [[gpio, high]], "wire": [...], "spindle": {"index": gpio, "sync": gpio, "pulses": n}, "marks": n, "turn": rpm, "drivers": [...], "record": bool, "until": cycle, "line": true}
+//   {"board": {"elf": "file", "motors": [[step, dir], ...]}, "cut": true, "stick": true, "panic": "file", "reset": true, "sense": [[channel, value]], "send": [[port, "hex"]], "now": [[port, byte]], "usb": {"open": bool, "reads": bool}, "unmasked": true, "loaded": true, "baud": [[port, rate]], "drive": [[gpio, high]], "wire": [...], "spindle": {"index": gpio, "sync": gpio, "pulses": n}, "marks": n, "turn": rpm, "drivers": [...], "record": bool, "until": cycle, "line": true}
 //
 // `board` comes first, and again where another board is to take the place of the one before. Ports are 0 and 1 for the UARTs, and 2 for USB; `usb` says what the program at its other end does.
 // With `record` edges of steps are recorded from there on, or what has been recorded is told and no more is. With `cut` the supply fails, and comes again; with `stick` the CPU gets stuck. What is sent and driven comes next; then the board runs to the cycle, or, with `line`, to the end of the next line that it says.
@@ -30,6 +30,7 @@ function act(request) {
   if (request.stick) machine.stick();
   if (request.panic) machine.panic(elf, request.panic);
   if (request.reset) machine.reset();
+  if (request.loaded) machine.startLoaded();
   if (request.unmasked) machine.masked = { cycles: 0, pc: 0 };
   for (const [channel, value] of request.sense ?? []) machine.sense(channel, value);
   for (const [port, rate] of request.baud ?? []) if (machine.senders[port]) machine.senders[port].rate = rate;

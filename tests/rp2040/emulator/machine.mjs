@@ -22,6 +22,8 @@ const EXIT = 11;
 // The CPU runs for so many cycles at most before others are looked at.
 const SPRINT = 10_000;
 const WATCHDOG = 0x40058;
+// The watchdog's reason: software has asked for it.
+const FORCED = 2;
 const TIMER = 0x40054;
 const ALARM0 = 0x10;
 // Ends whose rates differ by more do not understand each other.
@@ -177,6 +179,14 @@ export class Machine {
 
   // The reset button.
   reset() { this.boot(this.mcu, this.mcu.sram); }
+
+  // A new image has been loaded: the boot ROM starts it by the watchdog. Nobody has left a mark.
+  startLoaded() {
+    const watchdog = this.mcu.peripherals[WATCHDOG];
+    watchdog.scratchData.fill(0);
+    watchdog.reason = FORCED;
+    this.boot(this.mcu);
+  }
 
   // What a channel of the converter reads, of 4095.
   sense(channel, value) { this.sensed[channel] = value; }

@@ -31,6 +31,7 @@ struct Request {
     #[serde(skip_serializing_if = "Option::is_none")]
     panic: Option<String>,
     reset: bool,
+    loaded: bool,
     unmasked: bool,
     sense: Vec<(u8, u16)>,
     send: Vec<(usize, String)>,
@@ -285,6 +286,11 @@ impl Emulated {
     /// Presses the reset button.
     pub fn reset(&mut self) {
         self.request.reset = true;
+    }
+
+    /// Starts a new image as the boot ROM does.
+    pub fn start_loaded(&mut self) {
+        self.request.loaded = true;
     }
 
     /// Sets the reading of a channel of the converter, 0 to 4,095.

@@ -28,7 +28,7 @@ pub static GRBL: Dialect = Dialect {
     answer,
     version: Question { request: "$I", find: |lines| between(lines, ":Kerf ", &[']']) },
     opening: None,
-    stored: &[setting!("120"), setting!("121"), setting!("122"), setting!("123")],
+    stored: &[setting!("120"), setting!("121"), setting!("122")],
     check_mode: Some(["$C", "$C"]),
     dwell: |ms| format!("G4P{}", f64::from(ms) / 1_000.0),
     rest: Question {
