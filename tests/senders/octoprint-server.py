@@ -187,12 +187,14 @@ def cancel():
 
 
 def stop():
-    """Sends M112. OctoPrint closes the port as well, and the machine is in an alarm until OctoPrint connects again."""
+    """Sends M112. OctoPrint closes the port as well, and the machine is in an alarm: until OctoPrint connects again, which
+    resets the board, or until M999 on a board with USB of its own."""
     send("M112")
     until(lambda: state().startswith(("Offline", "Closed", "Error")))
     what = state()
     connect()
-    return f"{what}; connected again"
+    ask("M999", "ok")
+    return f"{what}; connected again, M999"
 
 
 def prints():
