@@ -60,11 +60,9 @@ impl Mark {
     pub const STARVED: Mark = Mark(0x4BC3);
 
     /// No mark: the next start is that of a new image.
-    #[cfg(target_arch = "arm")]
     pub const NONE: Mark = Mark(0);
 
     /// Whether this firmware has left the mark.
-    #[cfg(any(target_arch = "arm", test))]
     pub fn is_ours(self) -> bool {
         self == Self::ASKED || self == Self::STARVED || self.cause().is_some()
     }

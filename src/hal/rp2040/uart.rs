@@ -409,7 +409,8 @@ impl Line {
         let (now, lost) = waiting.split_at(ring.free().min(waiting.len()));
         ring.push_run(now);
         self.lost_ends = self.lost_ends.wrapping_add(ring.lose(lost));
-        self.queued = self.queued.wrapping_add(now.len() as u8);
+        self.queued = self.queued.wrapping_add(waiting.len() as u8);
+        self.last = ring.newest();
         self.behind.drop_first(PACKET);
         flags::set(Event::Received);
     }

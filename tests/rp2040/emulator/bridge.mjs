@@ -31,7 +31,7 @@ function act(request) {
   if (request.panic) machine.panic(elf, request.panic);
   if (request.reset) machine.reset();
   if (request.loaded) machine.startLoaded();
-  if (request.unmasked) machine.masked = { cycles: 0, pc: 0 };
+  if (request.unmasked) machine.masked = 0;
   for (const [channel, value] of request.sense ?? []) machine.sense(channel, value);
   for (const [port, rate] of request.baud ?? []) if (machine.senders[port]) machine.senders[port].rate = rate;
   for (const [port, hex] of request.send ?? []) machine.send(port, Buffer.from(hex, 'hex'));
@@ -74,7 +74,8 @@ function answer() {
     shares: shares(),
     asleep: machine.asleep,
     spent: machine.spent,
-    masked: machine.masked.cycles,
+    masked: machine.masked,
+    waited: machine.cache.waited,
     resets: machine.resets,
     waiting: machine.computer.bytes.length,
     recorded,

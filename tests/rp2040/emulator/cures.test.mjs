@@ -381,10 +381,10 @@ test('a line of flash costs its price once, until two others of its set have bee
 
 test('code in flash waits for its lines, and for numbers there', () => {
   // Twice around four instructions in a line: only the first time waits. ldr r0, [pc] reads the next line.
-  const spent = (code, miss) => { const m = machine(code, undefined, miss); m.run(1); return (n) => { m.run(n); return m.cache.waited; }; };
-  assert.equal(spent([0xbf00, 0xbf00, 0xbf00, 0xe7fb], 50)(1000), 50);
-  assert.equal(spent([0x4801, 0xbf00, 0xbf00, 0xe7fb, 0x1234, 0x5678], 50)(1000), 100);
-  assert.equal(spent([0xbf00, 0xbf00, 0xbf00, 0xe7fb], 0)(1000), 0);
+  const waited = (code, miss) => { const m = machine(code, undefined, miss); m.run(1000); return m.cache.waited; };
+  assert.equal(waited([0xbf00, 0xbf00, 0xbf00, 0xe7fb], 50), 50);
+  assert.equal(waited([0x4801, 0xbf00, 0xbf00, 0xe7fb, 0x1234, 0x5678], 50), 100);
+  assert.equal(waited([0xbf00, 0xbf00, 0xbf00, 0xe7fb], 0), 0);
 });
 
 test('an alarm of the timer goes off when the count is its value', () => {

@@ -147,8 +147,8 @@ export class Machine {
     // Bytes that have been heard.
     this.said = 0;
     this.asleep = 0;
-    // For how many cycles interrupts were off at most, and where that ended.
-    this.masked = { cycles: 0, pc: 0 };
+    // For how many cycles interrupts were off at most.
+    this.masked = 0;
     // Cycles of each exception's handler by itself, by its number; 0 is thread mode.
     this.spent = new Array(48).fill(0);
     this.boot();
@@ -339,16 +339,11 @@ export class Machine {
   single() {
     const { core } = this.mcu;
     const waits = core.PC >>> 24 === FLASH >>> 24 ? this.cache.touch(core.PC) : 0;
-    const [wasMasked, pc] = [core.PM, core.PC];
+    const wasMasked = core.PM;
     const spent = waits + core.executeInstruction();
     if (core.PM && !wasMasked) this.maskedAt = this.cycle;
-    if (!core.PM && wasMasked) this.unmask(this.cycle + spent - this.maskedAt, pc);
+    if (!core.PM && wasMasked) this.masked = Math.max(this.masked, this.cycle + spent - this.maskedAt);
     return spent;
-  }
-
-  // Interrupts were off for so many cycles, up to this instruction.
-  unmask(cycles, pc) {
-    if (cycles > this.masked.cycles) this.masked = { cycles, pc };
   }
 
   // Sleeps until something is due, or runs up to there.

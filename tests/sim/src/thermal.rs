@@ -18,8 +18,8 @@ pub use plant::{AIR, Plant};
 pub const EVERY_MS: u64 = 1;
 /// Number of computations between two samples.
 const SAMPLE: u64 = 100;
-/// The converter's supply, mV.
-const SUPPLY: f64 = 5_000.0;
+/// The converter's supply, mV: what a sensor's voltage is a share of.
+pub(crate) const SUPPLY: f64 = 5_000.0;
 /// Peak-to-peak noise of a sensor's wire, mV.
 const NOISE: f64 = 8.0;
 

@@ -392,6 +392,22 @@ fn a_limit_stops_as_soon_while_lines_are_streamed() {
     stops_at_once(true);
 }
 
+/// Half of the time went to waits for flash when the code was there.
+#[test]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
+fn what_runs_for_each_line_is_in_ram() {
+    let (mut board, mut host) = booted();
+    set(&mut board, &mut host, "{x:{vm:20000,fr:20000,ac:3000},y:{vm:20000,fr:20000,ac:3000}}");
+    let line = |n| format!("g1 f20000 x{:.2} y{:.2}\n", f64::from(n) * 0.05, f64::from(n) * 0.05);
+    board.send_to(USB, (1..=2_000).map(line).collect::<String>().as_bytes());
+    board.run_for_ms(20).unwrap();
+    let (cycle, waited) = (board.cycle(), board.waited());
+    board.run_for_ms(100).unwrap();
+    let share = (board.waited() - waited) / (board.cycle() - cycle) as f64;
+    println!("{:.3} % of the time waits for flash", 100.0 * share);
+    assert!(board.waiting() > 0 && share < 0.01, "{share}");
+}
+
 /// The longest time for which interrupts are off, us. Switches, steps and bytes wait for as long.
 const MASKED_US: f64 = 6.0;
 

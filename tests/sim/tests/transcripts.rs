@@ -26,7 +26,8 @@ const DRILLING: [&str; 10] = [
     "words",
 ];
 /// Transcripts that only emulated boards can play. No image for this chip has drivers with UART, built-in jobs, help
-/// screens, canned cycles and a second port, cycles that act on the spindle in TinyG's dialect, or both printing hosts and a second port or TinyG's dialect.
+/// screens, canned cycles and a second port, cycles that act on the spindle in TinyG's dialect, or both printing hosts and
+/// a second port or TinyG's dialect.
 pub const ELSEWHERE: [&str; 19] = [
     "actions",
     "corexy",

@@ -172,7 +172,7 @@ pub fn run_emulated(all: bool) -> Result<()> {
     for sender in senders {
         let job = Some(root().join("examples/square.gcode"));
         let board = Some(sender.boards()[1]);
-        run(&SendersArgs { sender: vec![sender], job, board, brief: true, ..Default::default() })?;
+        run(&SendersArgs { sender: vec![sender], job, board, brief: !all, ..Default::default() })?;
     }
     Ok(())
 }

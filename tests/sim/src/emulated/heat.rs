@@ -8,14 +8,12 @@ use anyhow::Result;
 
 use super::Emulated;
 use crate::runs::Runs;
-use crate::thermal::{EVERY_MS, Thermal};
+use crate::thermal::{EVERY_MS, SUPPLY, Thermal};
 
 /// The longest request between two computations, ms.
 const SLICE_MS: u64 = 2;
 /// What the converter reads at its reference.
 const FULL: f64 = 4_095.0;
-/// The voltage of [`Thermal`] at which a converter reads [`FULL`], mV.
-const SUPPLY: f64 = 5_000.0;
 
 /// The heaters of a board, their sensors and the fan.
 pub struct Heat(Option<Thermal>);
@@ -24,7 +22,7 @@ impl Heat {
     /// Heaters at room temperature, at a board that has pins for them.
     pub fn of(board: &mut Emulated) -> Self {
         let mut heat = Self(board.board().heaters.map(Thermal::new));
-        heat.pass(board, 0);
+        heat.pass(board, EVERY_MS);
         heat
     }
 
@@ -46,7 +44,7 @@ impl Heat {
         let Some(thermal) = &mut self.0 else { return };
         let power = thermal.pins().heaters.map(|heater| board.share(heater.pin));
         let fan = board.share(thermal.pins().fan);
-        for _ in 0..(ms / EVERY_MS).max(1) {
+        for _ in 0..ms / EVERY_MS {
             for (channel, millivolts) in thermal.pass(power, fan, board.cycle()) {
                 board.sense(channel, (f64::from(millivolts) / SUPPLY * FULL).round() as u16);
             }

@@ -159,6 +159,8 @@ struct Answer {
     #[serde(default)]
     masked: f64,
     #[serde(default)]
+    waited: f64,
+    #[serde(default)]
     spent: Vec<f64>,
     #[serde(default)]
     resets: u64,
@@ -386,6 +388,11 @@ impl Emulated {
     /// The longest time for which interrupts were off since [`Emulated::forget_masked`], cycles.
     pub fn masked(&self) -> f64 {
         self.answer.masked
+    }
+
+    /// Cycles that the CPU has waited for flash.
+    pub fn waited(&self) -> f64 {
+        self.answer.waited
     }
 
     /// Forgets how long interrupts were off.
