@@ -70,6 +70,7 @@ mod transcript;
 mod wiring;
 
 mod advance;
+mod alarm_packets;
 mod arc_props;
 mod bed;
 mod builder;

@@ -141,6 +141,9 @@ pub trait Dialect {
     /// Returns the alarm that a line raises on arrival, before the line is answered; `None` for most lines. The line
     /// has at most [`STOP_MAX`](super::STOP_MAX) bytes.
     fn asks_alarm(line: &[u8]) -> Option<Alarm>;
+
+    /// Whether a line ends an alarm.
+    fn ends_alarm(line: &[u8]) -> bool;
 }
 
 /// A line that is being answered. The answer starts only after the G-code of the line has run.
@@ -629,6 +632,15 @@ macro_rules! dialects {
                 alarm = alarm.or_else(|| <$dialect>::asks_alarm(line));
             })+
             alarm
+        }
+
+        /// See [`Dialect::ends_alarm`]. Tries the dialects as [`asks_alarm`] does.
+        #[inline(always)]
+        pub fn ends_alarm(line: &[u8], plain: bool) -> bool {
+            let mut ends = false;
+            $(#[cfg(feature = $feature)]
+            { ends = ends || (<$dialect>::IS_PLAIN == plain && <$dialect>::ends_alarm(line)); })+
+            ends
         }
     };
 }

@@ -25,7 +25,7 @@ use crate::hal::serial::TAKEN_RETURN;
 use crate::hal::text::copy_printing;
 use crate::machine::Alarm;
 use crate::machine::alarm::is_program_end;
-use crate::protocol::{asks_alarm, is_control, is_joined, may_be_control};
+use crate::protocol::{asks_alarm, ends_alarm, is_control, is_joined, may_be_control};
 use crate::realtime::ASCII;
 use crate::status::Status;
 
@@ -583,33 +583,48 @@ impl LinePool {
     }
 
     /// Has the G-code of all data lines refused, because of an alarm that is on or has just been ended. Other lines
-    /// are carried out, and so is everything from a line on that ends an alarm.
-    pub fn refuse(&mut self) {
-        self.drop_data(0, Class::Late);
+    /// are carried out, and so is everything from a line on that ends an alarm. Returns whether G-code that comes
+    /// behind the last line is refused as well: no line before it ends the alarm.
+    pub fn refuse(&mut self) -> bool {
+        self.drop_data(0, Class::Late)
     }
 
+    /// Has the line that has come last refused, as [`refuse`](Self::refuse) does, although a line that has overtaken it
+    /// ends the alarm. Returns whether the line ends the alarm itself.
+    pub fn refuse_newest(&mut self) -> bool {
+        let last = (self.entries.len() as u8).wrapping_sub(1);
+        self.drop_data(last, Class::Late);
+        self.ends_alarm(self.newest())
+    }
+
+    /// Gives data lines a class, the `first` ones excepted. Returns whether it came as far as the last line.
     #[cold]
     #[inline(never)]
     #[small]
-    fn drop_data(&mut self, first: u8, class: Class) {
+    fn drop_data(&mut self, first: u8, class: Class) -> bool {
         for index in first..self.entries.len() as u8 {
             let id = LineId(index);
-            if !self.class(id).is_whole() {
-                continue;
+            let is_data = self.class(id).is_whole();
+            if class == Class::Late
+                && (is_data || self.class(id) == Class::Control)
+                && self.ends_alarm(self.text(id))
+            {
+                return usize::from(index) + 1 == self.entries.len();
             }
-            if class == Class::Late && self.ends_alarm(self.text(id)) {
-                break;
-            }
-            if let Some(entry) = self.entries.get_mut(index.into()) {
+            if let Some(entry) = self.entries.get_mut(index.into())
+                && is_data
+            {
                 entry.class = class;
             }
         }
+        true
     }
 
-    /// Whether a data line ends an alarm: M2 or M30 alone, or in a pool that keeps the order `$X` and `$H`.
+    /// Whether a line ends an alarm: a program end alone, in a pool that keeps the order `$X` and `$H`, and in others
+    /// what their dialect has for it.
     fn ends_alarm(&self, text: &[u8]) -> bool {
         if !self.in_order {
-            return is_program_end(text);
+            return is_program_end(text) || ends_alarm(text, self.is_plain());
         }
         let mut text = text.iter().filter(|byte| **byte != b' ').map(|byte| byte | b' ');
         let first = [text.next(), text.next(), text.next(), text.next()];

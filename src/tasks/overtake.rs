@@ -24,6 +24,7 @@ use super::lines::{LinePool, is_blank};
 use super::links::Links;
 use crate::hal::ring::Window;
 use crate::hal::serial::{CLEAN, CUT, GO, MARKS, TAKEN, TAKEN_RETURN};
+use crate::machine;
 use crate::protocol::may_be_control;
 
 /// How far a ring has been scanned.
@@ -69,8 +70,8 @@ impl Scan {
         self.stops != 0
     }
 
-    /// Scans further, and takes the lines that overtake, as long as there is room for them. Returns whether there were
-    /// any. If the ring `closes` behind them, it has fewer bytes afterwards, and the difference is to be released.
+    /// Scans further, and takes the lines that overtake, as long as there is room for them: in an alarm only one. Returns
+    /// whether there were any. If the ring `closes` behind them, it has fewer bytes afterwards, and the difference is to be released.
     #[inline(never)]
     #[small]
     pub fn run(
@@ -119,6 +120,10 @@ impl Scan {
                         self.stops -= closed;
                     }
                     took = true;
+                    if machine::is_alarmed() {
+                        // This line may end the alarm: what is refused ends here.
+                        break;
+                    }
                     continue;
                 }
                 self.within = true;

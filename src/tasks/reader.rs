@@ -233,7 +233,8 @@ impl Intake {
                     Cut::None => {}
                     _ if !cuts => {}
                     _ if self.port.is_resetting() => pool.drop_unanswered(),
-                    Cut::Gcode(_) => pool.refuse(),
+                    Cut::Gcode(_) if pool.refuse_newest() => self.port.cut.set(Cut::None),
+                    Cut::Gcode(_) => {}
                     Cut::All(_) => pool.terminate(hold::dropped()),
                 }
                 self.ended(pool, looked, links);
@@ -400,8 +401,7 @@ fn look_ahead(links: &Links, port: &Port, scan: &mut Scan, ring: &mut Window<'_>
     let mut pool = port.lines.borrow_mut();
     if scan.run(links, &mut pool, ring, closes) {
         links.parser_wake.signal();
-        if machine::is_alarmed() {
-            pool.refuse();
+        if machine::is_alarmed() && pool.refuse() {
             // What has been looked through came before the control line, or is that line.
             hold::refuse_up_to(port, scan.looked.checked_sub(1).map(|last| ring.slot(last)));
         }

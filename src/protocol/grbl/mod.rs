@@ -133,4 +133,10 @@ impl Dialect for Grbl {
     fn asks_alarm(_line: &[u8]) -> Option<Alarm> {
         None
     }
+
+    #[inline(always)]
+    fn ends_alarm(_line: &[u8]) -> bool {
+        // Its lines are answered in their order, so that the pool asks for `$X` and `$H` itself.
+        false
+    }
 }

@@ -41,6 +41,12 @@ pub fn is_stop(frame: &Frame, line: &[u8]) -> bool {
     whole(frame, line) == Some(112)
 }
 
+/// Whether the line is M999.
+#[small]
+pub fn is_clear(frame: &Frame, line: &[u8]) -> bool {
+    whole(frame, line) == Some(999)
+}
+
 /// Whether a line overtakes the lines that wait: now, because M24 does so at a program stop only, and M25 while a file
 /// of the SD card prints.
 #[inline(never)]

@@ -192,6 +192,11 @@ impl Dialect for RepRap {
         stops.then_some(Alarm::Shutdown)
     }
 
+    #[inline(always)]
+    fn ends_alarm(line: &[u8]) -> bool {
+        command::is_clear(&Frame::of(line), line)
+    }
+
     fn interval_s(kept: &Retraction) -> u8 {
         kept.interval_s
     }

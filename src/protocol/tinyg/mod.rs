@@ -147,6 +147,11 @@ impl Dialect for Tinyg {
     fn asks_alarm(line: &[u8]) -> Option<Alarm> {
         stop::asks_alarm(line)
     }
+
+    #[inline(always)]
+    fn ends_alarm(line: &[u8]) -> bool {
+        stop::ends_alarm(line)
+    }
 }
 
 /// How the port is spoken to: in the mode of its last line.
