@@ -14,6 +14,11 @@ fn every_sender_finds_its_own() {
 }
 
 #[test]
+fn every_sender_finds_its_own_on_a_slow_line() {
+    by_sender::all_late(200, |_| boot(0));
+}
+
+#[test]
 fn the_greeting_loses_no_sender() {
     by_sender::greeting(Machine::boot(115_200).expect("one machine for each thread"));
 }
@@ -36,12 +41,13 @@ fn noise_costs_its_line_alone() {
     assert!(failed.is_empty(), "{failed:?}");
 }
 
-/// A machine that begins with this value of `dia`. Another machine, in a thread of its own, has stored the value.
+/// A machine that begins with this value of `dia` and, unlike a printer, without its fourth axis. Another machine, in a
+/// thread of its own, has stored the values.
 fn boot(dia: u8) -> Machine {
     let set = move || {
         let machine = Machine::boot(115_200).expect("one machine for each thread");
         machine.run_ms(100);
-        machine.send(format!("{{dia:{dia}}}\n").as_bytes());
+        machine.send(format!("{{aam:0}}\n{{dia:{dia}}}\n").as_bytes());
         machine.run_ms(500);
         eeprom::contents()
     };

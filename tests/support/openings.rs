@@ -8,6 +8,7 @@
 //!
 //! Bytes and expressions are facts from the senders' sources. Names in those sources are given with each sender.
 
+use std::collections::VecDeque;
 use std::thread;
 
 use regex::Regex;
@@ -83,7 +84,7 @@ const SENDERS: [Sender; 16] = [
             step(b"?", &[REPORT], 200),
             step(b"?", &[REPORT], 200),
             // Its jog, the restoring of modes, and the way it zeroes an axis.
-            step(b"$J=G21G91X1F600\n", &[OK], 1_000),
+            step(b"$J=G21G91X20F600\n", &[OK], 1_000),
             step(b"?", &[r"^<(Run|Jog)\|"], 200),
             step(b"\x85", &[], 500),
             step(b"G10P0L20X0\n$G\n", &[OK, MODES, OK], 4_000),
@@ -246,8 +247,6 @@ const SENDERS: [Sender; 16] = [
         name: "plotdeck",
         steps: &[
             step(b"$I\n", &[VERSION, OK], 1_000),
-            // What docs/senders.md tells its users to type.
-            step(b"$aam=0\n", &[OK], 1_000),
             step(b"?", &[THREE], 500),
             step(b"$H\n?", &[], 500),
         ],
@@ -283,23 +282,37 @@ struct Session<S> {
     /// Whether JSON may still come.
     json: bool,
     known: Vec<Regex>,
+    /// How long bytes are on their way, in each direction, ms.
+    latency: u64,
+    now: u64,
+    /// Bytes on their way to the machine, each with the time of their arrival.
+    there: VecDeque<(u64, &'static [u8])>,
+    /// Bytes on their way from the machine.
+    back: VecDeque<(u64, Vec<u8>)>,
 }
 
 impl<S: Side> Session<S> {
     fn run(&mut self) {
+        while let Some((_, bytes)) = self.there.pop_front_if(|(at, _)| *at <= self.now) {
+            self.side.send(bytes);
+        }
         self.side.run_ms(1);
-        self.heard += &String::from_utf8_lossy(&self.side.heard());
+        self.now += 1;
+        self.back.push_back((self.now + self.latency, self.side.heard()));
+        while let Some((_, bytes)) = self.back.pop_front_if(|(at, _)| *at <= self.now) {
+            self.heard += &String::from_utf8_lossy(&bytes);
+        }
     }
 
     fn play(&mut self, step: &Step) -> Result<(), String> {
-        self.side.send(step.says);
+        self.there.push_back((self.now + self.latency, step.says));
         if self.aside {
             self.side.send_aux(b"{sr:n}\n");
         }
         let said = String::from_utf8_lossy(step.says).into_owned();
         let mut wanted =
             step.hears.iter().map(|text| Regex::new(text).expect("an expression")).peekable();
-        for _ in 0..step.within {
+        for _ in 0..step.within + 2 * self.latency {
             self.run();
             while let Some((line, rest)) = self.heard.clone().split_once('\n') {
                 self.heard = rest.to_string();
@@ -472,14 +485,36 @@ pub fn noise<S: Side>(boot: impl Fn() -> S, seeds: std::ops::Range<u64>) {
 
 /// Plays all senders, each with machines that `boot` starts with this value of `dia`.
 pub fn all<S: Side>(boot: impl Fn(u8) -> S + Sync) {
+    play_all(&[(0, false), (0, true), (3, false), (11, true)], 0, |dia, _| boot(dia));
+}
+
+/// Plays all senders on a line that delays each byte by so many ms. `boot` is given what the sender says first.
+pub fn all_late<S: Side>(latency: u64, boot: impl Fn(&'static [u8]) -> S + Sync) {
+    play_all(&[(0, false)], latency, |_, first| boot(first));
+}
+
+fn play_all<S: Side>(
+    cases: &[(u8, bool)],
+    latency: u64,
+    boot: impl Fn(u8, &'static [u8]) -> S + Sync,
+) {
     let known = || KNOWN.iter().map(|text| Regex::new(text).expect("an expression")).collect();
     let mut failed = Vec::new();
-    for (dia, aside) in [(0, false), (0, true), (3, false), (11, true)] {
+    for (dia, aside) in cases.iter().copied() {
         for sender in &SENDERS {
             let play = || {
-                let side = boot(dia);
-                let mut session =
-                    Session { side, heard: String::new(), aside, json: dia == 0, known: known() };
+                let side = boot(dia, sender.steps[0].says);
+                let mut session = Session {
+                    side,
+                    heard: String::new(),
+                    aside,
+                    json: dia == 0,
+                    known: known(),
+                    latency,
+                    now: 0,
+                    there: VecDeque::new(),
+                    back: VecDeque::new(),
+                };
                 if aside {
                     session.side.send_aux(b"{sr:{posx:t,posy:t,posz:t,vel:t,feed:t,stat:t,line:t,unit:t,coor:t,dist:t}}\n{sv:2}\n{si:100}\n");
                     (0..400).for_each(|_| session.run());

@@ -5,14 +5,42 @@
 mod by_sender;
 
 use kerf::boards::MEGA2560_GRBL;
-use kerf_sim::Machine;
+use kerf_sim::{Loader, Machine};
 
-use crate::common::firmware;
+use crate::common::{firmware, image};
 use crate::side::Side;
 
 #[test]
 fn every_sender_finds_its_own() {
     by_sender::all(boot);
+}
+
+/// The port is opened, which resets the board, and what its sender says first comes while the boot loader waits for a
+/// command: it is lost, and delays the firmware by seconds. Half of the senders open the port twice. Then the sender
+/// begins anew, and each byte takes 200 ms.
+#[test]
+fn every_sender_finds_its_own_behind_the_boot_loader() {
+    let elf = image(&MEGA2560_GRBL);
+    let loader = Loader::of_debian().unwrap();
+    by_sender::all_late(200, |first| {
+        let mut machine = Machine::load(&elf, &MEGA2560_GRBL).unwrap();
+        machine.install(&loader);
+        machine.run_ms(40 * (first.len() as u64 % 24));
+        if first.len() % 2 == 0 {
+            machine.reset();
+            machine.run_ms(300);
+        }
+        Side::send(&mut machine, first);
+        let mut heard = String::new();
+        for _ in 0..100 {
+            machine.run_ms(100);
+            heard += &String::from_utf8_lossy(&machine.heard());
+            if heard.contains("for help]") {
+                return machine;
+            }
+        }
+        panic!("no greeting, but {heard:?}");
+    });
 }
 
 #[test]
