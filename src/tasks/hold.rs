@@ -230,6 +230,10 @@ fn act(links: &Links, port: &Port, characters: u8) {
     }
     if busy {
         machine::take(machine::Event::Hold);
+        if port.speech.get().is_in_order() && machine::cycle() == machine::Cycle::Jog {
+            // In grbl's dialect a hold ends a jog.
+            jog::end(links);
+        }
     } else if holds && !kills {
         jog::bar(links);
         if port.speech.get().is_in_order() && may_hold_at_rest() {

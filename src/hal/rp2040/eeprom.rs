@@ -5,10 +5,10 @@
 //! alike.
 //!
 //! **While the flash is written nothing else runs from it**: for 1 ms, and every 80 items for 45 ms, in which a sector
-//! is erased. So a piece waits until the motors stand still and no byte has come for [`QUIET_MS`]; until then
-//! [`Memory::is_busy`] is true. The waiting piece takes more bytes meanwhile, so a record of the log makes two or three
-//! items, not one for each byte. At most one piece waits: a write to another piece makes the waiting one be stored at
-//! once.
+//! is erased; by the data sheet of the flash 400 ms at worst. Heaters are off meanwhile. So a piece waits until the
+//! motors stand still and no byte has come for [`QUIET_MS`]; until then [`Memory::is_busy`] is true. The waiting piece
+//! takes more bytes meanwhile, so a record of the log makes two or three items, not one for each byte. At most one
+//! piece waits: a write to another piece makes the waiting one be stored at once.
 //!
 //! Only thread mode uses it, after start-up. RAM: 8.4 KB.
 
@@ -20,7 +20,7 @@ use embassy_rp::flash::{Blocking, Flash};
 use embassy_rp::peripherals::FLASH;
 
 use super::pieces::{BYTES, Pieces, number};
-use super::{stepper, time, uart, watchdog};
+use super::{heaters, stepper, time, uart, watchdog};
 use crate::store::Memory;
 use crate::store::program::AREA;
 
@@ -54,7 +54,9 @@ pub(super) fn start(flash: embassy_rp::Peri<'static, FLASH>) {
 
 /// Writes the piece that waits to the flash.
 fn put_away(pieces: &mut Pieces<Chip>) {
-    // Erasing takes as long as the flash needs, at worst longer than the watchdog waits.
+    // Erasing takes as long as the flash needs, at worst 400 ms, or for ever if the flash is broken: nobody looks after
+    // the heaters meanwhile, nor can the watchdog.
+    heaters::pause();
     watchdog::off();
     pieces.put_away();
     watchdog::start();

@@ -63,6 +63,12 @@ pub fn word(_: u8) -> Option<u16> {
     None
 }
 
+/// Switches both heaters off, until [`drive`] is called the next time: within 20 ms. Thread mode.
+pub(super) fn pause() {
+    let Some(Heaters { heaters, .. }) = ACTIVE.heaters else { return };
+    heaters.iter().for_each(|heater| gpio::set(heater.pin, false));
+}
+
 /// Switches the hot end, the bed and the fan: off at 0, else on. Thread mode.
 pub fn drive(power: [u8; 3]) {
     let Some(Heaters { heaters: [hot_end, bed], fan }) = ACTIVE.heaters else { return };

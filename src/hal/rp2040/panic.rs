@@ -1,5 +1,11 @@
 //! The panic handler. No panic is meant to be reachable after start-up. If one happens, motion and outputs stop and the
 //! machine stays still until it is reset. The message of the panic is sent [after the reset](super::last_words).
+//!
+//! A fault of the CPU, which is an access where no memory is, does the same. A stack that is too deep is such an access,
+//! because the stack lies at the lower end of RAM (`memory.x`). The CPU may then have no place for the frame of the
+//! fault's handler: it stands still, and the watchdog resets it within half a second.
+
+use cortex_m_rt::{ExceptionFrame, exception};
 
 use super::{gpio, last_words, pwm, stepper, watchdog};
 use crate::boards::ACTIVE;
@@ -21,6 +27,15 @@ pub fn make_safe() {
     ACTIVE.hazards.iter().for_each(|hazard| gpio::set(*hazard, false));
     gpio::stop_spindle();
     gpio::power(0);
+}
+
+// SAFETY: the handler of a fault ends all that runs, and its registers and the message are touched by nothing else
+// from then on.
+#[exception]
+unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
+    make_safe();
+    last_words::leave(&format_args!("fault at {:#x}", frame.pc()));
+    halt()
 }
 
 #[panic_handler]

@@ -158,8 +158,8 @@ impl Report {
                 // The measured speed of an encoder counts, even while the spindle is not programmed to turn.
                 let measures =
                     Capability::Lathe.is_built_in() && machine.value(Value::PulsesPerTurn) != 0;
-                let on = i32::from(measures || machine.value(Value::SpindleOn) != 0);
-                int(out, on * rpm(machine));
+                let on = measures || machine.value(Value::SpindleOn) != 0;
+                int(out, if on { turns(machine, measures) } else { 0 });
                 self.field = Field::Offset;
             }
             Field::Offset if self.with.0 => {
@@ -246,6 +246,17 @@ fn reported_error(machine: &mut impl Machine, out: &mut impl Out) {
 #[small]
 pub(super) fn rpm(machine: &mut impl Machine) -> i32 {
     (machine.value(Value::SpindleSpeed).abs() + 500) / 1_000
+}
+
+/// Returns the speed of the spindle that is on: as measured, or as programmed and overridden.
+#[small]
+fn turns(machine: &mut impl Machine, measures: bool) -> i32 {
+    let speed = rpm(machine);
+    match machine.value(Value::Override(Override::Spindle)) {
+        _ if measures => speed,
+        // At most 2,000, so that the product fits.
+        factor => speed.min(1_000_000) * factor / 1_000,
+    }
 }
 
 /// Returns a checksum of the offsets, which changes with them.

@@ -1,13 +1,13 @@
 // node bridge.mjs: an emulated board for a program that talks to it over standard input and output. Each line of the input is a request in JSON, each line of
 // the output its answer:
 //
-//   {"board": {"elf": "file", "motors": [[step, dir], ...]}, "cut": true, "stick": true, "panic": "file", "reset": true, "sense": [[channel, value]], "send": [[port, "hex"]], "now": [[port, byte]], "usb": {"open": bool, "reads": bool}, "unmasked": true, "loaded": true, "baud": [[port, rate]], "drive": [[gpio, high]], "wire": [...], "spindle": {"index": gpio, "sync": gpio, "pulses": n}, "marks": n, "turn": rpm, "drivers": [...], "record": bool, "until": cycle, "line": true}
+//   {"board": {"elf": "file", "motors": [[step, dir], ...]}, "cut": true, "stick": true, "panic": "file", "crash": "stack", "reset": true, "sense": [[channel, value]], "send": [[port, "hex"]], "now": [[port, byte]], "usb": {"open": bool, "reads": bool}, "unmasked": true, "loaded": true, "baud": [[port, rate]], "drive": [[gpio, high]], "wire": [...], "spindle": {"index": gpio, "sync": gpio, "pulses": n}, "noise": {"gpio": gpio, "period": cycles}, "marks": n, "turn": rpm, "drivers": [...], "record": bool, "until": cycle, "line": true}
 //
 // `board` comes first, and again where another board is to take the place of the one before. Ports are 0 and 1 for the UARTs, and 2 for USB; `usb` says what the program at its other end does.
 // With `record` edges of steps are recorded from there on, or what has been recorded is told and no more is. With `cut` the supply fails, and comes again; with `stick` the CPU gets stuck. What is sent and driven comes next; then the board runs to the cycle, or, with `line`, to the end of the next line that it says.
 import { createInterface } from 'node:readline';
 import { Machine } from './machine.mjs';
-import { Motors, Spindle } from './pins.mjs';
+import { Motors, Noise, Spindle } from './pins.mjs';
 import { Drivers } from './tmc2209.mjs';
 
 const PWM = 0x40050000;
@@ -29,6 +29,7 @@ function act(request) {
   if (request.cut) machine.cutPower();
   if (request.stick) machine.stick();
   if (request.panic) machine.panic(elf, request.panic);
+  if (request.crash) machine.crash(request.crash);
   if (request.reset) machine.reset();
   if (request.loaded) machine.startLoaded();
   if (request.unmasked) machine.masked = 0;
@@ -41,6 +42,7 @@ function act(request) {
   if (request.wire) motors.wire(request.wire);
   if (request.drivers) drivers.wire(request.drivers);
   if (request.spindle) machine.spindle = new Spindle(machine, request.spindle);
+  if (request.noise) machine.noise = new Noise(machine, request.noise);
   if (request.marks !== undefined) machine.spindle.setMarks(request.marks);
   if (request.turn !== undefined) machine.spindle.turn(request.turn);
   recorded = request.record === undefined ? undefined : motors.record(request.record);
@@ -76,6 +78,7 @@ function answer() {
     spent: machine.spent,
     masked: machine.masked,
     waited: machine.cache.waited,
+    stack: machine.deepest(),
     resets: machine.resets,
     waiting: machine.computer.bytes.length,
     recorded,

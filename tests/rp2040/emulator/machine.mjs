@@ -36,6 +36,10 @@ const USB = 0x50110;
 export const USB_PORT = 2;
 const UARTS = [[0x40034, 'UART0', 20], [0x40038, 'UART1', 21]];
 
+const RAM = 0x20000000;
+// What the stack has in it where it has not been used.
+const PAINT = 0xa5;
+const HARD_FAULT = 3;
 const XIP_FLUSH = 4;
 
 // XIP_CTRL, which rp2040js lacks: never streaming. What is written to one register empties the cache.
@@ -46,6 +50,20 @@ class XipControl extends BasePeripheral {
   }
   readUint32() { return 0; }
   writeUint32(offset) { if (offset === XIP_FLUSH) this.cache.flush(); }
+}
+
+// Whether nothing is at an address: behind the boot ROM, below and behind RAM.
+const isNowhere = (at) => (at >= 0x4000 && at < FLASH) || (at >= 0x19000000 && at < RAM) || (at >= RAM + 0x42000 && at < 0x40000000);
+
+// Tells of each access where nothing is, which rp2040js lets pass. Its narrow accesses there are made of whole ones.
+function watchAddresses(mcu, onFault) {
+  for (const name of ['readUint32', 'writeUint32']) {
+    const access = mcu[name].bind(mcu);
+    mcu[name] = (at, value) => {
+      if (isNowhere(at >>> 0)) onFault();
+      return access(at, value);
+    };
+  }
 }
 
 // An alarm of the timer goes off when the count becomes its value; that of rp2040js up to a microsecond before, so that who looks at the count then sees
@@ -138,6 +156,7 @@ export class Machine {
     this.senders = [new Sender(), new Sender()];
     // Whose sensors work pins; none by itself.
     this.spindle = { due: Infinity };
+    this.noise = { due: Infinity };
     this.inputs = new Map();
     this.sensed = [0, 0, 0, 0, 0];
     this.levels = new Array(30).fill(0);
@@ -188,6 +207,16 @@ export class Machine {
     this.boot(this.mcu);
   }
 
+  // The next instruction is one that reads where nothing is; or the stack ends right below what is on it.
+  crash(where) {
+    const { core, sram } = this.mcu;
+    core.waiting = false;
+    if (where === 'stack') core.SPmain = RAM + 8;
+    sram.set([0x03, 0x68], sram.length - 16); // LDR r3, [r0]
+    core.registers[0] = 0x30000000;
+    core.PC = RAM + sram.length - 16;
+  }
+
   // What a channel of the converter reads, of 4095.
   sense(channel, value) { this.sensed[channel] = value; }
 
@@ -223,6 +252,10 @@ export class Machine {
       pin.addListener((state) => this.changed(gpio, state));
       pin.setInputValue(this.inputs.get(gpio) ?? true);
     }
+    // The stack is below its first place, which the first word of the image is, down to the lower end of RAM.
+    this.stack = mcu.sram.subarray(0, mcu.readUint32(VECTORS) - RAM);
+    if (!sram) this.stack.fill(PAINT);
+    watchAddresses(mcu, () => { this.isFault = true; });
     goOffInTime(mcu);
     this.endAborts();
     this.timeInterrupts();
@@ -328,11 +361,26 @@ export class Machine {
   // Cycles until something happens that the CPU does not do itself, or `end`.
   untilDue(end) {
     const { clock } = this.mcu;
-    const { cycle, pios: [first, second], senders, spindle } = this;
+    const { cycle, noise, pios: [first, second], senders, spindle } = this;
     // What a state machine does at a cycle is done behind it.
-    const due = Math.min(end, senders[0].due, senders[1].due, spindle.due, first.due() + 1, second.due() + 1);
+    const due = Math.min(end, senders[0].due, senders[1].due, spindle.due, noise.due, first.due() + 1, second.due() + 1);
     const alarm = clock.nextAlarm ? clock.nanosToNextAlarm / NANOS : Infinity;
     return Math.ceil(Math.min(due - cycle, alarm));
+  }
+
+  // Bytes of the stack that have been used since power-up.
+  deepest() { return this.stack.length - this.stack.findIndex((byte) => byte !== PAINT); }
+
+  // The instruction at an address has faulted, with the stack as it was before. Behind a fault in a fault, and where there is no stack, the CPU stands
+  // still.
+  fault(pc, sp) {
+    const { core } = this.mcu;
+    const isSecond = core.IPSR === HARD_FAULT;
+    [core.PC, core.SPmain, this.isFault] = [pc, sp, false];
+    if (!isSecond) core.exceptionEntry(HARD_FAULT);
+    core.PC = (core.PC & ~1) >>> 0;
+    if (isSecond || this.isFault) this.stick();
+    this.isFault = false;
   }
 
   // One instruction by the core of rp2040js: all that mask interrupts are among those.
@@ -340,7 +388,9 @@ export class Machine {
     const { core } = this.mcu;
     const waits = core.PC >>> 24 === FLASH >>> 24 ? this.cache.touch(core.PC) : 0;
     const wasMasked = core.PM;
+    const [pc, sp] = [core.PC, core.SPmain];
     const spent = waits + core.executeInstruction();
+    if (this.isFault) this.fault(pc, sp);
     if (core.PM && !wasMasked) this.maskedAt = this.cycle;
     if (!core.PM && wasMasked) this.masked = Math.max(this.masked, this.cycle + spent - this.maskedAt);
     return spent;
@@ -352,6 +402,7 @@ export class Machine {
     const { clock, core } = mcu;
     if (this.cycle >= this.senders[0].due || this.cycle >= this.senders[1].due) this.receive();
     while (this.cycle >= this.spindle.due) this.spindle.pass();
+    while (this.cycle >= this.noise.due) this.noise.pass();
     let spent;
     if (core.waiting) {
       spent = Math.max(1, this.untilDue(end));

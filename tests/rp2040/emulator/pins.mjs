@@ -91,6 +91,21 @@ export class Motors {
   }
 }
 
+// Noise at a pin: its level changes with a period, in cycles.
+export class Noise {
+  constructor(machine, { gpio, period }) {
+    Object.assign(this, { machine, gpio, half: period / 2, high: true });
+    this.due = period ? machine.cycle + this.half : Infinity;
+    if (!period) machine.drive(gpio, true);
+  }
+  // The edge that is due.
+  pass() {
+    this.high = !this.high;
+    this.machine.drive(this.gpio, this.high);
+    this.due += this.half;
+  }
+}
+
 // The sensors of a spindle: they pull their pins low while marks pass. The index sees one in a turn, at its beginning; the other `pulses`, the first
 // half of the way between two behind that.
 const INDEX_WIDTH = 0.02;

@@ -430,6 +430,128 @@ fn interrupts_are_never_off_for_long() {
     assert!(masked > 0.1 && masked <= MASKED_US, "{masked} us");
 }
 
+/// 200 kHz at the probe's input, and around it, take no step of a million a second out of its place.
+#[test]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
+fn noise_at_a_switch_does_not_delay_motors() {
+    let (mut board, mut host) = booted();
+    FAST.iter().for_each(|line| set(&mut board, &mut host, line));
+    set(&mut board, &mut host, "g0 x100 y100 z100 a100");
+    host.run_for_ms(&mut board, 105).unwrap();
+    let probe = PICO_CNC.inputs[PROBE].unwrap().bit;
+    for period in [640, 700, 173, 2_560] {
+        board.disturb(probe, period);
+        let recorded = board.record_for_ms(2).unwrap();
+        let (rate, spread, worst) = evenness(&recorded.times[0]);
+        println!(
+            "{:.0} kHz: {rate:.0} steps/s, jitter {spread} cycles, {worst:.3} us",
+            128e3 / f64::from(period)
+        );
+        assert!(spread <= 1 && rate > 999_000.0, "{period}: {rate} {spread}");
+    }
+    board.disturb(probe, 0);
+}
+
+#[test]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
+fn a_fault_of_the_cpu_stops_everything_and_is_told_after_the_reset() {
+    let (mut board, mut host) = booted();
+    set(&mut board, &mut host, "m3 s1000");
+    set(&mut board, &mut host, "g1 x100 f1000");
+    host.run_for_ms(&mut board, 300).unwrap();
+    board.crash("address");
+    board.run_for_ms(1).unwrap();
+    let stands = Emulated::steps(&board);
+    assert!(!board.is_high(PICO_CNC.outputs[0].unwrap()));
+    board.run_for_ms(2_000).unwrap();
+    assert_eq!((Emulated::steps(&board), board.resets()), (stands, 0), "it waits");
+    board.reset();
+    board.run_for_ms(300).unwrap();
+    let said = String::from_utf8(board.receive_from(USB)).unwrap();
+    assert!(said.contains("{\"er\":{\"panic\":\"fault at 0x2004"), "{said}");
+}
+
+/// A stack that is too deep leaves the CPU without a place for the fault's frame: the watchdog resets it.
+#[test]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
+fn a_stack_that_is_too_deep_is_a_reset() {
+    let (mut board, mut host) = booted();
+    set(&mut board, &mut host, "m3 s1000");
+    set(&mut board, &mut host, "g1 x100 f1000");
+    host.run_for_ms(&mut board, 300).unwrap();
+    board.crash("stack");
+    board.run_for_ms(520).unwrap();
+    let stands = Emulated::steps(&board);
+    assert!(!board.is_high(PICO_CNC.outputs[0].unwrap()) && board.resets() == 1);
+    board.run_for_ms(1_000).unwrap();
+    assert_eq!(Emulated::steps(&board), stands);
+}
+
+/// Bytes of the stack that nothing has used when everything has been used. `memory.x` has 14 KiB.
+const STACK_LEFT: usize = 4 << 10;
+
+/// Answers in both dialects, lists, homing, probing, arcs, cycles, jobs, the worst of streams, stops: all that is deep.
+#[test]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
+fn the_stack_is_not_deep() {
+    let (mut board, mut host) = booted();
+    set(&mut board, &mut host, "{x:{vm:20000,fr:20000,ac:3000},si:50,sv:2}");
+    let stream = |n| {
+        format!(
+            "g1 f{} x{:.2} y{:.2} z{:.3}\n",
+            19_000 + n % 7,
+            f64::from(n) * 0.05,
+            f64::from(n % 9) * 0.05,
+            f64::from(n % 5) * 0.01
+        )
+    };
+    board.send_to(USB, (1..=1_000).map(stream).collect::<String>().as_bytes());
+    board.run_for_ms(200).unwrap();
+    for bytes in [
+        &b"{sys:n}\n{sr:n}\n{x:n}\n$$\n?\n"[..],
+        b"{qr:n}\n!\n~\n{sr:{posx:t,posy:t,stat:t}}\n$h\n$sys\n",
+        b"g2 x10 i5 f6000\ng81 x1 y1 z-1 r1\ng76 p1 z-1 i-0.2 j0.1 k0.5\ng38.3 z-1 f100\ng28.2 x0\n",
+        b"g10 l2 p1 x1\ng92 x0\n{gc:\"g1 x1 (msg here)\"}\n{x:{vm:12000,ac:1000}}\n{defa:1}\n",
+        b"{job:{1:\"g0 x1\"}}\n\x18",
+        b"!%",
+        b"{clear:n}\n{prf:n}\n{er:n}\n{kept:n}\n",
+    ] {
+        board.send_to(USB, bytes);
+        board.run_for_ms(1_000).unwrap();
+    }
+    board.reset();
+    board.run_for_ms(500).unwrap();
+    for bytes in [
+        &b"$$\n$#\n$G\n$I\n$N\n?"[..],
+        b"$100=250\n$J=G91X1F600\n\x85$C\n$C\n$H\n$X\n",
+        b"G91 G2 X5 I2.5 F3000\nG38.2 Z-1 F100\n$RST=*\n",
+    ] {
+        board.send_to(AUX, bytes);
+        board.run_for_ms(1_000).unwrap();
+    }
+    assert_shallow(&board);
+    // The most of an image: printing, drivers, the dialect of printing hosts.
+    let mut board = Emulated::load(&image(&SKR_PICO), &SKR_PICO).unwrap();
+    board.run_for_ms(300).unwrap();
+    for bytes in [
+        &b"M115\nM105\nM114\nM503\nM119\n"[..],
+        b"N1 M110*51\nM302 P1\nG28 X\nM303 E0 S50 C1\nM112\n",
+        b"M999\nG91\nG1 X5 E1 F3000\nG2 X5 I2.5 E1\nM600\nM108\nM500\nM301 P10\n",
+    ] {
+        board.send_to(USB, bytes);
+        board.run_for_ms(1_000).unwrap();
+    }
+    let said = String::from_utf8(board.receive_from(USB)).unwrap();
+    assert!(said.contains("FIRMWARE_NAME:Kerf") && said.matches("ok").count() > 8, "{said}");
+    assert_shallow(&board);
+}
+
+fn assert_shallow(board: &Emulated) {
+    let used = board.stack();
+    println!("{used} bytes of stack were used");
+    assert!(used > 2_000 && used + STACK_LEFT <= 14 << 10, "{used}");
+}
+
 #[test]
 #[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn settings_survive_a_power_cut_and_a_reset() {

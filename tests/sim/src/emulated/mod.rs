@@ -30,6 +30,7 @@ struct Request {
     stick: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
     panic: Option<String>,
+    crash: Option<String>,
     reset: bool,
     loaded: bool,
     unmasked: bool,
@@ -51,9 +52,19 @@ struct Request {
     #[serde(skip_serializing_if = "Option::is_none")]
     turn: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    noise: Option<Noise>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     record: Option<bool>,
     until: u64,
     line: bool,
+}
+
+/// Noise at a pin.
+#[derive(Serialize, Debug)]
+struct Noise {
+    gpio: u8,
+    /// Cycles of the CPU; 0 ends the noise.
+    period: u32,
 }
 
 /// The board that is to be powered up.
@@ -160,6 +171,8 @@ struct Answer {
     masked: f64,
     #[serde(default)]
     waited: f64,
+    #[serde(default)]
+    stack: usize,
     #[serde(default)]
     spent: Vec<f64>,
     #[serde(default)]
@@ -280,6 +293,12 @@ impl Emulated {
         self.request.stick = true;
     }
 
+    /// Makes the CPU read where nothing is: at an address far from memory, or, for `"stack"`, where there is no place
+    /// for the frame of the fault either.
+    pub fn crash(&mut self, where_: &str) {
+        self.request.crash = Some(where_.to_string());
+    }
+
     /// Makes the firmware panic: a cell is borrowed twice, in a file of this name.
     pub fn panic(&mut self, file: &str) {
         self.request.panic = Some(file.to_string());
@@ -339,6 +358,11 @@ impl Emulated {
         self.request.turn = Some(rpm);
     }
 
+    /// Has an input change its level with this period, in cycles of the CPU. 0 ends that.
+    pub fn disturb(&mut self, gpio: u8, period: u32) {
+        self.request.noise = Some(Noise { gpio, period });
+    }
+
     /// Records the edges of steps in the next milliseconds.
     pub fn record_for_ms(&mut self, ms: u64) -> Result<Recorded> {
         self.request.record = Some(true);
@@ -393,6 +417,11 @@ impl Emulated {
     /// Cycles that the CPU has waited for flash.
     pub fn waited(&self) -> f64 {
         self.answer.waited
+    }
+
+    /// Bytes of the stack that have been used since power-up.
+    pub fn stack(&self) -> usize {
+        self.answer.stack
     }
 
     /// Forgets how long interrupts were off.
