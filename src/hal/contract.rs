@@ -305,6 +305,9 @@ pub trait Timing {
     /// Shortest block with steps, s: twice the time that exec takes for it while the step interrupt is busy. At most
     /// 1/1,024.
     const BLOCK_S_MIN: f32 = 0.000_75;
+    /// The share of the step rate that chords and short blocks may use, because exec has much more to do there than in a
+    /// long line: five eighths, or 1.
+    const SHORT_SHARE: f32 = 0.625;
     /// Blocks that can wait at once, limited by RAM.
     const LOOK_AHEAD: usize = if cfg!(feature = "sd") && !cfg!(feature = "std") { 38 } else { 61 };
     /// Lines that can wait on a port. At most 9, because brief answers report with one digit how many more may come.
@@ -319,6 +322,8 @@ pub const TIMER_HZ: u32 = <imp::Chip as Timing>::TIMER_HZ;
 pub const PULSE_US: u8 = <imp::Chip as Timing>::PULSE_US;
 /// [`Timing::BLOCK_S_MIN`] of the chip of this image.
 pub const BLOCK_S_MIN: f32 = <imp::Chip as Timing>::BLOCK_S_MIN;
+/// [`Timing::SHORT_SHARE`] of the chip of this image.
+pub const SHORT_SHARE: f32 = <imp::Chip as Timing>::SHORT_SHARE;
 /// [`Timing::LOOK_AHEAD`] of the chip of this image.
 pub const LOOK_AHEAD: usize = <imp::Chip as Timing>::LOOK_AHEAD;
 /// [`Timing::LINES`] of the chip of this image.

@@ -16,6 +16,7 @@ use super::junction::{Heading, ONE, turn};
 use super::limits::Slowest;
 use super::path::Path;
 use super::short::{Log, OCTAVE, Short};
+use crate::hal::SHORT_SHARE;
 use crate::hal::arithmetic::product;
 use crate::math::sqrt;
 use crate::units::FIRST_ROTARY;
@@ -47,6 +48,11 @@ const CORNERS: u8 = 1;
 /// Changes of direction beyond this, some 40 degrees, do not belong to a curve. In 2^-14.
 const CORNER: u16 = 11_000;
 
+/// Whether an arc is no faster than the slower of its axes: its velocity is even. Otherwise chords that are parallel to
+/// no axis are faster, where the feed is beyond what an axis can do. Small chips have no room for this, and no such
+/// feeds.
+const EVEN: bool = SHORT_SHARE == 1.0;
+
 /// The limits of an arc.
 #[derive(Clone, Copy, Debug)]
 pub struct Curve {
@@ -74,17 +80,20 @@ impl Curve {
         dynamics: &Dynamics,
     ) -> (Self, f32) {
         let mut slowest = Slowest::default();
+        let mut curve = Self { velocity: f32::MAX, accel: Short::ZERO, goes_on: false };
         for axis in axes {
             if let Some(axis) = dynamics.axes.get(usize::from(axis)) {
                 slowest.look(ONE as u16, axis.accel, axis.jerk);
+                if EVEN && some(axis.feed) {
+                    curve.velocity = least(curve.velocity, axis.feed);
+                }
             }
         }
         let (accel, jerk) = (slowest.least.get(), slowest.jerk.get());
         let radius = greater(radius, RADIUS_LEAST);
-        let mut curve = Self { velocity: f32::MAX, accel: Short::ZERO, goes_on: false };
         let mut longest = f32::MAX;
         if some(jerk) {
-            curve.velocity = cube_root(jerk * radius * radius);
+            curve.velocity = least(curve.velocity, cube_root(jerk * radius * radius));
         }
         if some(accel) {
             let ramps = some(jerk) && some(effective_jerk(jerk, accel));

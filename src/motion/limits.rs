@@ -15,6 +15,7 @@ use super::path::Path;
 use super::short::{self, Log, Short};
 use crate::boards::MOTORS;
 use crate::gcode::command::Feed;
+use crate::hal::SHORT_SHARE;
 use crate::hal::arithmetic::product;
 use crate::math::sqrt;
 
@@ -55,10 +56,9 @@ fn times(a: f32, b: f32) -> f32 {
 /// Half a step, in parts of a step.
 const HALF_STEP: u16 = 1 << (PARTS_LOG2 - 1);
 
-/// The share of the step rate that short blocks may use.
-const SHORT_SHARE: f32 = 0.625;
 /// The logarithm of [`SHORT_SHARE`].
-const SHORT_SHARE_LOG: i16 = -174;
+const SHORT_SHARE_LOG: i16 = if SHORT_SHARE < 1.0 { -174 } else { 0 };
+const _: () = assert!(SHORT_SHARE == 0.625 || SHORT_SHARE == 1.0, "a share with another logarithm");
 /// More than the error of a sum of three logarithms.
 const SPARE: i16 = 24;
 
@@ -206,7 +206,7 @@ impl Path {
     }
 
     /// Keeps motors within the step rate that all motors that move can have together. Chords of arcs, and blocks short
-    /// enough for parts of a step, get five eighths of that rate: exec has much more to do there than in a long line.
+    /// enough for parts of a step, get the share [`SHORT_SHARE`] of that rate.
     /// Gives every block at least the time that exec needs ([`BLOCK_S_MIN`]).
     ///
     /// Cost: 300 where logarithms decide; 1,000 for a feed beyond the limit, or just below it. Velocities between the

@@ -604,15 +604,15 @@ impl LinePool {
     fn drop_data(&mut self, first: u8, class: Class) -> bool {
         for index in first..self.entries.len() as u8 {
             let id = LineId(index);
-            let is_data = self.class(id).is_whole();
-            if class == Class::Late
-                && (is_data || self.class(id) == Class::Control)
-                && self.ends_alarm(self.text(id))
-            {
+            let before = self.class(id);
+            if !before.is_whole() && before != Class::Control {
+                continue;
+            }
+            if class == Class::Late && self.ends_alarm(self.text(id)) {
                 return usize::from(index) + 1 == self.entries.len();
             }
             if let Some(entry) = self.entries.get_mut(index.into())
-                && is_data
+                && before != Class::Control
             {
                 entry.class = class;
             }

@@ -34,10 +34,16 @@ pub fn set_frequency(millihertz: u32) {
     let (sixteenths, top) = divide(millihertz);
     let channel = PWM.ch(slice);
     channel.csr().write(|w| w.set_en(false));
-    channel.div().write(|w| w.0 = sixteenths);
+    channel.div().write(|w| {
+        w.set_int((sixteenths / 16) as u8);
+        w.set_frac((sixteenths % 16) as u8);
+    });
     channel.top().write(|w| w.set_top(top as u16));
-    channel.cc().write(|w| w.0 = 0);
-    channel.ctr().write(|w| w.0 = 0);
+    channel.cc().write(|w| {
+        w.set_a(0);
+        w.set_b(0);
+    });
+    channel.ctr().write(|w| w.set_ctr(0));
     gpio::connect(pin, Unit::Pwm);
     channel.csr().write(|w| {
         w.set_ph_correct(true);

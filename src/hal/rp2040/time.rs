@@ -18,8 +18,8 @@ const PRIORITY: u8 = 1 << 6;
 
 /// Starts the count. Start-up.
 pub(super) fn start() {
-    // SAFETY: nobody else uses the core's peripherals.
-    let mut core = unsafe { cortex_m::Peripherals::steal() };
+    // Nobody has taken them before.
+    let Some(mut core) = cortex_m::Peripherals::take() else { return };
     // SAFETY: start-up.
     unsafe { core.SCB.set_priority(SystemHandler::SysTick, PRIORITY) };
     let syst: &mut SYST = &mut core.SYST;

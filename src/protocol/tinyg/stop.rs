@@ -2,6 +2,7 @@
 
 use super::json;
 use super::token::{Operation, Target, resolve};
+use crate::capability::Capability;
 use crate::config::Name;
 use crate::machine::Alarm;
 use crate::protocol::STOP_MAX;
@@ -13,7 +14,7 @@ use crate::protocol::STOP_MAX;
 #[small]
 pub fn asks_alarm(line: &[u8]) -> Option<Alarm> {
     match letters(line) {
-        _ if line.first() == Some(&b'$') => return None,
+        _ if is_text(line) => return None,
         [b'a', b'l'] | [b's', b'h'] | [b'p', b'a'] => {}
         _ => return None,
     }
@@ -29,6 +30,12 @@ pub fn asks_alarm(line: &[u8]) -> Option<Alarm> {
 #[small]
 pub fn ends_alarm(line: &[u8]) -> bool {
     letters(line) == *b"cl" && matches!(operation(line), Some(Operation::Clear))
+}
+
+/// Whether a line is a command of text mode.
+#[inline(always)]
+fn is_text(line: &[u8]) -> bool {
+    Capability::Text.is_built_in() && line.first() == Some(&b'$')
 }
 
 /// Returns the first two letters of a line, in lower case.
@@ -47,7 +54,7 @@ fn letters(line: &[u8]) -> [u8; 2] {
 fn operation(line: &[u8]) -> Option<Operation> {
     let name = match line {
         _ if line.len() > STOP_MAX => return None,
-        [b'$', name @ ..] => name.trim_ascii(),
+        [_, name @ ..] if is_text(line) => name.trim_ascii(),
         _ => {
             json::check(line).ok()?;
             json::pair(line, json::skip_blanks(line) + 1)?.name.of(line)

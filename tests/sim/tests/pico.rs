@@ -241,6 +241,28 @@ fn half_a_million_steps_a_second_of_six_motors() {
     assert_eq!(board.positions(), [76_800, 76_800, 76_800, 66_560, 76_800, 76_800]);
 }
 
+/// Six motors of six rates, the leading one at a million steps a second. Nearly all of the time goes to the feeder, which
+/// writes a word for each microsecond.
+#[test]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
+fn six_unlike_motors_leave_time() {
+    let mut board = Emulated::load(&image(&PICO_CNC6), &PICO_CNC6).unwrap();
+    let mut host = Host::new(LINES_IN_FLIGHT);
+    host.boot(&mut board, 1_000).unwrap();
+    FAST.iter().for_each(|line| set(&mut board, &mut host, line));
+    for line in ["{5ma:1,5tr:1.47,6ma:2,6tr:1.93}", "g0 x100 y87.3 z61.8 a79"] {
+        set(&mut board, &mut host, line);
+    }
+    host.run_for_ms(&mut board, 105).unwrap();
+    let asleep = board.asleep();
+    let recorded = board.record_for_ms(6).unwrap();
+    let idle = (board.asleep() - asleep) / (6.0 * 128e3);
+    let rates = recorded.times.iter().map(|times| evenness(times).0);
+    println!("{:.0?}, {:.0} % idle", rates.collect::<Vec<_>>(), 100.0 * idle);
+    assert!(evenness(&recorded.times[0]).0 > 995e3 && idle >= 0.12, "{idle}");
+    host.run_for_ms(&mut board, 1_000).unwrap();
+}
+
 #[test]
 #[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn a_stuck_chip_is_bitten_and_says_so() {
@@ -428,6 +450,28 @@ fn interrupts_are_never_off_for_long() {
     let masked = board.masked() / 128.0;
     println!("interrupts were off for {masked:.2} us at most");
     assert!(masked > 0.1 && masked <= MASKED_US, "{masked} us");
+}
+
+/// An arc that is asked for more than its axes can do has one velocity, that of an axis.
+#[test]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
+fn an_arc_at_the_limit_of_its_axes_is_even() {
+    let (mut board, mut host) = booted();
+    FAST.iter().for_each(|line| set(&mut board, &mut host, line));
+    set(&mut board, &mut host, "g2 x0 y0 i100 j0.001 f60000");
+    host.run_for_ms(&mut board, 150).unwrap();
+    let mut velocities = Vec::new();
+    for _ in 0..50 {
+        let before = Emulated::steps(&board);
+        board.run_for_ms(10).unwrap();
+        let now = Emulated::steps(&board);
+        let way = |m: usize| (now[m] - before[m]) as f64 / 1_280.0;
+        velocities.push(way(0).hypot(way(1)) * 100.0);
+    }
+    let (least, most) =
+        velocities.iter().fold((f64::MAX, 0f64), |(a, b), v| (a.min(*v), b.max(*v)));
+    println!("{least:.0} to {most:.0} mm/s");
+    assert!(least > 775.0 && most < 787.0, "{velocities:.0?}");
 }
 
 /// 200 kHz at the probe's input, and around it, take no step of a million a second out of its place.

@@ -23,7 +23,7 @@ const ORIGIN: u8 = 0;
 const HALF_TAKEN: [core::ops::RangeInclusive<u8>; 2] = [1..=4, 10..=12];
 const TAKEN: u8 = 13;
 /// Bit of the interrupt flag that a marked entry raises.
-const MARKED: u32 = 1;
+const MARKED: u8 = 1;
 /// How often [`place`] reads again when the state machine moves on meanwhile.
 const TRIES: u8 = 8;
 /// Words of an entry.
@@ -142,7 +142,7 @@ pub(super) fn start() {
     }
     // All pins of the chip. Only the motors' pins are connected to the state machine.
     sm.pinctrl().write(|w| w.set_out_count(PINS));
-    PIO0.irqs(0).inte().write(|w| w.0 = MARKED << 8);
+    PIO0.irqs(0).inte().write(|w| w.set_sm0(true));
     DMA.inte(0).write_value(0b11);
     for interrupt in [DMA_IRQ_0, PIO0_IRQ_0] {
         interrupt.set_priority(Priority::P2);
@@ -165,11 +165,11 @@ fn execute(instruction: u16) {
 /// Stops the state machine at once. Any level.
 pub(super) fn halt() {
     // Nobody uses the other state machines.
-    PIO0.ctrl().write(|w| w.0 = 0);
+    PIO0.ctrl().write(|w| w.set_sm_enable(0));
 }
 
 fn run() {
-    PIO0.ctrl().write(|w| w.0 = 1 << SM);
+    PIO0.ctrl().write(|w| w.set_sm_enable(1 << SM));
 }
 
 /// Sets the count of pulses from the next entry on. The feeder, while nothing is sent.
@@ -196,9 +196,9 @@ pub(super) fn take_done() -> u32 {
 
 /// Whether a marked entry has been carried out since the last call.
 pub(super) fn take_mark() -> bool {
-    let marked = PIO0.irq().read().0 & MARKED != 0;
+    let marked = PIO0.irq().read().irq() & MARKED != 0;
     if marked {
-        PIO0.irq().write(|w| w.0 = MARKED);
+        PIO0.irq().write(|w| w.set_irq(MARKED));
     }
     marked
 }
