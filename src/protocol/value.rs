@@ -69,10 +69,8 @@ pub enum Value {
     /// How often the step generator has waited for the planner in mid-motion since the reset; 255 for 255 or more.
     Starvations,
     /// How often USB has been restarted since the start, because it hung; 255 for 255 or more.
-    #[cfg(not(target_arch = "avr"))]
     UsbRestarts,
     /// Milliseconds with errors of the USB bus since the start, modulo 2^16.
-    #[cfg(not(target_arch = "avr"))]
     UsbErrors,
     /// Rising edges at the pin of the hardware's counter since the start, modulo 2^16; 0 without one.
     AtCounter,
