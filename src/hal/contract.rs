@@ -139,9 +139,11 @@ contract! {
         /// count: that program reads the greeting of the start.
         /// [`Event::Realtime`](crate::hal::event::Event::Realtime) announces it. Thread mode.
         fn take_opened() -> bool;
-        /// Whether the program that had the first port open has closed it since the last call, and none has opened it
-        /// since. [`Event::Received`](crate::hal::event::Event::Received) announces it. Thread mode.
-        fn take_closed() -> bool;
+        /// Returns how often the first port's USB has been restarted since the start, because it hung; 255 for more.
+        /// Thread mode.
+        fn restarts() -> u8;
+        /// Returns in how many milliseconds USB has seen errors of its bus since the start, modulo 2^16. Thread mode.
+        fn bus_errors() -> u16;
         /// Returns how many line ends have been lost since start-up, modulo 2^16. Thread mode.
         fn lost_ends(port: u8) -> u16;
         /// Returns how many bytes may come before one is lost, at most 254: one less than the receive ring has room
@@ -291,6 +293,9 @@ contract! {
         fn reset();
         /// Starts the boot loader, if the board has one; else acts as [`reset`](System::reset). Thread mode.
         fn boot();
+        /// Tells whether the machine rests. Only then a computer may restart it by a request of USB. Thread mode, every
+        /// 20 ms.
+        fn set_rests(rests: bool);
     }
 }
 

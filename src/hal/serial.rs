@@ -47,6 +47,10 @@ pub const CUT: u8 = RETURNED;
 /// Not a loss marker either: records where `~` stood in the stream.
 pub const GO: u8 = RETURNED | BEHIND_END;
 
+/// Where a program has closed the first port in the midst of a line, which is forgotten. This byte never comes into the
+/// ring from outside: it is replaced by [`STRAY`] on chips that notice the closing.
+pub const CLOSE: u8 = 0x1B;
+
 /// Replaces a line that has been taken out of its turn. This byte never comes into the ring from outside, because
 /// outside it is `^x`, the reset.
 pub const TAKEN: u8 = 0x18;

@@ -68,6 +68,10 @@ pub enum Value {
     Reset,
     /// How often the step generator has waited for the planner in mid-motion since the reset; 255 for 255 or more.
     Starvations,
+    /// How often USB has been restarted since the start, because it hung; 255 for 255 or more.
+    UsbRestarts,
+    /// Milliseconds with errors of the USB bus since the start, modulo 2^16.
+    UsbErrors,
     /// Rising edges at the pin of the hardware's counter since the start, modulo 2^16; 0 without one.
     AtCounter,
     /// 1 if all settings and tables are in EEPROM, 0 if some are still being written.

@@ -23,7 +23,8 @@
 use super::lines::{LinePool, is_blank};
 use super::links::Links;
 use crate::hal::ring::Window;
-use crate::hal::serial::{CLEAN, CUT, GO, MARKS, TAKEN, TAKEN_RETURN};
+use crate::hal::serial::{CLEAN, CLOSE, CUT, GO, MARKS, TAKEN, TAKEN_RETURN};
+use crate::hal::uart;
 use crate::machine;
 use crate::protocol::may_be_control;
 
@@ -100,7 +101,7 @@ impl Scan {
                     break;
                 }
                 self.within = byte & CLEAN == 0;
-            } else if byte == b'\n' || byte == b'\r' {
+            } else if byte == b'\n' || byte == b'\r' || is_close(byte) {
                 self.within = false;
             } else if !self.within && !is_nothing(byte) {
                 let (len, ends) = match find(ring, self.looked, pool.reserve()) {
@@ -132,6 +133,11 @@ impl Scan {
         }
         took
     }
+}
+
+/// Whether a program has closed the port here.
+fn is_close(byte: u8) -> bool {
+    uart::sees_opening() && byte == CLOSE
 }
 
 /// Whether a byte between two lines belongs to no line.

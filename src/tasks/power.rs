@@ -1,19 +1,20 @@
 //! The power task: gives motors power, and takes it from them when they have been idle.
 //!
 //! Reads the settings, the milliseconds and exec's snapshot; writes the drivers' enables. Runs every [`LOOK_MS`], and
-//! also checks the [`health`] of the firmware. Exec calls [`segment`] before it queues a segment, so that a driver is
+//! also checks the [`health`] of the firmware, and tells a chip with USB whether the machine rests. Exec calls [`segment`] before it queues a segment, so that a driver is
 //! on before its step; that costs 40 cycles a segment. All others change the state under the ceiling.
 
 use super::common;
 use super::health;
 use super::heat;
 use super::links::Links;
-use super::{surface, turning};
+use super::view::View;
+use super::{spindle, surface, turning};
 use crate::config::Settings;
 use crate::hal::Thread;
 use crate::hal::after_ms;
-use crate::hal::gpio;
 use crate::hal::time::millis;
+use crate::hal::{gpio, system, uart};
 use crate::machine;
 use crate::motors::{Modes, Motors};
 
@@ -29,12 +30,25 @@ pub async fn run(links: &'static Links) -> ! {
         look(links);
         turning::look(links);
         surface::look(links);
+        if uart::sees_opening() {
+            system::set_rests(rests(links));
+        }
         if links.chain_waits.take() {
             // The chain may have waited long enough.
             links.planner_wake.signal();
         }
         after_ms(LOOK_MS).await;
     }
+}
+
+/// Whether nothing moves or is queued, no heater and no spindle is on, and all settings are stored.
+#[inline(never)]
+#[small]
+fn rests(links: &Links) -> bool {
+    let is_cold =
+        |heater| heat::standing(links, heater).is_none_or(|it| it.to == 0 && it.power == 0);
+    let works = links.has_data() || View::of(links, links.feeder()).is_busy();
+    !works && spindle::on() == 0 && is_cold(0) && is_cold(1) && links.storage.is_done()
 }
 
 /// Takes power from the motors that have been idle long enough.

@@ -21,8 +21,8 @@ use crate::gcode::comment::Aside;
 use crate::hal::event::{Event, next, set_asked};
 use crate::hal::ring::Window;
 use crate::hal::serial::{
-    AUX, AUX_RING, BEHIND_END, CLEAN, CUT, Flow, GO, MARKS, PORTS, RETURNED, RX_RING, Received,
-    TAKEN, TAKEN_RETURN, USB, high_water, is_shared, low_water,
+    AUX, AUX_RING, BEHIND_END, CLEAN, CLOSE, CUT, Flow, GO, MARKS, PORTS, RETURNED, RX_RING,
+    Received, TAKEN, TAKEN_RETURN, USB, high_water, is_shared, low_water,
 };
 use crate::hal::uart::{self, lost_ends};
 use crate::machine;
@@ -156,18 +156,7 @@ impl Intake {
             }
             _ => {}
         }
-        if uart::sees_opening() && left == Left::Nothing {
-            self.see_to_closing();
-        }
         left
-    }
-
-    /// Drops the half line of a program that has closed the port. Otherwise the first line of the next program would
-    /// be appended to it.
-    fn see_to_closing(&self) {
-        if self.port.number == USB && uart::take_closed() {
-            self.port.lines.borrow_mut().forget();
-        }
     }
 
     /// Takes the bytes of a turn.
@@ -224,6 +213,12 @@ impl Intake {
                 TAKEN_RETURN if pool.is_plain() => pool.put(byte),
                 TAKEN | TAKEN_RETURN => {
                     pool.follow(byte == TAKEN_RETURN);
+                    false
+                }
+                // A program has closed the port. The first line of the next program must not be appended to its half
+                // line.
+                CLOSE if uart::sees_opening() => {
+                    pool.forget();
                     false
                 }
                 _ => pool.put(byte),

@@ -18,7 +18,8 @@ use super::links::Links;
 use super::overtake::Scan;
 use super::ports::Port;
 use crate::hal::ring::Window;
-use crate::hal::serial::{CLEAN, CUT, GO, MARKS, TAKEN};
+use crate::hal::serial::{CLEAN, CLOSE, CUT, GO, MARKS, TAKEN};
+use crate::hal::uart;
 use crate::machine::Alarm;
 use crate::protocol::{STOP_MAX, asks_alarm};
 
@@ -69,6 +70,10 @@ impl Scan {
                     (at, whole) = (n + 1, true);
                 }
                 CUT | GO | TAKEN => {}
+                CLOSE if uart::sees_opening() => {
+                    line.clear();
+                    (at, whole) = (n + 1, true);
+                }
                 mark if mark < MARKS => {
                     if n + 1 == ring.len() {
                         // The mark may yet come to tell of more.

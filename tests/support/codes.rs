@@ -87,7 +87,7 @@ can be read as well: [settings.md](settings.md). Names that do something: [proto
 ";
 
 /// Values of the machine: the name, or the name within its group with `x`, `1` or `e` for the group; and the meaning.
-const VALUES: [(&str, &str); 63] = [
+const VALUES: [(&str, &str); 65] = [
     (
         "n",
         "line number (N) of the last finished line; in motion, of those that move or switch something",
@@ -136,6 +136,11 @@ const VALUES: [(&str, &str); 63] = [
         "cause of the last start: 0 power, 1 reset button or port, 2 low supply voltage, 3 watchdog, 4 request",
     ),
     ("stv", "number of times that steps came late since the start; should be 0"),
+    ("usbr", "RP2040, else 0: number of times that USB hung and was restarted since the start"),
+    (
+        "usbe",
+        "RP2040, else 0: milliseconds with errors of the USB bus since the start, modulo 65,536",
+    ),
     (
         "pls",
         "rising edges at D47 since the start, modulo 65,536: connect it with a step pin to count pulses; 0 on images with `spn`, and on the RP2040",

@@ -48,7 +48,7 @@ pub struct Chip;
 
 /// Functions of [`System`](super::contract::System).
 pub mod system {
-    pub use super::{boot, reset};
+    pub use super::{boot, reset, set_rests};
 }
 
 /// Functions of [`Text`](super::primitives::Text).
@@ -103,6 +103,9 @@ pub fn boot() -> ! {
         );
     }
 }
+
+/// Does nothing: this chip has no USB.
+pub fn set_rests(_: bool) {}
 
 /// Whether the boot section, from 0x3E000 on, holds a program.
 fn has_boot_loader() -> bool {

@@ -360,9 +360,14 @@ pub fn take_opened() -> bool {
     false
 }
 
-/// Always false: see [`sees_opening`].
-pub fn take_closed() -> bool {
-    false
+/// Always 0: this chip has no USB.
+pub fn restarts() -> u8 {
+    0
+}
+
+/// Always 0: see [`restarts`].
+pub fn bus_errors() -> u16 {
+    0
 }
 
 /// Returns how many line ends have been lost since start-up, modulo 2^16.

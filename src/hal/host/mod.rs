@@ -38,7 +38,7 @@ pub struct Chip;
 
 /// Functions of [`System`](super::contract::System).
 pub mod system {
-    pub use super::{boot, reset};
+    pub use super::{boot, reset, set_rests};
 }
 
 /// Functions of [`Text`](super::primitives::Text).
@@ -83,6 +83,9 @@ pub fn reset() {
 pub fn boot() {
     reset();
 }
+
+/// Does nothing: there is no USB.
+pub fn set_rests(_: bool) {}
 
 /// Whether the firmware has asked for a reset.
 pub fn was_reset() -> bool {

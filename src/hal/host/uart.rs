@@ -11,8 +11,9 @@ use crate::boards::ACTIVE;
 use crate::hal::event::Event;
 use crate::hal::ring::{Consumer, Producer, Ring};
 use crate::hal::serial::{
-    self, AUX, AUX_RING, AllEnds, CUT, Ends, Flow, GO, LATE, LINE_END, MARKS, PORTS, RX_RING,
-    STRAY, TX_RING, USB, XOFF, XON, batch, hardware, high_water, last_mark, lose, mark, wait_ms,
+    self, AUX, AUX_RING, AllEnds, CLOSE, CUT, Ends, Flow, GO, LATE, LINE_END, MARKS, PORTS,
+    RX_RING, STRAY, TX_RING, USB, XOFF, XON, batch, hardware, high_water, last_mark, lose, mark,
+    wait_ms,
 };
 use crate::realtime::{self, Asked};
 
@@ -85,8 +86,6 @@ struct Line {
     rts: bool,
     /// A program has opened the port.
     opened: bool,
-    /// A program has closed the port.
-    closed: bool,
     lost_ends: u16,
     /// Bytes queued, modulo 256.
     queued: u8,
@@ -121,7 +120,6 @@ impl Line {
             cts: false,
             rts: false,
             opened: false,
-            closed: false,
             lost_ends: 0,
             queued: 0,
             realtime: 0,
@@ -270,20 +268,31 @@ pub fn take_opened() -> bool {
     with(USB, |line| core::mem::take(&mut line.opened))
 }
 
-/// Whether the program that had the first port open has closed it since the last call.
-pub fn take_closed() -> bool {
-    with(USB, |line| core::mem::take(&mut line.closed))
+/// Always 0: this USB never hangs.
+pub fn restarts() -> u8 {
+    0
+}
+
+/// Always 0: see [`restarts`].
+pub fn bus_errors() -> u16 {
+    0
 }
 
 /// Makes a program open the first port.
 pub(super) fn open_usb() {
-    with(USB, |line| (line.opened, line.closed) = (true, false));
+    with(USB, |line| line.opened = true);
     flags::set(Event::Realtime);
 }
 
 /// Makes the program close the first port.
 pub(super) fn close_usb() {
-    with(USB, |line| line.closed = true);
+    with(USB, |line| {
+        let ended = matches!(line.last, 0 | b'\n' | b'\r');
+        if let (false, Some(ring)) = (ended, line.rx_in.as_mut()) {
+            ring.push(CLOSE);
+            line.last = b'\n';
+        }
+    });
     flags::set(Event::Received);
 }
 
@@ -478,7 +487,7 @@ impl Line {
         }
         let Some(ring) = self.rx_in.as_mut() else { return };
         let full = ring.is_full();
-        let byte = if byte < MARKS { STRAY } else { byte };
+        let byte = if byte < MARKS || byte == CLOSE { STRAY } else { byte };
         if full || garbles {
             self.lost_ends = self.lost_ends.wrapping_add(lost(ring.as_mut(), byte));
         } else {

@@ -10,7 +10,7 @@
 //! | 1 | UART0_IRQ, UART1_IRQ | `uart` | bytes between the line and the rings |
 //! | 1 | SysTick | `time` | counts milliseconds |
 //! | 2 | DMA_IRQ_0, PIO0_IRQ_0 | `stepper` | the feeder: runs the step generator ahead of time, and writes words |
-//! | 2 | SWI_IRQ_2, USBCTRL_IRQ | `usb` | the tasks of USB: packets between the bus and the rings |
+//! | 2 | SWI_IRQ_2, USBCTRL_IRQ | `usb` | the tasks of USB: packets between the bus and the rings; a restart of its controller |
 //! | 2 | TIMER_IRQ_0 | `embassy-rp` | wakes tasks whose time has come |
 //! | 3 | SWI_IRQ_1 | [`avr_embassy::interrupt`] | polls the exec executor |
 //! | thread | | [`avr_embassy::Executor`] | everything else |
@@ -64,6 +64,7 @@ pub struct Chip;
 
 /// Functions of [`System`](super::contract::System).
 pub mod system {
+    pub use super::usb::set_rests;
     pub use super::watchdog::{boot, reset};
 }
 

@@ -30,8 +30,8 @@ use crate::boards::{ACTIVE, Usart};
 use crate::hal::event::Event;
 use crate::hal::ring::{Consumer, Producer, Ring};
 use crate::hal::serial::{
-    self, AUX, AUX_RING, AllEnds, CUT, Ends, Flow, GO, LATE, LINE_END, MARKS, PORTS, RX_RING,
-    STRAY, TX_RING, USB, XOFF, XON, batch, hardware, last_mark, lose, mark, wait_ms,
+    self, AUX, AUX_RING, AllEnds, CLOSE, CUT, Ends, Flow, GO, LATE, LINE_END, MARKS, PORTS,
+    RX_RING, STRAY, TX_RING, USB, XOFF, XON, batch, hardware, last_mark, lose, mark, wait_ms,
 };
 use crate::realtime::{self, Asked};
 
@@ -118,10 +118,14 @@ impl Filling {
     }
 }
 
-/// The bytes of a packet that wait for room in the ring. The next packet is read only when none waits, so they never lie
-/// across the end of the array.
+/// Bytes that may wait for room in the ring: a packet; one more, which the chip has taken when the program closes the
+/// port; and [`CLOSE`].
+const WAITING: usize = 2 * PACKET + 1;
+
+/// The bytes that wait for room in the ring. The next packet is read only when none waits, or when the port closes, so
+/// they never lie across the end of the array.
 struct Behind {
-    bytes: [u8; PACKET],
+    bytes: [u8; WAITING],
     /// The first byte that waits, and the end of the last.
     from: usize,
     to: usize,
@@ -129,7 +133,7 @@ struct Behind {
 
 impl Behind {
     const fn new() -> Self {
-        Self { bytes: [0; PACKET], from: 0, to: 0 }
+        Self { bytes: [0; WAITING], from: 0, to: 0 }
     }
 
     fn waiting(&self) -> &[u8] {
@@ -155,6 +159,22 @@ impl Behind {
     /// Drops the first bytes.
     fn drop_first(&mut self, count: usize) {
         self.from = (self.from + count).min(self.to);
+    }
+
+    /// Whether a whole packet has room.
+    fn has_room(&self) -> bool {
+        self.waiting().len() <= PACKET
+    }
+
+    /// Drops the newest bytes of a half line, at most [`AT_ONCE`]. Returns whether there may be more.
+    fn drop_newest(&mut self) -> bool {
+        for _ in 0..AT_ONCE {
+            match self.waiting().last() {
+                None | Some(b'\n' | b'\r' | &CLOSE) => return false,
+                Some(_) => self.to -= 1,
+            }
+        }
+        true
     }
 }
 
@@ -359,6 +379,11 @@ fn is_text(byte: u8) -> bool {
     matches!(byte, b'\n' | b' '..=b'}') && realtime::bit(byte) == 0
 }
 
+/// Returns a byte of text as it is queued: one that would be a mark is replaced.
+fn text(byte: u8) -> u8 {
+    if byte < MARKS || byte == CLOSE { STRAY } else { byte }
+}
+
 /// What a received byte is.
 enum Came {
     /// It has acted, and is not part of a line.
@@ -411,7 +436,7 @@ impl Line {
         self.lost_ends = self.lost_ends.wrapping_add(ring.lose(lost));
         self.queued = self.queued.wrapping_add(waiting.len() as u8);
         self.last = ring.newest();
-        self.behind.drop_first(PACKET);
+        self.behind.drop_first(WAITING);
         flags::set(Event::Received);
     }
 
@@ -494,7 +519,7 @@ impl Line {
             Came::Text if waits => {
                 self.last = byte;
                 // There is room for a packet: the next one is read only after the last one has been queued.
-                self.behind.add(&[if byte < MARKS { STRAY } else { byte }]);
+                self.behind.add(&[text(byte)]);
             }
             Came::Text => self.queue(byte, true),
         }
@@ -529,6 +554,21 @@ impl Line {
         Some(!self.behind.is_empty())
     }
 
+    /// Ends the half line of a program that has closed USB: [`CLOSE`] follows what has been queued of it, and what waits
+    /// of it is dropped by [`Behind::drop_newest`] before.
+    fn close(&mut self) {
+        let ended = |byte: &u8| matches!(byte, 0 | b'\n' | b'\r');
+        let is_half = !ended(&core::mem::replace(&mut self.last, b'\n'));
+        let Some(ring) = self.rx.as_mut() else { return };
+        match self.behind.is_empty() {
+            true if is_half && ring.is_full() => self.behind.add(&[CLOSE]),
+            true if is_half => ring.push(CLOSE),
+            // Whole lines wait.
+            _ => {}
+        }
+        flags::set(Event::Received);
+    }
+
     /// Takes the next bytes to send that are contiguous in the ring. Returns how many; 0 also if a byte is to be sent
     /// ahead of them.
     fn take_run(&mut self, to: &mut [u8]) -> usize {
@@ -547,7 +587,7 @@ impl Line {
     }
 
     fn queue(&mut self, byte: u8, whole: bool) {
-        let byte = if byte < MARKS { STRAY } else { byte };
+        let byte = text(byte);
         let full = self.rx.as_ref().is_none_or(Filling::is_full);
         if full || !whole {
             self.lose(byte);
@@ -630,6 +670,20 @@ pub(super) fn bring(packet: &[u8]) -> bool {
     with(USB, |line| line.behind.is_empty())
 }
 
+/// Whether a packet has room that came before the program closed USB.
+pub(super) fn takes_last() -> bool {
+    with(USB, |line| line.behind.has_room())
+}
+
+/// Drops the half line of a program that has closed USB, wherever its bytes are. The lines before it are carried out.
+/// Interrupts are off for some bytes at a time.
+#[cold]
+#[inline(never)]
+pub(super) fn close() {
+    while with(USB, |line| line.behind.drop_newest()) {}
+    with(USB, Line::close);
+}
+
 /// Queues bytes that have come by USB when there was no room. Thread mode, each turn.
 pub fn go_on() {
     for _ in 0..PACKET / AT_ONCE {
@@ -651,9 +705,14 @@ pub fn take_opened() -> bool {
     usb::take_opened()
 }
 
-/// Whether the program that had USB open has closed it since the last call, and none has opened it since. Thread mode.
-pub fn take_closed() -> bool {
-    usb::take_closed()
+/// How often USB has been restarted since the start, because it hung; 255 for more. Thread mode.
+pub fn restarts() -> u8 {
+    usb::restarts()
+}
+
+/// In how many milliseconds USB has seen errors of its bus since the start, modulo 2^16. Thread mode.
+pub fn bus_errors() -> u16 {
+    usb::bus_errors()
 }
 
 /// Takes the bytes to send by USB next. Returns how many.
@@ -700,6 +759,7 @@ pub fn look() {
         with(port, |line| line.wait_ms = line.wait_ms.saturating_sub(1));
         if port == USB && registers(port).is_none() {
             usb::flush();
+            usb::look();
         }
         kick(port);
     }

@@ -6,12 +6,21 @@
 //!
 //! While no program has the port open, or while the bus sleeps, output is dropped, so that no task waits for it. Only
 //! the first [`KEPT`] bytes after start-up, with the greeting, are kept for the first program that opens the port.
-//! Tasks are told when another program opens it ([`take_opened`]).
+//! Tasks are told when another program opens it ([`take_opened`]). When its program closes the port, which a reset of
+//! the bus does too, the half line that it has sent is dropped; whole lines are carried out.
+//!
+//! The chip's controller may hang, and the stack may wait for ever: [`watch`] restarts them. A computer may also
+//! restart the chip: see [`restart`].
+
+mod restart;
+mod watch;
 
 use core::sync::atomic::{AtomicBool, Ordering};
+use core::task::Poll;
 
 use avr_embassy::interrupt::prompt;
-use embassy_futures::select::select;
+use embassy_futures::poll_once;
+use embassy_futures::select::{Either, select};
 use embassy_rp::bind_interrupts;
 use embassy_rp::interrupt::{self, InterruptExt, Priority};
 use embassy_rp::peripherals::USB;
@@ -33,7 +42,8 @@ pub(super) const PACKET: usize = 64;
 const PIECE: usize = PACKET - 1;
 /// Bytes kept for the first program that opens the port.
 const KEPT: usize = 256 + last_words::LINE;
-/// A test pair of vendor and product number, of pid.codes; no boards are sold with it.
+/// The pair of vendor and product number that pid.codes has for tests. It tells no product from another: whoever sells
+/// boards needs another pair.
 const VENDOR: u16 = 0x1209;
 /// See [`VENDOR`].
 const PRODUCT: u16 = 0x0001;
@@ -50,21 +60,23 @@ pub(super) static ROOM: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 static NEWS: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 /// A piece is being sent. Output written meanwhile is sent after it.
 static SENDS: AtomicBool = AtomicBool::new(false);
-/// The bus sleeps, or its cable is out.
+/// The bus sleeps, its cable is out, or its controller is being restarted.
 static ASLEEP: AtomicBool = AtomicBool::new(false);
 
 /// A program, not the first, has opened the port, and this has not been taken yet.
 static OPENED: AtomicBool = AtomicBool::new(false);
-/// The program has closed the port, and this has not been taken yet.
-static CLOSED: AtomicBool = AtomicBool::new(false);
+/// The program has closed the port: what it has sent is to be ended.
+static SHUTS: Signal<CriticalSectionRawMutex, ()> = Signal::new();
+
+pub use restart::set_rests;
+pub(super) use watch::{bus_errors, restarts};
 
 /// Notices when the bus sleeps.
 struct Sleep;
 
 impl Handler for Sleep {
     fn suspended(&mut self, suspended: bool) {
-        ASLEEP.store(suspended, Ordering::Relaxed);
-        NEWS.signal(());
+        set_asleep(suspended);
     }
 
     fn reset(&mut self) {
@@ -72,13 +84,20 @@ impl Handler for Sleep {
     }
 }
 
+fn set_asleep(asleep: bool) {
+    ASLEEP.store(asleep, Ordering::Relaxed);
+    NEWS.signal(());
+}
+
 /// Starts the tasks of USB; the computer notices the device. Start-up.
 pub(super) fn start() {
     static DESCRIPTORS: StaticCell<[u8; 256]> = StaticCell::new();
-    static BOS: StaticCell<[u8; 32]> = StaticCell::new();
+    static BOS: StaticCell<[u8; 64]> = StaticCell::new();
+    static MICROSOFT: StaticCell<[u8; 64]> = StaticCell::new();
     static CONTROL: StaticCell<[u8; 64]> = StaticCell::new();
     static STATE: StaticCell<State<'static>> = StaticCell::new();
     static SLEEP: StaticCell<Sleep> = StaticCell::new();
+    static RESTARTS: StaticCell<restart::Requests> = StaticCell::new();
     let mut config = Config::new(VENDOR, PRODUCT);
     config.manufacturer = Some("Kerf");
     config.product = Some(ACTIVE.name);
@@ -88,13 +107,15 @@ pub(super) fn start() {
         Driver::new(unit, Handlers),
         config,
         DESCRIPTORS.init([0; 256]),
-        BOS.init([0; 32]),
-        &mut [],
+        BOS.init([0; 64]),
+        MICROSOFT.init([0; 64]),
         CONTROL.init([0; 64]),
     );
     builder.handler(SLEEP.init(Sleep));
     let class = CdcAcmClass::new(&mut builder, STATE.init(State::new()), PACKET as u16);
     let (sender, receiver, control) = class.split_with_control();
+    let requests = restart::Requests::new(&mut builder);
+    builder.handler(RESTARTS.init(requests));
     let device = builder.build();
     interrupt::SWI_IRQ_2.set_priority(Priority::P2);
     interrupt::USBCTRL_IRQ.set_priority(Priority::P2);
@@ -114,11 +135,6 @@ pub(super) fn start() {
 pub(super) fn take_opened() -> bool {
     // If another opening comes in between, this greeting serves both.
     take(&OPENED)
-}
-
-/// Whether the program has closed the port since the last call, and none has opened it since. Thread mode.
-pub(super) fn take_closed() -> bool {
-    take(&CLOSED)
 }
 
 /// Clears a flag. Returns whether it was set.
@@ -145,23 +161,56 @@ pub(super) fn flush() {
     }
 }
 
+/// Looks after the controller and after requests of the computer. Thread mode, each millisecond.
+pub(super) fn look() {
+    watch::look();
+    restart::look();
+}
+
 #[embassy_executor::task]
 async fn serve(mut device: UsbDevice<'static, Driver>) {
-    device.run().await;
+    loop {
+        let Either::Second(trouble) = select(device.run(), watch::TROUBLE.wait()).await;
+        device.disable().await;
+        watch::cure(trouble);
+    }
 }
 
 #[embassy_executor::task]
 async fn hear(mut receiver: Receiver<'static, Driver>) {
     let mut packet = [0; PACKET];
+    while let Either::Second(()) = select(receiver.wait_connection(), SHUTS.wait()).await {
+        shut(&mut receiver, &mut packet);
+    }
     loop {
-        receiver.wait_connection().await;
-        while let Ok(count) = receiver.read_packet(&mut packet).await {
-            ROOM.reset();
-            if !uart::bring(packet.get(..count).unwrap_or_default()) {
-                ROOM.wait().await;
+        match select(receiver.read_packet(&mut packet), SHUTS.wait()).await {
+            Either::First(Ok(count)) => {
+                ROOM.reset();
+                if uart::bring(packet.get(..count).unwrap_or_default()) {
+                    continue;
+                }
+                while let Either::Second(()) = select(ROOM.wait(), SHUTS.wait()).await {
+                    shut(&mut receiver, &mut packet);
+                }
             }
+            // The driver reports no errors.
+            Either::First(Err(_)) => receiver.wait_connection().await,
+            Either::Second(()) => shut(&mut receiver, &mut packet),
         }
     }
+}
+
+/// Ends what a program has sent that has closed the port, with the packet that the chip has taken meanwhile. Otherwise
+/// the rest of a line would be taken for the next program's.
+#[cold]
+#[inline(never)]
+fn shut(receiver: &mut Receiver<'static, Driver>, packet: &mut [u8; PACKET]) {
+    if let Poll::Ready(Ok(count)) = poll_once(receiver.read_packet(packet))
+        && uart::takes_last()
+    {
+        uart::bring(packet.get(..count).unwrap_or_default());
+    }
+    uart::close();
 }
 
 #[embassy_executor::task]
@@ -174,14 +223,10 @@ async fn tell(mut sender: Sender<'static, Driver>, control: ControlChanged<'stat
     loop {
         match door.turn(control.dtr()) {
             Some(Turn::OpensAgain) => {
-                CLOSED.store(false, Ordering::Relaxed);
                 OPENED.store(true, Ordering::Relaxed);
                 flags::set(Event::Realtime);
             }
-            Some(Turn::Closes) => {
-                CLOSED.store(true, Ordering::Relaxed);
-                flags::set(Event::Received);
-            }
+            Some(Turn::Closes) => SHUTS.signal(()),
             None => {}
         }
         let hears = hears(&control);

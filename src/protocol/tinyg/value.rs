@@ -171,7 +171,7 @@ impl Vector {
 }
 
 /// The number of rows of [`SINGLES`].
-pub const SINGLE_COUNT: usize = 47 + if Capability::Printer.is_built_in() { 6 } else { 0 };
+pub const SINGLE_COUNT: usize = 49 + if Capability::Printer.is_built_in() { 6 } else { 0 };
 /// The number of rows of [`VECTORS`].
 pub const VECTOR_COUNT: usize = 17;
 /// The index of the vector `g92`.
@@ -288,6 +288,8 @@ progmem! {
         single("ma", Source::Zero, Form::Length),
         count("rst", of(Value::Reset), text!("Last reset:"), text!("Power on|External|Brown-out|Watchdog|Asked for")),
         count("stv", of(Value::Starvations), text!("Late segments:"), NONE),
+        count("usbr", of(Value::UsbRestarts), NONE, NONE),
+        count("usbe", of(Value::UsbErrors), NONE, NONE),
         count("pls", of(Value::AtCounter), NONE, NONE),
         count("kept", of(Value::Kept), NONE, NONE),
         count("inp", of(PROBE), text!("Probe:"), NONE),

@@ -85,6 +85,8 @@ pub(super) fn value(view: &mut View<'_>, value: Value) -> i32 {
         Value::Pass => turning::pass(view.links.thread) as i32,
         Value::PulseMisfits => turning::misfits(view.links.thread).into(),
         Value::Starvations => health::starvations().into(),
+        Value::UsbRestarts => uart::restarts().into(),
+        Value::UsbErrors => uart::bus_errors().into(),
         Value::AtCounter => encoder::at_counter().into(),
         Value::Temperature(heater) => view.standing(heater).now.into(),
         Value::WantedTemperature(heater) => view.standing(heater).to.into(),

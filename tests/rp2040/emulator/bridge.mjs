@@ -1,9 +1,9 @@
 // node bridge.mjs: an emulated board for a program that talks to it over standard input and output. Each line of the input is a request in JSON, each line of
 // the output its answer:
 //
-//   {"board": {"elf": "file", "motors": [[step, dir], ...]}, "cut": true, "stick": true, "panic": "file", "crash": "stack", "reset": true, "sense": [[channel, value]], "send": [[port, "hex"]], "now": [[port, byte]], "usb": {"open": bool, "reads": bool}, "unmasked": true, "loaded": true, "baud": [[port, rate]], "drive": [[gpio, high]], "wire": [...], "spindle": {"index": gpio, "sync": gpio, "pulses": n}, "noise": {"gpio": gpio, "period": cycles}, "marks": n, "turn": rpm, "drivers": [...], "record": bool, "until": cycle, "line": true}
+//   {"board": {"elf": "file", "motors": [[step, dir], ...]}, "cut": true, "stick": true, "panic": "file", "crash": "stack", "reset": true, "sense": [[channel, value]], "send": [[port, "hex"]], "now": [[port, byte]], "usb": {"open": bool, "reads": bool}, "faults": [["sleep", ms], ...], "ask": [[byte, ...]], "unmasked": true, "loaded": true, "baud": [[port, rate]], "drive": [[gpio, high]], "wire": [...], "spindle": {"index": gpio, "sync": gpio, "pulses": n}, "noise": {"gpio": gpio, "period": cycles}, "marks": n, "turn": rpm, "drivers": [...], "record": bool, "until": cycle, "line": true}
 //
-// `board` comes first, and again where another board is to take the place of the one before. Ports are 0 and 1 for the UARTs, and 2 for USB; `usb` says what the program at its other end does.
+// `board` comes first, and again where another board is to take the place of the one before. Ports are 0 and 1 for the UARTs, and 2 for USB; `usb` says what the program at its other end does, `faults` what goes wrong there (`trouble`), `ask` which requests the computer makes.
 // With `record` edges of steps are recorded from there on, or what has been recorded is told and no more is. With `cut` the supply fails, and comes again; with `stick` the CPU gets stuck. What is sent and driven comes next; then the board runs to the cycle, or, with `line`, to the end of the next line that it says.
 import { createInterface } from 'node:readline';
 import { Machine } from './machine.mjs';
@@ -38,6 +38,8 @@ function act(request) {
   for (const [port, hex] of request.send ?? []) machine.send(port, Buffer.from(hex, 'hex'));
   for (const [port, byte] of request.now ?? []) machine.sendNow(port, byte);
   if (request.usb) machine.talk(request.usb);
+  if (request.faults) machine.trouble(request.faults);
+  for (const packet of request.ask ?? []) machine.ask(packet);
   for (const [gpio, high] of request.drive ?? []) motors.drive(gpio, high);
   if (request.wire) motors.wire(request.wire);
   if (request.drivers) drivers.wire(request.drivers);
@@ -61,6 +63,16 @@ function shares() {
   });
 }
 
+// What the computer at the other end of USB knows.
+function bus() {
+  const { computer, usb } = machine;
+  const hex = (bytes) => (typeof bytes === 'string' ? bytes : Buffer.from(bytes).toString('hex'));
+  const answered = computer.answered.map(hex);
+  computer.answered = [];
+  const { ready = false, attached, lost } = computer;
+  return { ready, attached, lost, hangs: usb.hangs, answered, descriptors: hex(computer.descriptors ?? []) };
+}
+
 function answer() {
   const heard = machine.heard.map((bytes) => Buffer.from(bytes).toString('hex'));
   machine.heard = [[], [], []];
@@ -81,6 +93,8 @@ function answer() {
     stack: machine.deepest(),
     resets: machine.resets,
     waiting: machine.computer.bytes.length,
+    bus: bus(),
+    loads: machine.loads,
     recorded,
   };
 }

@@ -147,7 +147,7 @@ test('the boot ROM has the functions of the flash', () => {
   const table = mcu.readUint16(0x14);
   const names = [];
   for (let at = table; mcu.readUint16(at); at += 4) names.push(String.fromCharCode(mcu.readUint8(at), mcu.readUint8(at + 1)));
-  assert.deepEqual(names, ['IF', 'EX', 'FC', 'CX', 'RE', 'RP', 'MC', 'C4']);
+  assert.deepEqual(names, ['IF', 'EX', 'FC', 'CX', 'RE', 'RP', 'MC', 'C4', 'UB']);
 });
 
 test('to write to flash clears bits alone', () => {

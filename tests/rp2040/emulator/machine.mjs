@@ -5,7 +5,7 @@ import { readFileSync } from 'node:fs';
 import { BasePeripheral, ConsoleLogger, LogLevel, RP2040 } from 'rp2040js';
 import { quicken } from './core.mjs';
 import { Pio } from './pio.mjs';
-import { bootRom } from './rom.mjs';
+import { BOOT_LOADER, bootRom } from './rom.mjs';
 import { Uart } from './uart.mjs';
 import { Computer, Usb } from './usb.mjs';
 import { Cache } from './xip.mjs';
@@ -32,6 +32,8 @@ const GARBLES = 0.045;
 const FRAME = 10;
 const CHAN_ABORT = 0x444;
 const USB = 0x50110;
+const RESETS = 0x4000c;
+const RESET_USB = 1 << 24;
 // The port of USB, behind those of the UARTs.
 export const USB_PORT = 2;
 const UARTS = [[0x40034, 'UART0', 20], [0x40038, 'UART1', 21]];
@@ -161,6 +163,8 @@ export class Machine {
     this.sensed = [0, 0, 0, 0, 0];
     this.levels = new Array(30).fill(0);
     this.resets = 0;
+    // The boot loader has been started.
+    this.loads = false;
     // Line ends that have been heard.
     this.lines = 0;
     // Bytes that have been heard.
@@ -183,6 +187,23 @@ export class Machine {
     const { core } = this.mcu;
     core.checkForInterrupts = () => false;
     core.waiting = true;
+  }
+
+  // Faults of USB and its bus: [what, ...].
+  trouble(faults) {
+    const { usb } = this;
+    const ms = (n) => n * 1e6;
+    for (const [what, first, second] of faults) {
+      switch (what) {
+        case 'sleep': usb.sleep(ms(first)); break;
+        case 'skip': usb.skip(ms(first)); break;
+        case 'unplug': usb.unplug(ms(first)); break;
+        case 'reset': usb.resetBus(); break;
+        case 'abort': usb.abort(); break;
+        case 'noise': usb.noise(first, second); break;
+        default: usb.damage(what, first);
+      }
+    }
   }
 
   // A panic: a cell is borrowed twice, in a file of that name.
@@ -246,7 +267,17 @@ export class Machine {
     }
     // It bites once: that of rp2040js would go on at the same instant for ever.
     watchdog.onWatchdogTrigger = () => { watchdog.alarm.enable = false; this.isResetting = true; };
-    mcu.onBreak = (code) => { throw new Error(`bkpt ${code} at ${mcu.core.PC.toString(16)}`); };
+    const resets = mcu.peripherals[RESETS];
+    const writeResets = resets.writeUint32.bind(resets);
+    resets.writeUint32 = (offset, value) => {
+      if (offset === 0 && value & ~resets.reset & RESET_USB) this.usb.resetUnit();
+      writeResets(offset, value);
+    };
+    mcu.onBreak = (code) => {
+      if (code !== BOOT_LOADER) throw new Error(`bkpt ${code} at ${mcu.core.PC.toString(16)}`);
+      this.loads = true;
+      this.stick();
+    };
     this.pios = mcu.pio.map((pio) => new Pio(pio));
     for (const [gpio, pin] of mcu.gpio.entries()) {
       pin.addListener((state) => this.changed(gpio, state));
@@ -312,6 +343,12 @@ export class Machine {
   talk({ open, reads }) {
     this.computer.open = open ?? this.computer.open;
     this.computer.reads = reads ?? this.computer.reads;
+    this.usb.wake();
+  }
+
+  // Has the computer make a request.
+  ask(packet) {
+    this.computer.ask(packet);
     this.usb.wake();
   }
 

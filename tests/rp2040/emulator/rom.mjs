@@ -8,8 +8,12 @@ const ERASE = 0x150;
 const PROGRAM = 0x180;
 const COPY = 0x1a0;
 const FLUSH = 0x1c0;
+const BOOT = 0x1d0;
 const FUNCTIONS = 0x200;
 const DATA = 0x280;
+
+// The boot loader is a breakpoint of this number.
+export const BOOT_LOADER = 0xb0;
 
 export function bootRom() {
   const rom = new Uint16Array(8192);
@@ -66,8 +70,9 @@ export function bootRom() {
     0x6041, // str r1, [r0, #4]
     0x4770, // bx lr
   ]);
+  put(BOOT, [0xbe00 | BOOT_LOADER, 0xe7fe]); // bkpt; b .
   const code = (name) => name.charCodeAt(0) | name.charCodeAt(1) << 8;
-  const functions = { IF: NOP, EX: NOP, FC: FLUSH, CX: NOP, RE: ERASE, RP: PROGRAM, MC: COPY, C4: COPY };
+  const functions = { IF: NOP, EX: NOP, FC: FLUSH, CX: NOP, RE: ERASE, RP: PROGRAM, MC: COPY, C4: COPY, UB: BOOT };
   put(FUNCTIONS, [...Object.entries(functions).flatMap(([name, at]) => [code(name), at | 1]), 0, 0]);
   put(DATA, [0, 0]);
   return new Uint32Array(rom.buffer);

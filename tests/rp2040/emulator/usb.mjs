@@ -1,11 +1,17 @@
 // The USB of the RP2040 as a device, the bus, and a computer with one program that talks to a CDC ACM port of it. That of rp2040js gives buffers back
 // before anything has come, and keeps no order of packets.
+//
+// The bus has frames, may sleep, be reset, and lose its cable; packets may be damaged (`Usb.damage`, `Usb.noise`). The device takes them as the data sheet
+// says: what is damaged on the way to it sets a bit of SIE_STATUS and is not answered; without an ACK it sends the same packet again; a packet that comes
+// again is acknowledged and dropped. With erratum E15 (`hang`) it does nothing any more until the unit is reset: neither packets, nor frames, nor what
+// the bus signals.
 import { BasePeripheral } from 'rp2040js';
 
 const IRQ = 5;
 // Registers.
 const ADDR_ENDP = 0x00;
 const SIE_CTRL = 0x4c;
+const SOF_RD = 0x48;
 const SIE_STATUS = 0x50;
 const BUFF_STATUS = 0x58;
 const EP_STALL_ARM = 0x68;
@@ -15,10 +21,21 @@ const INTS = 0x98;
 const PULL_UP = 1 << 16;
 const BUS_RESET = 1 << 19;
 const SETUP = 1 << 17;
+const SUSPENDED = 1 << 4;
+const RESUME = 1 << 11;
+const CONNECTED = 1 << 16;
+const CRC_ERROR = 1 << 24;
+const BIT_STUFF_ERROR = 1 << 25;
+const RX_TIMEOUT = 1 << 27;
+const DATA_SEQ_ERROR = 1 << 31;
+// Levels of the bus in SIE_STATUS.
+const [SE0, J, K] = [0, 1 << 2, 2 << 2];
 // Bits of interrupts.
 const INTR_RESET = 1 << 12;
 const INTR_SETUP = 1 << 16;
 const INTR_BUFFER = 1 << 4;
+const INTR_SUSPEND = 1 << 14;
+const INTR_RESUME = 1 << 15;
 // A buffer's control word.
 const FULL = 1 << 15;
 const DATA1 = 1 << 13;
@@ -29,8 +46,17 @@ const LENGTH = 0x3ff;
 // A full-speed bus has time for 19 packets of 64 bytes in a millisecond.
 const PACKET_NS = 1e6 / 19;
 const PACKET = 64;
+const FRAME_NS = 1e6;
+// At power-up the computer is quick, so that tests are. Later it takes its time, as one with Linux does.
 const ATTACHED_NS = 2e6;
 const RESET_NS = 10e6;
+const AGAIN_ATTACHED_NS = 100e6;
+const AGAIN_RESET_NS = 50e6;
+const RESUME_NS = 20e6;
+// A bus without frames is asleep.
+const ASLEEP_NS = 3e6;
+// Faults of single packets: lost; damaged on the way to the device; its ACK damaged; the computer's ACK; its data.
+const DAMAGES = ['token', 'crc', 'stuffing', 'answer', 'ack', 'data'];
 
 const inControl = (endpoint) => 0x08 + 8 * (endpoint - 1);
 const outControl = (endpoint) => 0x0c + 8 * (endpoint - 1);
@@ -54,6 +80,21 @@ export class Computer {
     this.attached = 0;
     // Packets that the device had no room for when they were due.
     this.naks = 0;
+    // Requests to be made, and what came of those that have been: the answer, or 'stall'.
+    this.asks = [];
+    this.answered = [];
+    // Bytes that were dropped because the device was gone.
+    this.lost = 0;
+  }
+  // Has another request made: the eight bytes of its packet.
+  ask(packet) {
+    this.asks.push({ packet, length: packet[0] & 0x80 ? packet[6] | packet[7] << 8 : 0, mayFail: true });
+  }
+  // The device is gone, or its bus has been reset.
+  lose() {
+    this.lost += this.bytes.length;
+    this.bytes.length = 0;
+    this.ready = false;
   }
   // A device has been found.
   begin() {
@@ -69,12 +110,15 @@ export class Computer {
     yield setup(0x00, 5, 1, 0, 0);
     const head = yield describe(2, 9);
     const all = yield describe(2, head[2] | head[3] << 8);
+    this.descriptors = all;
     this.endpoints = endpointsOf(all);
     yield setup(0x00, 9, 1, 0, 0);
     yield setup(0x21, 0x20, 0, 0, 7, LINE_CODING);
     this.ready = true;
     for (;;) {
-      if (this.told === this.open) yield undefined;
+      const ask = this.asks.shift();
+      if (ask) this.answered.push((yield ask) ?? 'stall');
+      else if (this.told === this.open) yield undefined;
       else yield setup(0x21, 0x22, (this.told = this.open) ? 3 : 0, 0, 0);
     }
   }
@@ -103,18 +147,27 @@ export class Usb extends BasePeripheral {
     this.toggles = new Map();
     this.alarm = mcu.clock.createAlarm(() => this.due());
     this.isDue = false;
+    this.isPlugged = true;
+    // How many times the bus has changed: what was planned before counts no more.
+    this.changes = 0;
+    this.frames = 0;
+    // Faults that wait for their packets, by kind; and a random number that makes others.
+    this.damages = new Map();
+    this.hangs = 0;
   }
 
   get memory() { return this.rp2040.usbDPRAMView; }
   get(offset) { return this.registers.get(offset) ?? 0; }
   get intr() {
-    return (this.sieStatus & BUS_RESET && INTR_RESET) | (this.sieStatus & SETUP && INTR_SETUP) | (this.buffStatus && INTR_BUFFER);
+    return (this.sieStatus & SUSPENDED && INTR_SUSPEND) | (this.sieStatus & RESUME && INTR_RESUME)
+      | (this.sieStatus & BUS_RESET && INTR_RESET) | (this.sieStatus & SETUP && INTR_SETUP) | (this.buffStatus && INTR_BUFFER);
   }
   update() { this.rp2040.setInterrupt(IRQ, !!(this.intr & this.get(INTE))); }
 
   readUint32(offset) {
     switch (offset) {
-      case SIE_STATUS: return this.sieStatus;
+      case SIE_STATUS: return (this.sieStatus | this.level() | (this.isCounting() && CONNECTED)) >>> 0;
+      case SOF_RD: return this.frame();
       case BUFF_STATUS: return this.buffStatus;
       case INTR: return this.intr;
       case INTS: return this.intr & this.get(INTE);
@@ -126,7 +179,7 @@ export class Usb extends BasePeripheral {
     if (offset === SIE_STATUS) this.sieStatus &= ~this.rawWriteValue;
     else if (offset === BUFF_STATUS) this.buffStatus &= ~this.rawWriteValue;
     else this.registers.set(offset, value);
-    if (offset === SIE_CTRL && value & PULL_UP && !this.state) this.attach();
+    if (offset === SIE_CTRL) this.pull(!!(value & PULL_UP));
     this.update();
     this.wake();
   }
@@ -134,9 +187,175 @@ export class Usb extends BasePeripheral {
   // A word of the memory with buffers has been written.
   DPRAMUpdated() { this.wake(); }
 
+  // The unit is reset. Its memory stays.
+  resetUnit() {
+    this.stopFrames();
+    this.registers.clear();
+    [this.sieStatus, this.buffStatus, this.frames] = [0, 0, 0];
+    this.isHung = false;
+    this.pull(false);
+    this.update();
+  }
+
+  // The pull-up is switched.
+  pull(on) {
+    if (on && !this.state && this.isPlugged) this.attach();
+    if (!on && this.state) this.leave();
+  }
+
   attach() {
-    this.state = 'attached';
-    this.after(ATTACHED_NS);
+    this.change('attached');
+    if (this.isKnown) this.later(ASLEEP_NS, () => this.signal(SUSPENDED));
+    this.after(this.isKnown ? AGAIN_ATTACHED_NS : ATTACHED_NS);
+  }
+
+  // The computer sees no device any more.
+  leave() {
+    this.change(undefined);
+    this.computer.lose();
+  }
+
+  change(state) {
+    this.changes++;
+    this.stopFrames();
+    this.state = state;
+    this.alarm.cancel();
+    this.isDue = false;
+  }
+
+  // Does something later, if the bus has not changed until then.
+  later(nanos, act) {
+    const { changes } = this;
+    this.rp2040.clock.createAlarm(() => { if (this.changes === changes) act(); }).schedule(nanos);
+  }
+
+  // The level of the bus between packets.
+  level() {
+    if (!(this.get(SIE_CTRL) & PULL_UP) || this.state === 'reset') return SE0;
+    return this.state === 'resuming' ? K : J;
+  }
+
+  isCounting() { return this.framesFrom !== undefined; }
+  frame() {
+    const now = this.isCounting() ? Math.floor((this.rp2040.clock.nanos - this.framesFrom) / FRAME_NS) : 0;
+    return this.frames + now & 0x7ff;
+  }
+  stopFrames() {
+    this.frames = this.frame();
+    this.framesFrom = undefined;
+  }
+  startFrames() { if (!this.isHung) this.framesFrom = this.rp2040.clock.nanos; }
+
+  // What the bus signals.
+  signal(bit) {
+    if (this.isHung) return;
+    this.sieStatus |= bit;
+    this.update();
+  }
+
+  // The computer sends nothing any more for some time, and then what `then` does.
+  silence(state, nanos, then) {
+    this.change(state);
+    if (nanos > ASLEEP_NS) this.later(ASLEEP_NS, () => this.signal(SUSPENDED));
+    this.later(nanos, then);
+  }
+
+  // The computer sleeps. Without a state in which it could, nothing happens; the same is so below.
+  sleep(nanos) {
+    if (this.state !== 'running') return;
+    this.silence('asleep', nanos, () => {
+      this.change('resuming');
+      this.signal(RESUME);
+      this.later(RESUME_NS, () => this.goOn());
+    });
+  }
+
+  // Frames fail to come for some time; more than 3 ms of it is a sleep without a resume.
+  skip(nanos) {
+    if (this.state === 'running') this.silence('silent', nanos, () => this.goOn());
+  }
+
+  goOn() {
+    this.change('running');
+    this.startFrames();
+    this.after(PACKET_NS);
+  }
+
+  // The cable comes out, and in again.
+  unplug(nanos) {
+    if (this.state) this.leave();
+    this.isPlugged = false;
+    this.silence(undefined, nanos, () => {
+      this.isPlugged = true;
+      this.pull(!!(this.get(SIE_CTRL) & PULL_UP));
+    });
+  }
+
+  // The computer resets the bus.
+  resetBus() {
+    if (this.state !== 'running') return;
+    this.computer.lose();
+    this.beginReset();
+  }
+
+  beginReset() {
+    this.change('reset');
+    this.signal(BUS_RESET);
+    this.after(this.isKnown ? AGAIN_RESET_NS : RESET_NS);
+    this.isKnown = true;
+  }
+
+  // The computer makes a request, and gives it up at once by a reset of the bus.
+  abort() {
+    if (this.state !== 'running' || this.isHung || this.request) return;
+    this.request = { ...describe(1, 18), stage: 'setup', answer: [], sent: 0 };
+    this.control(this.request);
+    this.request.stage = 'given up';
+    this.later(2 * PACKET_NS, () => this.resetBus());
+  }
+
+  // The next packets are damaged in this way; `hang` is E15.
+  damage(kind, count) {
+    if (kind !== 'hang' && !DAMAGES.includes(kind)) throw new Error(`no fault ${kind}`);
+    this.damages.set(kind, count);
+  }
+
+  // One in so many packets is damaged, by a seed; none with 0.
+  noise(seed, oneIn) { [this.random, this.oneIn] = [seed, oneIn]; }
+
+  // Whether a packet is damaged in this way.
+  isDamaged(kind) {
+    const left = this.damages.get(kind) ?? 0;
+    if (left > 0) this.damages.set(kind, left - 1);
+    return left > 0 || (kind !== 'hang' && this.oneIn > 0 && this.draw() % (this.oneIn * 3) === 0);
+  }
+  // Mulberry32.
+  draw() {
+    this.random = this.random + 0x6d2b79f5 | 0;
+    let t = Math.imul(this.random ^ this.random >>> 15, 1 | this.random);
+    t = t + Math.imul(t ^ t >>> 7, 61 | t) ^ t;
+    return (t ^ t >>> 14) >>> 0;
+  }
+
+  // Whether a packet to the device is lost, or damaged so that the device does not answer.
+  isSpoiltOut() {
+    if (this.isDamaged('token')) return true;
+    if (this.isDamaged('crc')) this.sieStatus |= CRC_ERROR;
+    else if (this.isDamaged('stuffing')) this.sieStatus |= BIT_STUFF_ERROR;
+    else return false;
+    return true;
+  }
+  // Whether a packet of the device gets no ACK, because it is damaged, or because the device takes another one for the ACK and hangs.
+  isSpoiltIn() {
+    if (this.isDamaged('hang')) {
+      this.stopFrames();
+      this.isHung = true;
+      this.hangs++;
+      return true;
+    }
+    if (!this.isDamaged('data')) return false;
+    this.sieStatus |= RX_TIMEOUT;
+    return true;
   }
 
   after(nanos) {
@@ -152,19 +371,16 @@ export class Usb extends BasePeripheral {
   due() {
     this.isDue = false;
     if (this.state === 'attached') {
-      this.state = 'reset';
-      this.sieStatus |= BUS_RESET;
-      this.update();
-      this.after(RESET_NS);
+      this.beginReset();
     } else if (this.state === 'reset') {
       if (this.sieStatus & BUS_RESET) throw new Error('the device does not see the reset of its bus');
-      this.state = 'running';
       this.toggles.clear();
+      [this.sentAgain, this.heardAgain] = [false, false];
       this.computer.begin();
       this.steps = this.computer.requests();
       this.next(undefined);
-      this.after(PACKET_NS);
-    } else if (this.transact()) {
+      this.goOn();
+    } else if (this.state === 'running' && this.transact()) {
       this.after(PACKET_NS);
     }
   }
@@ -177,6 +393,8 @@ export class Usb extends BasePeripheral {
   // One packet. False if there is none: the device is asked again when it has changed something.
   transact() {
     const { computer } = this;
+    // Nobody answers: the computer goes on with its frames.
+    if (this.isHung) return false;
     if (!this.request) this.next(undefined);
     if (this.request && this.control(this.request)) return true;
     if (!computer.ready) return false;
@@ -188,9 +406,13 @@ export class Usb extends BasePeripheral {
 
   control(request) {
     switch (request.stage) {
+      case 'given up':
+        return false;
       case 'setup':
+        if (this.isSpoiltOut()) return true;
         // One that comes ends what was before.
         for (const at of [inBuffer(0), outBuffer(0)]) this.memory.setUint32(at, this.memory.getUint32(at, true) & ~(AVAILABLE | STALL), true);
+        this.registers.set(EP_STALL_ARM, 0);
         request.packet.forEach((byte, i) => this.memory.setUint8(i, byte));
         this.toggles.set('in0', DATA1).set('out0', DATA1);
         this.sieStatus |= SETUP;
@@ -198,8 +420,10 @@ export class Usb extends BasePeripheral {
         request.stage = request.data ? 'out' : request.length ? 'in' : 'acknowledge';
         return true;
       case 'in': {
+        if (this.isRefused(request)) return true;
+        if (!this.isOffered(0)) return false;
+        if (this.isSpoiltIn()) return true;
         const bytes = this.takeIn(0);
-        if (!bytes) return false;
         request.answer.push(...bytes);
         if (bytes.length < PACKET || request.answer.length >= request.length) request.stage = 'end';
         return true;
@@ -214,31 +438,63 @@ export class Usb extends BasePeripheral {
         request.stage = 'acknowledge';
         return true;
       default: {
+        if (this.isRefused(request)) return true;
         this.toggles.set('in0', DATA1);
-        if (!this.takeIn(0)) return false;
+        if (!this.isOffered(0)) return false;
+        if (this.isSpoiltIn()) return true;
+        this.takeIn(0);
         this.next([]);
         return true;
       }
     }
   }
 
+  // Whether a request is refused, which only some may be.
+  isRefused(request) {
+    if (!(this.memory.getUint32(inBuffer(0), true) & STALL && this.get(EP_STALL_ARM))) return false;
+    if (!request.mayFail) throw new Error('a request is refused');
+    this.next(undefined);
+    return true;
+  }
+
   say() {
     const { computer } = this;
-    if (!computer.bytes.length || !computer.open) return false;
-    if (!this.putOut(computer.endpoints.out, computer.bytes.slice(0, PACKET))) {
+    if (!(computer.bytes.length || this.sentAgain) || !computer.open) return false;
+    const { out } = computer.endpoints;
+    if (!this.isReady(out)) {
       computer.naks++;
       return false;
     }
-    computer.bytes.splice(0, PACKET);
+    if (this.isSpoiltOut()) return true;
+    if (this.sentAgain) {
+      // The device has it already, but the computer has not seen its ACK.
+      this.sieStatus |= DATA_SEQ_ERROR;
+      this.sentAgain = false;
+    } else {
+      this.putOut(out, computer.bytes.splice(0, PACKET));
+      this.sentAgain = this.isDamaged('answer');
+    }
     return true;
   }
 
   hear() {
     const { computer } = this;
     if (!computer.reads || !computer.open) return false;
-    const bytes = this.takeIn(computer.endpoints.in);
-    bytes?.forEach((byte) => computer.onByte(byte));
-    return !!bytes;
+    const endpoint = computer.endpoints.in;
+    if (!this.isOffered(endpoint)) return false;
+    if (this.isSpoiltIn()) return true;
+    const isNew = !this.heardAgain;
+    if (isNew && this.isDamaged('ack')) {
+      // The device sends the packet again; the computer knows it by its number.
+      this.heardAgain = true;
+      this.sieStatus |= RX_TIMEOUT;
+      this.bytesIn(endpoint).forEach((byte) => computer.onByte(byte));
+      return true;
+    }
+    this.heardAgain = false;
+    const bytes = this.takeIn(endpoint);
+    if (isNew) bytes.forEach((byte) => computer.onByte(byte));
+    return true;
   }
 
   // Where an endpoint's buffer is.
@@ -255,16 +511,27 @@ export class Usb extends BasePeripheral {
     this.toggles.set(name, wanted ^ DATA1);
   }
 
+  // Whether the device has something for the computer, and whether it takes something.
+  isOffered(endpoint) {
+    return !!(this.memory.getUint32(inBuffer(endpoint), true) & AVAILABLE) && this.place(endpoint, inControl(endpoint)) !== undefined;
+  }
+  isReady(endpoint) {
+    return !!(this.memory.getUint32(outBuffer(endpoint), true) & AVAILABLE) && this.place(endpoint, outControl(endpoint)) !== undefined;
+  }
+
+  bytesIn(endpoint) {
+    const word = this.memory.getUint32(inBuffer(endpoint), true);
+    if (!(word & FULL)) throw new Error('an empty buffer is to be sent');
+    const place = this.place(endpoint, inControl(endpoint));
+    return [...this.rp2040.usbDPRAM.slice(place, place + (word & LENGTH))];
+  }
+
   // What the device has for the computer.
   takeIn(endpoint) {
     const at = inBuffer(endpoint);
     const word = this.memory.getUint32(at, true);
-    if (endpoint === 0 && word & STALL && this.get(EP_STALL_ARM)) throw new Error('a request is refused');
-    const place = this.place(endpoint, inControl(endpoint));
-    if (!(word & AVAILABLE) || place === undefined) return undefined;
-    if (!(word & FULL)) throw new Error('an empty buffer is to be sent');
+    const bytes = this.bytesIn(endpoint);
     this.toggle(`in${endpoint}`, word);
-    const bytes = [...this.rp2040.usbDPRAM.slice(place, place + (word & LENGTH))];
     this.done(at, word & ~(AVAILABLE | FULL), 2 * endpoint);
     return bytes;
   }

@@ -69,6 +69,7 @@ mod pico;
 mod pico_bench;
 mod pico_drivers;
 mod pico_usb;
+mod pico_usb_faults;
 mod pico_verify;
 mod plot;
 mod ports;

@@ -39,6 +39,8 @@ struct Request {
     now: Vec<(usize, u8)>,
     #[serde(skip_serializing_if = "Option::is_none")]
     usb: Option<Talks>,
+    faults: Vec<(&'static str, u64, u64)>,
+    ask: Vec<[u8; 8]>,
     baud: Vec<(usize, u32)>,
     drive: Vec<(u8, bool)>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -83,6 +85,65 @@ pub struct Talks {
     pub open: bool,
     /// Whether it reads what comes.
     pub reads: bool,
+}
+
+/// A fault of USB: at the bus, at its packets, or at the computer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// The computer sleeps for so many ms.
+    Sleep(u64),
+    /// No frames come for so many ms.
+    Skip(u64),
+    /// The cable is out for so many ms.
+    Unplug(u64),
+    /// The computer resets the bus.
+    Reset,
+    /// The computer gives a request up, and resets the bus.
+    Abort,
+    /// The controller hangs by erratum E15 at the next packet that it sends.
+    Hang,
+    /// So many packets are damaged, in the way that the emulator's `DAMAGES` name.
+    Damage(&'static str, u64),
+    /// From now on one packet in so many is damaged, by a seed; none with 0.
+    Noise {
+        /// The seed.
+        seed: u64,
+        /// See [`Fault::Noise`].
+        one_in: u64,
+    },
+}
+
+impl Fault {
+    /// The fault for the emulator.
+    fn told(self) -> (&'static str, u64, u64) {
+        match self {
+            Fault::Sleep(ms) => ("sleep", ms, 0),
+            Fault::Skip(ms) => ("skip", ms, 0),
+            Fault::Unplug(ms) => ("unplug", ms, 0),
+            Fault::Reset => ("reset", 0, 0),
+            Fault::Abort => ("abort", 0, 0),
+            Fault::Hang => ("hang", 1, 0),
+            Fault::Damage(kind, count) => (kind, count, 0),
+            Fault::Noise { seed, one_in } => ("noise", seed, one_in),
+        }
+    }
+}
+
+/// What the computer at the other end of USB knows.
+#[derive(Deserialize, Clone, Default, Debug)]
+pub struct Bus {
+    /// Whether the port can be talked to.
+    pub ready: bool,
+    /// How often the computer has found the device.
+    pub attached: u64,
+    /// Bytes of its program that were dropped, because the device was gone.
+    pub lost: u64,
+    /// How often the controller has hung since the chip was reset.
+    pub hangs: u64,
+    /// What came of the requests since the last answer: hexadecimal digits, or `stall`.
+    pub answered: Vec<String>,
+    /// The configuration descriptor, hexadecimal digits.
+    pub descriptors: String,
 }
 
 /// Number of lines that the emulator has: two UARTs, and USB.
@@ -180,6 +241,10 @@ struct Answer {
     #[serde(default)]
     waiting: usize,
     #[serde(default)]
+    bus: Bus,
+    #[serde(default)]
+    loads: bool,
+    #[serde(default)]
     recorded: Option<Recorded>,
 }
 
@@ -263,6 +328,11 @@ impl Emulated {
         self.run(self.cycle() + self.cycles(ms), false)
     }
 
+    /// As [`Emulated::run_for_ms`], in microseconds.
+    pub fn run_for_us(&mut self, us: u64) -> Result<()> {
+        self.run(self.cycle() + self.cycles(us) / 1_000, false)
+    }
+
     /// Puts bytes on the line of a port.
     pub fn send_to(&mut self, port: usize, bytes: &[u8]) {
         self.request.send.push((line(self.board, port), packed(bytes)));
@@ -281,6 +351,29 @@ impl Emulated {
     /// Sets what the program at the other end of USB does from now on.
     pub fn session(&mut self, talks: Talks) {
         self.request.usb = Some(talks);
+    }
+
+    /// Has something go wrong at USB.
+    pub fn trouble(&mut self, fault: Fault) {
+        self.request.faults.push(fault.told());
+    }
+
+    /// Has the computer make a request of USB, and returns what came of it within `ms` milliseconds: hexadecimal digits,
+    /// or `stall`.
+    pub fn request(&mut self, packet: [u8; 8], ms: u64) -> Result<Option<String>> {
+        self.request.ask.push(packet);
+        self.run_for_ms(ms)?;
+        Ok(self.answer.bus.answered.pop())
+    }
+
+    /// What the computer at the other end of USB knows.
+    pub fn bus(&self) -> &Bus {
+        &self.answer.bus
+    }
+
+    /// Whether the boot loader in ROM has been started.
+    pub fn loads(&self) -> bool {
+        self.answer.loads
     }
 
     /// Cuts the supply and restores it.
