@@ -243,6 +243,8 @@ contract! {
         /// [`PULSED`](crate::boards::PULSED) names have pulses; the others are off at 0, else on. Thread mode. Cost:
         /// 60.
         fn drive(power: [u8; 3]);
+        /// Switches the fan of the heatbreak, on boards that have one. Thread mode.
+        fn cool(on: bool);
     }
 
     /// Stepper drivers that are set up by UART, of boards that have them.

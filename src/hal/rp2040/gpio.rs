@@ -76,7 +76,7 @@ pub(super) fn set(pin: Pin, high: bool) {
 }
 
 /// Makes a pin an output.
-fn output(pin: Pin) {
+pub(super) fn output(pin: Pin) {
     connect(pin, Unit::Cpu);
     drive(pin);
 }

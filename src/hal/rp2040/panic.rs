@@ -1,7 +1,7 @@
 //! The panic handler. No panic is meant to be reachable after start-up. If one happens, motion and outputs stop and the
 //! machine stays still until it is reset. The message of the panic is sent [after the reset](super::last_words).
 
-use super::{gpio, last_words, pwm, stepper, watchdog};
+use super::{gpio, heaters, last_words, pwm, stepper, watchdog};
 use crate::boards::ACTIVE;
 
 /// Stops the steps, switches drivers and hazardous outputs off, and never returns.
@@ -14,13 +14,15 @@ pub fn halt() -> ! {
     }
 }
 
-/// Stops the steps, and switches drivers and hazardous outputs off. Interrupts are off.
+/// Stops the steps, and switches drivers and hazardous outputs off. The fan of the heatbreak turns from then on, because
+/// the hot end may be hot. Interrupts are off.
 pub fn make_safe() {
     stepper::kill();
     pwm::kill();
     ACTIVE.hazards.iter().for_each(|hazard| gpio::set(*hazard, false));
     gpio::stop_spindle();
     gpio::power(0);
+    heaters::cool(true);
 }
 
 #[panic_handler]

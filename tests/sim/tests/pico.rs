@@ -7,8 +7,10 @@ use kerf::boards::inputs::{ENDS, PROBE};
 use kerf::boards::{Board, PICO_CNC, PICO_CNC6, SKR_PICO, gp};
 use kerf_sim::bench::{ideal, spiral};
 use kerf_sim::emulated::even::{FAST, evenness};
+use kerf_sim::emulated::heat::Heat;
 use kerf_sim::emulated::{Emulated, Near, job};
 use kerf_sim::job::{Options, lines_of};
+use kerf_sim::thermal::{HOT_END, Plant};
 use kerf_sim::{AUX, Host, LINES_IN_FLIGHT, Runs, USB};
 
 use crate::common::share::{is_long, share_of};
@@ -327,6 +329,46 @@ fn an_skr_pico_heats() {
     host.run_for_ms(&mut board, 500).unwrap();
     assert!(!board.is_high(gp(23)), "a fault switches it off");
     assert_eq!(value(&mut board, &mut host, "stat"), 2.0);
+}
+
+/// Runs an SKR Pico with its heaters for a time. Returns whether the fan of the heatbreak, FAN2, turns.
+fn cools_after(board: &mut Emulated, heat: &mut Heat, ms: u64) -> bool {
+    let until = board.cycle() + board.cycles(ms);
+    heat.run_until(board, until).unwrap();
+    board.is_high(gp(18))
+}
+
+#[test]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
+fn the_heatbreak_is_cooled_while_the_hot_end_is_hot_or_may_be() {
+    let mut board = Emulated::load(&image(&SKR_PICO), &SKR_PICO).unwrap();
+    let mut heat = Heat::of(&mut board);
+    let mut host = Host::new(LINES_IN_FLIGHT);
+    host.boot(&mut board, 1_000).unwrap();
+    set(&mut board, &mut host, "{he1k:1,he3k:1}");
+    assert!(!cools_after(&mut board, &mut heat, 500), "cold");
+    set(&mut board, &mut host, "m104 s60");
+    assert!(cools_after(&mut board, &mut heat, 500), "with a target, before it is hot");
+    assert!(cools_after(&mut board, &mut heat, 17_000));
+    let felt = value(&mut board, &mut host, "he1t");
+    assert!(felt > 51.0, "{felt}");
+    for line in ["m104 s0", "{alarm:n}", "{alarm:1}"] {
+        host.ask(&mut board, line, 1_000).unwrap();
+        assert!(cools_after(&mut board, &mut heat, 300), "still hot after {line}");
+    }
+    let thermal = heat.thermal_mut().unwrap();
+    // The sensor's wire breaks, and the hot end cools down: nobody knows.
+    thermal.break_wire(HOT_END, Some(5_000));
+    *thermal.plant_mut(HOT_END) = Plant::hot_end();
+    assert!(cools_after(&mut board, &mut heat, 1_000), "its sensor is broken");
+    heat.thermal_mut().unwrap().break_wire(HOT_END, None);
+    assert!(!cools_after(&mut board, &mut heat, 200), "cool");
+    assert!(!board.is_high(gp(23)), "the heater is off");
+    // After a panic it turns at full speed, whatever was before.
+    board.panic("src/some.rs");
+    board.run_for_ms(100).unwrap();
+    let on = [18, 17, 20, 23, 21].map(|pin| board.is_high(gp(pin)));
+    assert_eq!(on, [true, false, false, false, false]);
 }
 
 /// Longest time from the edge of a limit switch to the last step, us: two samples, the entry of the interrupt, which
