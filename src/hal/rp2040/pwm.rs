@@ -38,7 +38,7 @@ pub fn set_frequency(millihertz: u32) {
     channel.top().write(|w| w.set_top(top as u16));
     channel.cc().write(|w| w.0 = 0);
     channel.ctr().write(|w| w.0 = 0);
-    gpio::connect(pin, Unit::Pwm);
+    gpio::connect_output(pin, Unit::Pwm);
     channel.csr().write(|w| {
         w.set_ph_correct(true);
         w.set_en(true);

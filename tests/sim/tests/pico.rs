@@ -300,6 +300,43 @@ fn a_panic_stops_everything_and_is_told_after_the_reset() {
     assert!(said.contains("SYSTEM READY") && !said.contains("panic"), "once: {said}");
 }
 
+#[test]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
+fn outputs_are_strong_and_none_of_them_floats() {
+    for board in [&PICO_CNC, &SKR_PICO] {
+        let mut machine = Emulated::load(&image(board), board).unwrap();
+        machine.run_for_ms(300).unwrap();
+        let motors = board.motors.iter().flat_map(|m| [Some(m.step), Some(m.dir), m.enable]);
+        let outputs = motors.chain(board.outputs).chain([board.enable_all]).flatten();
+        for pin in outputs.chain(board.hazards.iter().copied()) {
+            assert!(machine.is_strong(pin), "{pin:?} of {}", board.name);
+        }
+        let spindle = board.outputs[0].unwrap();
+        assert!(!machine.floated(spindle) && !machine.is_high(spindle), "{}", board.name);
+    }
+}
+
+#[test]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
+fn directions_stand_before_and_behind_pulses() {
+    for (pulse_us, setup_us) in [(0, 1), (1, 0), (2, 1), (5, 20)] {
+        let (mut board, mut host) = booted();
+        let fast = "{x:{vm:20000,fr:20000,ac:3000,jm:1e6},y:{vm:20000,fr:20000,ac:3000,jm:1e6}}";
+        for line in [fast, &format!("{{spw:{pulse_us},dsu:{setup_us}}}")] {
+            set(&mut board, &mut host, line);
+        }
+        let mut lines = String::from("g1 f20000 x9 y5\n");
+        for _ in 0..4 {
+            lines += "g2 x1 i-4\ng3 x9 i4\nx9.01\nx9\ny0 x0\nx9 y5\n";
+        }
+        board.send_to(USB, lines.as_bytes());
+        let recorded = board.record_for_ms(3_000).unwrap();
+        let [hold, setup] = [recorded.hold, recorded.setup].map(|least| least.unwrap() / 128.0);
+        println!("pulses of {pulse_us} us: {hold:.2} us behind, {setup:.2} us before");
+        assert!(hold >= 1.0 && setup >= f64::from(setup_us), "{hold} {setup}");
+    }
+}
+
 /// Returns what the converter reads from a thermistor of this resistance with 4,700 ohms to the supply.
 fn reading(ohms: f64) -> u16 {
     (4_095.0 * ohms / (ohms + 4_700.0)) as u16
