@@ -1,4 +1,5 @@
-//! Raspberry Pi Pico on a breakout board: four drivers, spindle, switches.
+//! Raspberry Pi Pico on a breakout board: four drivers, spindle, switches. The pins are those of grblHAL's generic map for
+//! four axes, which is what most Picos are wired by.
 
 use super::{Board, Encoder, MotorPins, NATIVE_USB, Pwm, Serial, Timer, Usart, gp};
 
@@ -30,9 +31,9 @@ pub const PICO_CNC: Board = Board {
     ],
     enable_all: Some(gp(10)),
     // Spindle enable, spindle direction, spindle PWM, mist, flood
-    hazards: &[gp(11), gp(12), gp(13), gp(14), gp(15)],
-    outputs: [Some(gp(11)), Some(gp(12)), Some(gp(14)), Some(gp(15))],
-    pwm: Some(Pwm { timer: Timer::Slices, channel: 13 }),
+    hazards: &[gp(26), gp(27), gp(15), gp(17), gp(16)],
+    outputs: [Some(gp(26)), Some(gp(27)), Some(gp(17)), Some(gp(16))],
+    pwm: Some(Pwm { timer: Timer::Slices, channel: 15 }),
     // USB; then transmit GP0, receive GP1
     serial: &[
         NATIVE_USB,
@@ -40,20 +41,21 @@ pub const PICO_CNC: Board = Board {
     ],
     inputs: [
         // One switch input for both ends of an axis
-        Some(gp(16)),
-        Some(gp(16)),
-        Some(gp(17)),
-        Some(gp(17)),
-        Some(gp(18)),
-        Some(gp(18)),
-        None,
-        None,
-        // Probe, door, emergency stop
-        Some(gp(19)),
+        Some(gp(11)),
+        Some(gp(11)),
+        Some(gp(12)),
+        Some(gp(12)),
+        Some(gp(13)),
+        Some(gp(13)),
+        Some(gp(14)),
+        Some(gp(14)),
+        // Probe, door, emergency stop (grblHAL's reset)
         Some(gp(22)),
-        Some(gp(26)),
+        Some(gp(21)),
+        Some(gp(18)),
     ],
-    encoder: Some(Encoder { index: gp(27), sync: gp(28), second: None }),
+    // Inputs there, too: feed hold and an auxiliary one. GP20, cycle start, is left alone.
+    encoder: Some(Encoder { index: gp(28), sync: gp(19), second: None }),
     drivers: None,
     heaters: None,
     card: None,

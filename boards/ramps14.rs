@@ -57,6 +57,7 @@ pub const RAMPS14: Board = Board {
             Heater { pin: pin(H, 5), channel: 14, select: None },
         ],
         fan: pin(H, 6),
+        cooler: None,
     }),
     // Chip select D53, as on the displays for RAMPS
     card: Some(pin(B, 0)),

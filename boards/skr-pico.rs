@@ -32,10 +32,10 @@ pub const SKR_PICO: Board = Board {
         MotorPins { step: gp(14), dir: gp(13), enable: Some(gp(15)) },
     ],
     enable_all: None,
-    // Fans 1 to 3, servo, bed heater, hot-end heater
-    hazards: &[gp(17), gp(18), gp(20), gp(29), gp(21), gp(23)],
-    // Spindle FAN2, mist FAN3
-    outputs: [Some(gp(18)), None, Some(gp(20)), None],
+    // Fans 1 and 3, servo, bed heater, hot-end heater
+    hazards: &[gp(17), gp(20), gp(29), gp(21), gp(23)],
+    // Spindle FAN3
+    outputs: [Some(gp(20)), None, None, None],
     pwm: Some(Pwm { timer: Timer::Slices, channel: 29 }),
     // USB; then transmit GP0, receive GP1
     serial: &[
@@ -58,13 +58,14 @@ pub const SKR_PICO: Board = Board {
         Some(gp(16)),
     ],
     encoder: None,
-    // Hot end: HE, sensor TH0. Bed: HB, sensor THB. Fan: FAN1
+    // Hot end: HE, sensor TH0. Bed: HB, sensor THB. Fans: FAN1 for the print, FAN2 for the heatbreak
     heaters: Some(Heaters {
         heaters: [
             Heater { pin: gp(23), channel: 1, select: None },
             Heater { pin: gp(21), channel: 0, select: None },
         ],
         fan: gp(17),
+        cooler: Some(gp(18)),
     }),
     drivers: Some(Tmc2209 { tx: gp(8), rx: gp(9), addresses: &[0, 2, 1, 3] }),
     card: None,

@@ -49,11 +49,14 @@ pub const LOOKS: Timer = if cfg!(feature = "printer") { Timer::T3 } else { Timer
 /// Whether a timer produces the pulses of the hot end, the bed and the fan, in this order. It does so for pins that are
 /// outputs of timer 2.
 pub const PULSED: [bool; 3] = match ACTIVE.heaters {
-    Some(Heaters { heaters: [hot_end, bed], fan }) => {
+    Some(Heaters { heaters: [hot_end, bed], fan, .. }) => {
         [hot_end.pin.channel().is_some(), bed.pin.channel().is_some(), fan.channel().is_some()]
     }
     None => [false; 3],
 };
+
+/// Whether the board has a fan for the heatbreak of its hot end.
+pub const COOLS: bool = matches!(ACTIVE.heaters, Some(Heaters { cooler: Some(_), .. }));
 
 /// Whether a unit of the chip produces the step pulses from entries in memory (the PIO of the RP2040). Pulses then take
 /// no CPU time.

@@ -1,4 +1,4 @@
-//! TMC2209 drivers: the values of their registers, and the datagrams that write them. Pure: no pin, no UART.
+//! TMC2209 drivers: the values of their registers, and the datagrams that write and read them. Pure: no pin, no UART.
 //!
 //! The registers set the microsteps, the currents, the chopper mode, and the load at which the driver raises its pin
 //! DIAG. The driver measures the load only in stealthChop mode, and only while a 256th of a step takes at most
@@ -8,14 +8,27 @@
 //! Registers and datagrams: TMC2209 data sheet, 4.1 (UART datagram structure), 5.1 to 5.5 (register map), 9 (currents),
 //! 11 (StallGuard4).
 
+pub mod watch;
+
 use crate::config::Settings;
 use crate::config::drive::Drive;
 
 /// The number of registers that Kerf writes to each driver.
-pub const REGISTERS: usize = 5;
+pub const REGISTERS: usize = 6;
 
-/// The addresses of GCONF, CHOPCONF, IHOLD_IRUN, TCOOLTHRS and SGTHRS, in the order of [`FIRST`].
-const ADDRESSES: [u8; REGISTERS] = [0x00, 0x6C, 0x10, 0x14, 0x40];
+/// The addresses of GCONF, CHOPCONF, IHOLD_IRUN, TCOOLTHRS, SGTHRS and NODECONF, in the order of [`FIRST`].
+const ADDRESSES: [u8; REGISTERS] = [0x00, 0x6C, 0x10, 0x14, 0x40, 0x03];
+/// The address of GSTAT.
+const GSTAT: u8 = 0x01;
+/// The number of bytes of a request to read a register.
+pub const REQUEST: usize = 4;
+/// The number of bytes of a datagram that writes a register, and of an answer.
+pub const DATAGRAM: usize = 8;
+/// The first byte of each datagram, and the address of the master in answers.
+const SYNC: u8 = 0x05;
+const MASTER: u8 = 0xFF;
+/// NODECONF: a driver waits for 24 bits before it answers, as it has to if several share the line.
+const ANSWER_DELAY: u32 = 2 << 8;
 
 /// GCONF: the UART is used instead of the configuration pins, microsteps come from CHOPCONF, step pulses are filtered,
 /// and the current does not depend on the pin VREF.
@@ -58,6 +71,7 @@ const fn values(drive: &Drive, microsteps: u8, slowest: u32) -> [u32; REGISTERS]
         HOLD_DELAY | counts(run, full) << 8 | counts(hold, full),
         if drive.stall == 0 { 0 } else { slowest },
         drive.stall as u32,
+        ANSWER_DELAY,
     ]
 }
 
@@ -93,12 +107,41 @@ fn slowest(settings: &Settings, motor: usize) -> u32 {
 
 /// Returns the datagram that writes a register of the driver with the given address. `number` is the index of the
 /// register, below [`REGISTERS`]. Cost on a Cortex-M0+: 1,000 cycles.
-pub fn datagram(address: u8, number: usize, value: u32) -> [u8; 8] {
-    let register = ADDRESSES.get(number).copied().unwrap_or(0);
+pub fn datagram(address: u8, number: usize, value: u32) -> [u8; DATAGRAM] {
+    write(address, ADDRESSES.get(number).copied().unwrap_or(0), value)
+}
+
+/// Returns the datagram that clears GSTAT.
+pub fn clearing(address: u8) -> [u8; DATAGRAM] {
+    write(address, GSTAT, watch::CLEARS)
+}
+
+fn write(address: u8, register: u8, value: u32) -> [u8; DATAGRAM] {
     let [a, b, c, d] = value.to_be_bytes();
-    let mut datagram = [0x05, address, register | 0x80, a, b, c, d, 0];
+    let mut datagram = [SYNC, address, register | 0x80, a, b, c, d, 0];
     datagram[7] = checksum(&datagram[..7]);
     datagram
+}
+
+/// Returns the request to read a register.
+pub fn request(address: u8, asked: watch::Asked) -> [u8; REQUEST] {
+    let mut request = [SYNC, address, asked as u8, 0];
+    request[3] = checksum(&request[..3]);
+    request
+}
+
+/// Returns the value in an answer. `heard` is what has come since the request: first the request itself, because both
+/// share the line, then the answer. `None` if no valid answer is at its end.
+pub fn answer(heard: &[u8], asked: watch::Asked) -> Option<u32> {
+    let answer = heard.get(heard.len().checked_sub(DATAGRAM)?..)?;
+    match *answer {
+        [SYNC, MASTER, register, a, b, c, d, sum]
+            if register == asked as u8 && checksum(&answer[..7]) == sum =>
+        {
+            Some(u32::from_be_bytes([a, b, c, d]))
+        }
+        _ => None,
+    }
 }
 
 /// Returns the CRC with the polynomial x^8 + x^2 + x + 1. It takes the lowest bit of each byte first.
@@ -132,10 +175,26 @@ mod tests {
 
     #[test]
     fn a_datagram_is_that_of_the_data_sheet() {
-        assert_eq!(FIRST, [0x1C0, 0x1503_0053, 0x0008_1209, 0, 0]);
+        assert_eq!(FIRST, [0x1C0, 0x1503_0053, 0x0008_1209, 0, 0, 0x200]);
         assert_eq!(datagram(2, 0, 0x1C0)[..7], [5, 2, 0x80, 0, 0, 1, 0xC0]);
         // A request to read GCONF.
         assert_eq!(checksum(&[5, 0, 0]), 0x48);
+    }
+
+    #[test]
+    fn only_a_whole_answer_to_the_question_counts() {
+        let asked = watch::Asked::Taken;
+        let mut answered = [5, 0xFF, 2, 0, 0, 0, 77, 0];
+        answered[7] = checksum(&answered[..7]);
+        let mut heard = request(3, asked).to_vec();
+        assert_eq!(answer(&heard, asked), None);
+        heard.extend(answered);
+        assert_eq!(answer(&heard, asked), Some(77));
+        assert_eq!(answer(&answered, asked), Some(77), "without an echo");
+        assert_eq!(answer(&heard, watch::Asked::Global), None);
+        assert_eq!(answer(&heard[..11], asked), None);
+        heard[10] ^= 1;
+        assert_eq!(answer(&heard, asked), None);
     }
 
     #[test]
@@ -170,7 +229,7 @@ mod tests {
         for (name, value) in [("xvm", "800"), ("xsv", "600")] {
             set(&mut settings, name, value);
         }
-        let told = |settings: &Settings| registers(settings, 0)[3..].to_vec();
+        let told = |settings: &Settings| registers(settings, 0)[3..5].to_vec();
         assert_eq!(told(&settings), [39, 90]);
         set(&mut settings, "1mi", "32");
         assert_eq!(told(&settings), [39, 90], "parts are of full steps");

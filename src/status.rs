@@ -40,6 +40,22 @@ pub enum Status {
     TooHot,
     TooCold,
     HeatersLocked,
+    /// A motor's driver does not answer on its UART.
+    #[cfg(feature = "drivers")]
+    DriverSilent,
+    /// A motor's driver has not taken its settings.
+    #[cfg(feature = "drivers")]
+    DriverUnset,
+    /// A motor's driver has reset, so that its motor may stand elsewhere.
+    #[cfg(feature = "drivers")]
+    DriverReset,
+    /// A motor's driver has switched its motor off.
+    #[cfg(feature = "drivers")]
+    DriverOff,
+    #[cfg(feature = "drivers")]
+    DriverHot,
+    #[cfg(feature = "drivers")]
+    DriverOpen,
     CardError,
     UnrecognizedName,
     MalformedCommand,

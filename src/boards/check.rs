@@ -16,8 +16,8 @@ const MAX_PORTS: usize = 2;
 const SERIAL_PINS: usize = 5;
 
 /// Pins beside those of motors and serial ports: `enable_all`, hazards, the firmware's own, inputs, drivers, and SPI
-/// with its select pins.
-const OTHER_PINS: usize = 1 + 8 + 1 + inputs::COUNT + 2 + SPI.len() + 3;
+/// with its select pins, and the fan of the heatbreak.
+const OTHER_PINS: usize = 1 + 8 + 1 + inputs::COUNT + 2 + SPI.len() + 3 + 1;
 const MAX_PINS: usize = 3 * MOST_MOTORS + MAX_PORTS * SERIAL_PINS + OTHER_PINS;
 
 impl Serial {
@@ -75,9 +75,9 @@ impl Board {
             n += 2;
             assert!(drivers.addresses.len() == self.motors.len(), "a driver for each motor");
         }
-        if let Some(Heaters { heaters: [hot_end, bed], .. }) = self.heaters {
-            (pins[n], pins[n + 1]) = (hot_end.select, bed.select);
-            n += 2;
+        if let Some(Heaters { heaters: [hot_end, bed], cooler, .. }) = self.heaters {
+            (pins[n], pins[n + 1], pins[n + 2]) = (hot_end.select, bed.select, cooler);
+            n += 3;
         }
         if let Some(card) = self.card
             && !card.is(SPI[0])
@@ -190,7 +190,7 @@ impl Board {
     /// Panics if a heater is not among the hazards (so a panic would leave it on), or is an output of M3 to M9. Also
     /// panics if a sensor is on no channel of the converter, shares its channel, or is on the pin of an input.
     const fn check_heaters(&self) {
-        let Some(Heaters { heaters: [hot_end, bed], fan }) = self.heaters else { return };
+        let Some(Heaters { heaters: [hot_end, bed], fan, .. }) = self.heaters else { return };
         let pins = [hot_end.pin, bed.pin, fan];
         let mut p = 0;
         while p < pins.len() {

@@ -217,11 +217,14 @@ pub struct Heater {
     pub select: Option<Pin>,
 }
 
-/// The heaters and the fan of a printer.
+/// The heaters and the fans of a printer.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Heaters {
     /// The hot end and the bed.
     pub heaters: [Heater; 2],
     /// The part-cooling fan. Its pin is a hazard.
     pub fan: Pin,
+    /// The fan of the hot end's heatbreak, on an RP2040. Its pin is no hazard: after a panic the fan turns, because
+    /// the hot end may be hot.
+    pub cooler: Option<Pin>,
 }

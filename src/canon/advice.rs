@@ -143,6 +143,42 @@ const ADVICE: &[(Status, &str, &str)] = &[
         "The line switches a heater on while a fault has locked the heaters.",
         "Find the cause; `^x` unlocks the heaters.",
     ),
+    #[cfg(feature = "drivers")]
+    (
+        DriverSilent,
+        "A motor's driver does not answer: nobody knows its microsteps. As an alarm: it fell silent while motors moved.",
+        "Switch the motor supply on: without it drivers are silent. `{dr:n}` shows which one. In an alarm `{clear:n}`; home.",
+    ),
+    #[cfg(feature = "drivers")]
+    (
+        DriverUnset,
+        "The driver of a motor answers, but has not taken its settings: not yet, or its line is disturbed.",
+        "Wait for half a second after power-up. If it stays: `{dr:n}` shows which driver; replace the board.",
+    ),
+    #[cfg(feature = "drivers")]
+    (
+        DriverReset,
+        "A motor's driver has lost its supply. It has its settings again, but the motor may stand elsewhere. An alarm, if motors moved.",
+        "Check the motor supply and its plug. `{clear:n}`, then home.",
+    ),
+    #[cfg(feature = "drivers")]
+    (
+        DriverOff,
+        "A motor's driver has switched it off: too hot, a coil shorted, the supply too low. An alarm, if motors moved.",
+        "`{dr:n}` says which and why. Let it cool, lower `drr`, check motor and wires. `{md:1}`, `{clear:n}`, and home.",
+    ),
+    #[cfg(feature = "drivers")]
+    (
+        DriverHot,
+        "The driver of a motor is above 120 degrees. It works on, and switches off at 143. Told once.",
+        "Cool it with a fan, or lower its current (`drr`).",
+    ),
+    #[cfg(feature = "drivers")]
+    (
+        DriverOpen,
+        "A wire of a motor seems to be open. Told once; `{dr:n}` shows which. At high speed a driver may be wrong about it.",
+        "Stop, cut the power, and check the motor's plug.",
+    ),
     (
         CardError,
         "The SD card, or the file being printed from it, cannot be read. The print has ended.",

@@ -3,10 +3,17 @@
 use super::Settings;
 #[cfg(feature = "drivers")]
 use super::{Owner, Setting};
+use crate::boards::ACTIVE;
 use crate::capability::Capability;
+use crate::status::Status;
 
 /// The number of drivers with settings: 0 in an image without the capability `drivers`.
 pub const DRIVERS: usize = if Capability::Drivers.is_built_in() { 4 } else { 0 };
+
+/// 1 in an image with drivers that are set up by UART, else 0.
+pub const DRIVEN: usize = Capability::Drivers.is_built_in() as usize;
+/// Why such drivers do not move motors at the start: none has been asked yet, so lines wait.
+pub const AT_START: Status = if ACTIVE.drivers.is_some() { Status::Again } else { Status::Ok };
 
 /// The settings of a motor's driver, beside its microsteps.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

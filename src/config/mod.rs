@@ -53,6 +53,8 @@ pub struct Settings {
     pub heating: [Heating; heating::PRINTERS],
     /// The configuration of the motor drivers. Empty in an image without configurable drivers.
     pub drives: [Drive; DRIVERS],
+    /// Why the drivers do not move the motors, or `Ok`. The task of the drivers keeps it up to date.
+    pub undriven: [Status; drive::DRIVEN],
     /// The plane of the printer's bed. Empty in an image without bed levelling.
     pub bed: [Bed; BEDS],
 }
@@ -81,6 +83,7 @@ impl Settings {
             octaves: 0,
             heating: [Heating::NONE; heating::PRINTERS],
             drives: [Drive::DEFAULT; DRIVERS],
+            undriven: [drive::AT_START; drive::DRIVEN],
             bed: [Bed::NONE; BEDS],
         }
     }

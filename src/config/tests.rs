@@ -165,6 +165,7 @@ fn getters_have_their_units() {
 #[test]
 fn ram_is_accounted_for() {
     let heating = if heating::PRINTERS == 0 { 0 } else { 12 };
+    // The status and the padding behind it.
     let drives = drive::DRIVERS * 6;
     let bed = bed::BEDS * 48;
     assert_eq!(size_of::<Settings>(), 436 + heating + drives + bed);

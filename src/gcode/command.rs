@@ -245,6 +245,19 @@ pub enum Motion {
     },
 }
 
+impl Motion {
+    /// Whether motors may turn for it.
+    pub fn moves(&self) -> bool {
+        let stands = matches!(
+            self,
+            Motion::None | Motion::Check | Motion::Heat(_) | Motion::SetPosition { .. }
+        );
+        #[cfg(feature = "bed-plane")]
+        let stands = stands || matches!(self, Motion::FollowBed(_));
+        !stands
+    }
+}
+
 /// How fast a feed move goes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Feed {

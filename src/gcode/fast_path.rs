@@ -125,6 +125,7 @@ impl State {
             && !(Capability::Printer.is_built_in()
                 && words.seen & 1 << EXTRUDER != 0
                 && setup.extrudes().is_err())
+            && !(Capability::Drivers.is_built_in() && setup.drives().is_err())
             && self.carry_out(&words, out)
     }
 

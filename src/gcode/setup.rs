@@ -69,6 +69,10 @@ pub trait Setup {
     fn extrudes(&self) -> Result<(), Status> {
         Ok(())
     }
+    /// Returns `Ok` if the drivers of the motors are ready to move them, else the reason why not.
+    fn drives(&self) -> Result<(), Status> {
+        Ok(())
+    }
     /// Returns the axes that have a homing switch, as bits.
     fn axes_that_home(&self) -> u8 {
         u8::MAX

@@ -302,6 +302,9 @@ impl State {
         if Capability::Printer.is_built_in() {
             self.check_extrusion(start, &out.motion, setup)?;
         }
+        if Capability::Drivers.is_built_in() && out.motion.moves() {
+            setup.drives()?;
+        }
         // Soft limits apply to homed axes only.
         if self.homed != 0 {
             limits::check(start, &out.motion, self.homed, setup)?;

@@ -21,6 +21,7 @@ use super::serial::{AllEnds, Flow};
 use crate::boards::MOTORS;
 use crate::dda::{Dda, Segment, Ticks};
 use crate::drivers::REGISTERS;
+use crate::drivers::watch::Watch;
 use crate::encoder::Pulses;
 use crate::realtime::Asked;
 use crate::store::Memory;
@@ -245,6 +246,8 @@ contract! {
         /// [`PULSED`](crate::boards::PULSED) names have pulses; the others are off at 0, else on. Thread mode. Cost:
         /// 60.
         fn drive(power: [u8; 3]);
+        /// Switches the fan of the heatbreak, on boards that have one. Thread mode.
+        fn cool(on: bool);
     }
 
     /// Stepper drivers that are set up by UART, of boards that have them.
@@ -253,6 +256,10 @@ contract! {
         /// [`drivers`](crate::drivers). A register whose value has changed is sent within 1 ms for each changed
         /// register before it; all registers are repeated in turn, for ever. Thread mode.
         fn tell(motor: u8, values: &[u32; REGISTERS]);
+        /// Returns what is known of a motor's driver. Thread mode.
+        fn watch(motor: u8) -> Watch;
+        /// Takes the [news](crate::drivers::watch::news) of a motor's driver since the last call. Thread mode.
+        fn take_news(motor: u8) -> u8;
     }
 
     /// The lines of an SD card: SPI, and the pin that selects the card. On a chip without a card the input line reads

@@ -119,6 +119,11 @@ impl Heater {
         self.level
     }
 
+    /// Returns the temperature of a single reading, 1/64 degree; `None` if the reading is missing.
+    pub fn feels(&self, reading: Option<u16>) -> Option<Result<i16, Broken>> {
+        reading.map(|reading| self.kind.temperature(reading))
+    }
+
     /// Switches off at once.
     pub fn stop(&mut self) {
         self.level = 0;

@@ -4,6 +4,7 @@
 //! changes in step with motion). Temperatures are integers, in eighths of a degree Celsius.
 
 pub mod control;
+pub mod cooler;
 pub mod fault;
 pub mod heater;
 pub mod sensor;

@@ -11,6 +11,13 @@ use crate::hal::{PULSE_US, TICKS, TIMER_HZ};
 const CYCLES_PER_US: u16 = (TIMER_HZ / 1_000_000) as u16;
 const _: () = assert!(TIMER_HZ / 1_000_000 < 256, "255 us take more than a tick period holds");
 
+/// Latest cycle of its first tick at which the direction pins of a segment are set.
+pub const TURNED: u16 = 158;
+/// The time from the end of a pulse to a change of directions by a step generator in hardware, and the cycles that the
+/// change itself takes.
+const HOLD_US: u16 = 1;
+const CHANGES: u16 = 16;
+
 pub use crate::dda::Drivers;
 
 impl Drivers {
@@ -40,9 +47,16 @@ impl Drivers {
         }
     }
 
-    /// How long a direction must be stable before the first step, CPU cycles.
+    /// How long the first step must wait from [`TURNED`] on so that a direction is stable before it, CPU cycles. A step
+    /// generator in hardware changes directions a microsecond after the last pulse, which may be later than `TURNED`.
     pub const fn setup(self) -> u16 {
-        self.setup_us as u16 * CYCLES_PER_US
+        let setup = self.setup_us as u16 * CYCLES_PER_US;
+        if !STEPS_BY_UNIT {
+            return setup;
+        }
+        let pulse_us = if self.pulse_us == 0 { 1 } else { self.pulse_us };
+        let changed = (pulse_us as u16 + HOLD_US) * CYCLES_PER_US + CHANGES;
+        setup + changed.saturating_sub(TURNED)
     }
 
     /// Returns the highest step rate of each of `motors` that move together, steps per second. This is one step in

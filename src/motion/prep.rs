@@ -50,7 +50,7 @@ mod ticks;
 use super::advance::{Advance, EXTRUDERS};
 use super::block::PARTS_LOG2;
 use super::divide::quotient;
-use super::pace::{COARSEST, Drivers, Pace, paces};
+use super::pace::{COARSEST, Drivers, Pace, TURNED, paces};
 use crate::boards::{MOTORS, each_motor};
 use crate::dda::{STEP, STEP_LOG2, Segment, TICKS_MAX};
 use crate::hal::TICKS;
@@ -84,9 +84,6 @@ pub const FINE_LOG2: i8 = -4;
 
 /// Latest cycle of a tick at which the interrupt may become ready for its pulses.
 const SETTLE: u8 = 76;
-
-/// Latest cycle of its first tick at which the direction pins of a segment are set.
-const TURNED: u16 = 158;
 
 /// Ticks and period of a segment for a retreat while the motors of the block stand still.
 const ASIDE: (u16, u16) = (64, 500);

@@ -144,6 +144,12 @@ pub enum Value {
     WantedTemperature(u8),
     /// The power of a heater, in thousandths of its full power.
     HeaterPower(u8),
+    /// The state of a motor's driver: see [`State`](crate::drivers::watch::State).
+    #[cfg(feature = "drivers")]
+    Driver(u8),
+    /// The register DRV_STATUS of a motor's driver.
+    #[cfg(feature = "drivers")]
+    DriverStatus(u8),
     /// The axis end whose limit switch was hit, for exceptions; -1 for none.
     LimitHit,
     /// The axis that could not be homed, for exceptions.

@@ -13,6 +13,8 @@
 //! [locks](lock) them, and raises an alarm. Any alarm switches them off. While a wait is on ([`Heaters::begin_wait`]),
 //! the planner is woken when the wait is over.
 //!
+//! The fan of the heatbreak ([`cooler`]), on boards that have one, is decided at each reading of the hot end, also in an alarm.
+//!
 //! Thread mode. Cost of a turn: 3,500 cycles; 8,000 in every fifth turn. A late turn switches the heaters late. Under
 //! the hardest motion a turn may be half a second late, because thread mode has little of the CPU.
 
@@ -25,7 +27,7 @@ use super::common;
 use super::links::Links;
 use super::setup::moved_by;
 use super::storage::Storage;
-use crate::boards::PULSED;
+use crate::boards::{COOLS, PULSED};
 use crate::capability::Capability;
 use crate::config::groups::hot_end;
 use crate::config::{Owner, Setting, Settings};
@@ -35,6 +37,7 @@ use crate::hal::Thread;
 use crate::hal::event::Event;
 use crate::hal::{flags, heaters};
 use crate::heat::control::{FULL, level};
+use crate::heat::cooler;
 use crate::heat::heater::{Heater, Seen, in_units};
 use crate::heat::sensor::UNIT;
 use crate::heat::tune::{Found, Stage, Tune};
@@ -72,6 +75,8 @@ struct Parts {
     /// [`spread`](crate::heat::control::spread).
     kick: Cell<u8>,
     owed: Cell<u8>,
+    /// Whether the fan of the heatbreak turns, on a board that has one.
+    cools: [Cell<bool>; COOLS as usize],
     /// The requested cycles of an autotune, and whether the heater is to take over its factors.
     asked: Cell<(u8, bool)>,
     /// The autotune under way, or the last one.
@@ -94,6 +99,7 @@ impl Parts {
             next: Cell::new(0),
             kick: Cell::new(0),
             owed: Cell::new(0),
+            cools: [const { Cell::new(false) }; COOLS as usize],
             asked: Cell::new((0, false)),
             tune: RefCell::new(Tune::IDLE),
             tuned: Cell::new(0),
@@ -114,6 +120,15 @@ impl Parts {
         let power = level(pulsed, &mut owed, speed);
         self.owed.set(owed);
         if left > 0 { FULL } else { power }
+    }
+
+    /// Switches the fan of the heatbreak by a reading of the hot end.
+    fn turn_cooler(&self, reading: Option<u16>, orders: &Orders) {
+        let Some(cools) = self.cools.first() else { return };
+        let ([hot_end, _], [to, _]) = (&*self.heaters.borrow(), orders.to);
+        let turns = cooler::turns(cools.get(), to, hot_end.feels(reading));
+        cools.set(turns);
+        heaters::cool(turns);
     }
 
     /// Whether the awaited temperatures have been reached.
@@ -316,6 +331,9 @@ pub fn look(links: &Links) {
     let number = parts.next.replace(parts.next.get() ^ 1);
     let reading = heaters::reading();
     heaters::begin(parts.next.get());
+    if COOLS && number == 0 {
+        parts.turn_cooler(reading, &orders);
+    }
     let seen = look_at(parts, number, reading, &orders);
     let fan = parts.turn_fan(orders.fan);
     let [hot_end, bed] = parts.heaters.borrow().each_ref().map(Heater::level);

@@ -5,6 +5,7 @@
 //! on before its step; that costs 40 cycles a segment. All others change the state under the ceiling.
 
 use super::common;
+use super::drivers;
 use super::health;
 use super::heat;
 use super::links::Links;
@@ -26,6 +27,7 @@ pub async fn run(links: &'static Links) -> ! {
     loop {
         heat::look(links);
         health::look();
+        drivers::look(links);
         links.signs.age(millis());
         look(links);
         turning::look(links);

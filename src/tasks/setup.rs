@@ -113,11 +113,21 @@ impl Setup for Settings {
         }
     }
 
+    fn drives(&self) -> Result<(), Status> {
+        match self.undriven.first() {
+            None | Some(Status::Ok) => Ok(()),
+            Some(refused) => Err(*refused),
+        }
+    }
+
     fn axes_that_home(&self) -> u8 {
         homing::axes(self)
     }
 
     fn homing(&self, axis: u8) -> Result<(), Status> {
+        if Capability::Drivers.is_built_in() {
+            self.drives()?;
+        }
         homing::of(self, axis).map(|_| ())
     }
 }

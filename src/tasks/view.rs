@@ -33,6 +33,7 @@ use super::setup::counted;
 use super::spindle;
 use super::switches;
 use crate::boards::{MOTORS, inputs, outputs};
+use crate::capability::Capability;
 #[cfg(feature = "sd")]
 use crate::card::{Entry, Op};
 #[cfg(feature = "bed-plane")]
@@ -40,6 +41,7 @@ use crate::config::bed::Bed;
 use crate::config::{Setting, Settings};
 use crate::gcode::command::Motion;
 use crate::gcode::overrides::Change;
+use crate::gcode::setup::Setup as _;
 use crate::gcode::tables::TableRow;
 use crate::hal::Thread;
 use crate::hal::eeprom::Eeprom;
@@ -230,8 +232,10 @@ impl<'a> View<'a> {
         if alarm != Alarm::None && !ends_alarm {
             return Err(alarm.status());
         }
-        let busy = self.is_busy() || self.has_others();
-        if busy { Err(Status::NotAccepted) } else { Ok(()) }
+        if self.is_busy() || self.has_others() {
+            return Err(Status::NotAccepted);
+        }
+        if Capability::Drivers.is_built_in() { self.settings.drives() } else { Ok(()) }
     }
 
     /// Does what [`Links::may_feed`] does, for callers that have a view already: there is one at a time.

@@ -39,6 +39,9 @@ sends G-code, or that sent it last.
 | 34 | EEPROM cannot be written | |
 | 37 | steps came late for the first time | `{stv:n}` counts them |
 | 38 | the program waits at a program stop | `~` resumes |
+| 57, 58, 60 | motors moved, and a driver does not answer, is not set, or has switched off | an alarm, on `skr-pico` |
+| 59 | a driver has reset: home | an alarm, if motors moved |
+| 61, 62 | a driver is hot; a motor's wire seems open | told once |
 | 180 | a tool has no length: 0 is used | a note |
 | 203 | `{alarm:n}`, or after 250 | |
 | 204 | a limit was hit | `sw`: `xmin` `xmax` `ymin` `ymax` `zmin` `zmax` `amin` `amax` |
@@ -87,7 +90,7 @@ can be read as well: [settings.md](settings.md). Names that do something: [proto
 ";
 
 /// Values of the machine: the name, or the name within its group with `x`, `1` or `e` for the group; and the meaning.
-const VALUES: [(&str, &str); 65] = [
+const VALUES: [(&str, &str); 66] = [
     (
         "n",
         "line number (N) of the last finished line; in motion, of those that move or switch something",
@@ -157,6 +160,10 @@ const VALUES: [(&str, &str); 65] = [
     ("tof", "`tofx` to `tofc`: active tool length, mm or degrees; can be set"),
     ("g92", "`g92x` to `g92c`: G92 offset, active units"),
     ("pwr", "`pwr1` to `pwr4`: 1: the motor has power"),
+    (
+        "drx",
+        "`drx1` to `drx4`, on `skr-pico`: state of the driver, see [rp2040.md](rp2040.md#skr-pico)",
+    ),
     ("_te", "`_tex` to `_tec`: end position of the last line read, mm or degrees"),
     ("_tr", "`_trx` to `_trc`: present position, mm or degrees"),
     ("_ts", "`_ts1` to `_ts4`: present motor position, steps"),

@@ -141,6 +141,7 @@ fn wires(board: &Board) -> Vec<Wire> {
             add(format!("{name}, sensor"), sensor, "thermistor to ground", setting.into());
         }
         add("fan".into(), Some(heaters.fan), "high is on", "M106".into());
+        add("fan of the heatbreak".into(), heaters.cooler, "high is on", "by itself".into());
     }
     // The first port of an Arduino is its USB. The first port of a chip with USB of its own has no pins.
     let wired = usize::from(!is_numbered(board));
@@ -172,7 +173,7 @@ fn about(board: &Board) -> &'static str {
             "A Raspberry Pi Pico with six drivers: the two additional motors may share an axis with another motor, or move B and C. **3.3 V**, as `pico-cnc`."
         }
         "skr-pico" => {
-            "A BTT SKR Pico v1.0: motor 4 is its driver E. FAN1 cools the print, FAN2 and FAN3 are spindle and mist, the servo pin is the spindle's PWM. **3.3 V**, as `pico-cnc`. \
+            "A BTT SKR Pico v1.0: motor 4 is its driver E. FAN1 cools the print, FAN2 the heatbreak of the hot end; FAN3 is the spindle's enable, the servo pin is the spindle's PWM. **3.3 V**, as `pico-cnc`. \
              A DIAG jumper connects the driver's pin instead of the switch of X, Y or Z, for [homing by a stall](rp2040.md#homing-by-a-stall): remove the switch then. \
              Leave the jumper of E off: its pin is the emergency stop's."
         }

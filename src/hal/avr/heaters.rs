@@ -194,6 +194,9 @@ pub fn drive(power: [u8; 3]) {
     drive_pin(heaters.fan, of_fan);
 }
 
+/// Does nothing: no board with this chip has a fan for the heatbreak.
+pub fn cool(_: bool) {}
+
 /// Sets the power of a pin. The timer drives the pin while it is connected to it. The port's bit stays low, so the
 /// pin is low while it is not connected.
 #[inline(always)]

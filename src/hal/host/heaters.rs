@@ -36,6 +36,9 @@ pub fn drive(power: [u8; 3]) {
     switched().set(hot_end | bed << 1 | fan << 2);
 }
 
+/// Does nothing: the host's board has no fan for the heatbreak.
+pub fn cool(_: bool) {}
+
 /// Sets what the converter reads of a heater's sensor from now on.
 pub fn set(heater: usize, reading: u16) {
     let mut all = readings().get();

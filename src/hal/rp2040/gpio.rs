@@ -3,6 +3,7 @@
 //! Setting a pin is one store that disturbs no other pin.
 
 use embassy_rp::pac::io::vals::{Inover, Outover};
+use embassy_rp::pac::pads::vals::Drive;
 use embassy_rp::pac::{IO_BANK0, PADS_BANK0, SIO};
 
 use crate::boards::outputs::{COUNTERCLOCKWISE, SPINDLE};
@@ -36,6 +37,13 @@ pub(super) fn connect(pin: Pin, unit: Unit) {
         w.set_funcsel(unit as u8);
         w.set_inover(Inover::NORMAL);
     });
+}
+
+/// Connects an output to a unit. It may drive 12 mA, because the LED of an opto-coupler takes 8 to 12; after a reset a
+/// pin drives 4.
+pub(super) fn connect_output(pin: Pin, unit: Unit) {
+    connect(pin, unit);
+    PADS_BANK0.gpio(pin.bit.into()).modify(|w| w.set_drive(Drive::_12M_A));
 }
 
 /// Makes a pin an input with a pull-up. Start-up.
@@ -76,8 +84,8 @@ pub(super) fn set(pin: Pin, high: bool) {
 }
 
 /// Makes a pin an output.
-fn output(pin: Pin) {
-    connect(pin, Unit::Cpu);
+pub(super) fn output(pin: Pin) {
+    connect_output(pin, Unit::Cpu);
     drive(pin);
 }
 
@@ -86,7 +94,8 @@ fn drive(pin: Pin) {
 }
 
 /// Makes the board's output pins outputs: drivers off, hazards off. The level that switches the spindle off is not
-/// known yet, so its enable pin is not driven before [`set_low`].
+/// known yet, so its enable pin is not driven before [`set_low`]; its pull-down stays on, as it is from the reset on, so
+/// that the pin does not float.
 pub(super) fn start() {
     let enables = ACTIVE.motors.iter().filter_map(|motor| motor.enable);
     enables.chain(ACTIVE.enable_all).for_each(|enable| {
@@ -96,7 +105,8 @@ pub(super) fn start() {
     for hazard in ACTIVE.hazards {
         set(*hazard, false);
         if ACTIVE.outputs[0] == Some(*hazard) {
-            connect(*hazard, Unit::Cpu);
+            connect_output(*hazard, Unit::Cpu);
+            PADS_BANK0.gpio(hazard.bit.into()).modify(|w| w.set_pde(true));
         } else {
             output(*hazard);
         }

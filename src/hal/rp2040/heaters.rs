@@ -29,8 +29,9 @@ static READING: AtomicU16 = AtomicU16::new(NONE);
 
 /// Connects the sensors. Start-up.
 pub(super) fn start() {
-    let Some(Heaters { heaters, .. }) = ACTIVE.heaters else { return };
+    let Some(Heaters { heaters, cooler, .. }) = ACTIVE.heaters else { return };
     heaters.iter().for_each(|heater| gpio::sense(heater.channel));
+    cooler.into_iter().for_each(gpio::output);
     ADC.cs().write(|w| w.set_en(true));
 }
 
@@ -71,9 +72,15 @@ pub(super) fn pause() {
 
 /// Switches the hot end, the bed and the fan: off at 0, else on. Thread mode.
 pub fn drive(power: [u8; 3]) {
-    let Some(Heaters { heaters: [hot_end, bed], fan }) = ACTIVE.heaters else { return };
+    let Some(Heaters { heaters: [hot_end, bed], fan, .. }) = ACTIVE.heaters else { return };
     let [of_hot_end, of_bed, of_fan] = power.map(|power| power != 0);
     gpio::set(hot_end.pin, of_hot_end);
     gpio::set(bed.pin, of_bed);
     gpio::set(fan, of_fan);
+}
+
+/// Switches the fan of the heatbreak, if the board has one. Thread mode, and the panic handler.
+pub fn cool(on: bool) {
+    let cooler = ACTIVE.heaters.and_then(|heaters| heaters.cooler);
+    cooler.into_iter().for_each(|pin| gpio::set(pin, on));
 }

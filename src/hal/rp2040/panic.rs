@@ -7,7 +7,7 @@
 
 use cortex_m_rt::{ExceptionFrame, exception};
 
-use super::{gpio, last_words, pwm, stepper, watchdog};
+use super::{gpio, heaters, last_words, pwm, stepper, watchdog};
 use crate::boards::ACTIVE;
 
 /// Stops the steps, switches drivers and hazardous outputs off, and never returns.
@@ -20,13 +20,15 @@ pub fn halt() -> ! {
     }
 }
 
-/// Stops the steps, and switches drivers and hazardous outputs off. Interrupts are off.
+/// Stops the steps, and switches drivers and hazardous outputs off. The fan of the heatbreak turns from then on, because
+/// the hot end may be hot. Interrupts are off.
 pub fn make_safe() {
     stepper::kill();
     pwm::kill();
     ACTIVE.hazards.iter().for_each(|hazard| gpio::set(*hazard, false));
     gpio::stop_spindle();
     gpio::power(0);
+    heaters::cool(true);
 }
 
 // SAFETY: the handler of a fault ends all that runs, and its registers and the message are touched by nothing else

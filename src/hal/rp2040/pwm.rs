@@ -44,7 +44,7 @@ pub fn set_frequency(millihertz: u32) {
         w.set_b(0);
     });
     channel.ctr().write(|w| w.set_ctr(0));
-    gpio::connect(pin, Unit::Pwm);
+    gpio::connect_output(pin, Unit::Pwm);
     channel.csr().write(|w| {
         w.set_ph_correct(true);
         w.set_en(true);

@@ -45,6 +45,8 @@ pub fn alarm_number(status: Status) -> Option<u8> {
         {
             3
         }
+        #[cfg(feature = "drivers")]
+        Status::DriverSilent | Status::DriverUnset | Status::DriverReset | Status::DriverOff => 3,
         Status::ProbeFailed => 5,
         // A reset has interrupted homing.
         Status::Terminated => 6,
@@ -56,13 +58,13 @@ pub fn alarm_number(status: Status) -> Option<u8> {
 
 /// A row for each status, in the order of their variants.
 macro_rules! rows {
-    ($($name:ident = $number:literal;)+) => {
+    ($($(#[$only:meta])* $name:ident = $number:literal;)+) => {
         progmem! {
-            static ERRORS: [u8; Status::COUNT] = [$($number),+];
+            static ERRORS: [u8; Status::COUNT] = [$($(#[$only])* $number),+];
         }
 
         const _: () = {
-            let order = [$(Status::$name as usize),+];
+            let order = [$($(#[$only])* (Status::$name as usize)),+];
             let mut row = 0;
             while row < order.len() {
                 assert!(order[row] == row, "a row of the table of errors is not in its place");
@@ -105,6 +107,18 @@ rows! {
     TooHot = 9;
     TooCold = 9;
     HeatersLocked = 9;
+    #[cfg(feature = "drivers")]
+    DriverSilent = 9;
+    #[cfg(feature = "drivers")]
+    DriverUnset = 9;
+    #[cfg(feature = "drivers")]
+    DriverReset = 9;
+    #[cfg(feature = "drivers")]
+    DriverOff = 9;
+    #[cfg(feature = "drivers")]
+    DriverHot = 9;
+    #[cfg(feature = "drivers")]
+    DriverOpen = 9;
     CardError = 9;
     UnrecognizedName = 3;
     MalformedCommand = 1;

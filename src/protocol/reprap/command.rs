@@ -1,6 +1,7 @@
 //! Recognizes the code of a line, and finds its words.
 
 use super::frame::{Frame, Sum, integer};
+use crate::capability::Capability;
 use crate::card;
 use crate::config::Number;
 use crate::gcode::comment::Aside;
@@ -84,6 +85,7 @@ pub fn says_more((letter, number): (u8, u16), block: &[u8]) -> bool {
         (b'G', 10) => (false, has(block, b'P') || has(block, b'L')),
         (b'G', number) => (false, !matches!(number, 4 | 11)),
         (_, 17 | 18 | 84 | 92 | 201..=208 | 420) => (false, true),
+        (_, 569 | 906) => (false, Capability::Drivers.is_built_in()),
         _ => (false, false),
     };
     let mut bytes = Bytes::of(words(block));

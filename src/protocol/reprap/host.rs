@@ -54,6 +54,7 @@ pub fn of(code: Option<Code>, block: &[u8]) -> Option<Code> {
         (b'G', 10) => !has(block, b'P') && !has(block, b'L'),
         (b'G', 11 | 28 | 161 | 162) => true,
         (b'G', 29) | (b'M', 420) => Capability::BedPlane.is_built_in(),
+        (b'M', 122 | 569 | 906) => Capability::Drivers.is_built_in(),
         (b'M', number) => matches!(
             number,
             17 | 18 | 82..=84 | 92 | 105 | 108 | 110..=112 | 114 | 115 | 117..=119 | 130..=134 | 155
@@ -111,6 +112,8 @@ pub fn part(
         115 => listed(report::identity(at, out)),
         118 => echo(at, block, out),
         119 => listed(report::switches(at, machine, out)),
+        #[cfg(feature = "drivers")]
+        122 | 569 | 906 => super::drivers::part(number, at, block, machine, out),
         130..=132 => tuning::set_teacup(number, at, block, machine, out),
         155 => match u32::try_from(value(block, b'S', 0).unwrap_or(0)) {
             Ok(seconds) => {
@@ -162,6 +165,7 @@ pub fn needs_rest(code: Code, block: &[u8]) -> bool {
         (b'M', 18 | 84 | 400 | 420 | 501 | 502) | (b'G', 28 | 29 | 161 | 162) => true,
         (b'M', 92 | 201 | 203 | 206) => !words(block).is_empty(),
         (b'M', 205) => has(block, b'J'),
+        (b'M', 569) => Capability::Drivers.is_built_in() && has(block, b'S'),
         (b'$', _) => block.contains(&b'='),
         _ => false,
     }
@@ -263,6 +267,7 @@ fn home(at: u8, number: u16, block: &[u8], machine: &mut impl Machine) -> Step {
                 machine.memory().reprap.homes = true;
                 Step::Later(HOMES)
             }
+            Status::Again => Step::Later(at),
             status => Step::Refused(status),
         };
     }

@@ -15,6 +15,7 @@
 //! | [`names`] | `$name=value`, `$$`: settings by Kerf's own names |
 //! | [`bed`] | G29, M420: the plane of the bed |
 //! | [`card`] | M20 to M27, M30, M32: the SD card |
+//! | `drivers` | M122, M569, M906: the motors' drivers, in an image with them |
 //! | [`report`] | M105, M114, M115, M119 |
 //! | [`tuning`] | M301, M303, M304 |
 //! | [`telling`] | what is reported without being asked |
@@ -29,6 +30,8 @@
 mod bed;
 mod card;
 mod command;
+#[cfg(feature = "drivers")]
+mod drivers;
 mod frame;
 mod host;
 mod names;

@@ -18,7 +18,7 @@ use crate::text;
 use crate::units::Length;
 
 /// The letters of the axes: E is the A axis of the interpreter.
-const LETTERS: [u8; 4] = *b"XYZE";
+pub const LETTERS: [u8; 4] = *b"XYZE";
 /// The codes that M503 lists, in order.
 const LISTED: [u16; 5] = [92, 203, 201, 205, 206];
 

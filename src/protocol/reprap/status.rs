@@ -86,6 +86,18 @@ pub fn reason(status: Status) -> Text {
         Status::TooCold => text!("too cold to extrude"),
         Status::HeatersLocked => text!("heaters are locked; M999 unlocks them"),
         Status::CardError => text!("SD card cannot be read"),
+        #[cfg(feature = "drivers")]
+        Status::DriverSilent => text!("motor driver does not answer; no motor power?"),
+        #[cfg(feature = "drivers")]
+        Status::DriverUnset => text!("motor driver has not taken its settings"),
+        #[cfg(feature = "drivers")]
+        Status::DriverReset => text!("motor driver was reset, position lost"),
+        #[cfg(feature = "drivers")]
+        Status::DriverOff => text!("motor driver has switched off; M122"),
+        #[cfg(feature = "drivers")]
+        Status::DriverHot => text!("motor driver is hot; M122"),
+        #[cfg(feature = "drivers")]
+        Status::DriverOpen => text!("motor wire seems open; M122"),
         Status::ProbeFailed | Status::ProbeTooShort => text!("probing failed"),
         Status::AxisConflict | Status::ModalGroupViolation => {
             text!("more than one code in the line")

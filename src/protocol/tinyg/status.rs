@@ -20,13 +20,13 @@ pub fn status_text(status: Status) -> Option<Text> {
 
 /// A row for each status, in the order of their variants.
 macro_rules! rows {
-    ($($name:ident = $number:literal, $text:literal;)+) => {
+    ($($(#[$only:meta])* $name:ident = $number:literal, $text:literal;)+) => {
         progmem! {
-            static ROWS: [(u8, Text); Status::COUNT] = [$(($number, text!($text))),+];
+            static ROWS: [(u8, Text); Status::COUNT] = [$($(#[$only])* ($number, text!($text))),+];
         }
 
         const _: () = {
-            let order = [$(Status::$name as usize),+];
+            let order = [$($(#[$only])* (Status::$name as usize)),+];
             let mut row = 0;
             while row < order.len() {
                 assert!(order[row] == row, "a row of the table of statuses is not in its place");
@@ -70,6 +70,18 @@ rows! {
     TooHot = 52, "Heater too hot";
     TooCold = 53, "Too cold to extrude";
     HeatersLocked = 54, "Heaters are locked [^x to reset]";
+    #[cfg(feature = "drivers")]
+    DriverSilent = 57, "Motor driver does not answer";
+    #[cfg(feature = "drivers")]
+    DriverUnset = 58, "Motor driver without its settings";
+    #[cfg(feature = "drivers")]
+    DriverReset = 59, "Motor driver was reset: home again";
+    #[cfg(feature = "drivers")]
+    DriverOff = 60, "Motor driver has switched off";
+    #[cfg(feature = "drivers")]
+    DriverHot = 61, "Motor driver is hot";
+    #[cfg(feature = "drivers")]
+    DriverOpen = 62, "Motor wire seems open";
     CardError = 56, "SD card cannot be read";
     UnrecognizedName = 100, "Unrecognized command or config name";
     MalformedCommand = 101, "Invalid or malformed command";

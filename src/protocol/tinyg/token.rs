@@ -1,9 +1,13 @@
 //! Names in requests and responses: settings, values, groups and actions.
 
+#[cfg(feature = "drivers")]
+use super::value::FIRST_DRIVER;
 use super::value::{
     Form, PROBE_STATE, PROBED, SHIFT, SINGLE_COUNT, SINGLES, Single, Source, VECTOR_COUNT, VECTORS,
     Vector, place_form, vector_value,
 };
+#[cfg(feature = "drivers")]
+use crate::config::drive::DRIVERS;
 use crate::config::name::{LONGEST, Name, axis_letter, axis_of, padded};
 use crate::config::rows::{find_row, row_name, value_name};
 use crate::config::table::Kind;
@@ -352,6 +356,12 @@ impl Group {
     /// Returns the first member from index `from` on, and its index; `None` if there is none.
     pub fn member(self, from: u8, machine: &mut impl Machine) -> Option<(u8, Token)> {
         match self {
+            #[cfg(feature = "drivers")]
+            Group::Settings(Owner::Drivers) if from >= Owner::Drivers.rows() => {
+                let driver = from - Owner::Drivers.rows();
+                (usize::from(driver) < DRIVERS)
+                    .then(|| (from, Token::single(FIRST_DRIVER + driver)))
+            }
             Group::Settings(owner) => (from..owner.rows())
                 .find_map(|row| Some((row, Token::of_setting(Setting::of(owner, row)?)))),
             Group::Vector(PROBED) if from == 0 => Some((0, Token::single(PROBE_STATE))),

@@ -5,6 +5,7 @@ use super::variation::Variation;
 use crate::boards::inputs;
 use crate::capability::Capability;
 use crate::config::Fixed;
+use crate::config::drive::DRIVERS;
 use crate::config::name::token;
 use crate::gcode::overrides::Override;
 use crate::progmem::Text;
@@ -171,7 +172,11 @@ impl Vector {
 }
 
 /// The number of rows of [`SINGLES`].
-pub const SINGLE_COUNT: usize = 49 + if Capability::Printer.is_built_in() { 6 } else { 0 };
+pub const SINGLE_COUNT: usize =
+    49 + if Capability::Printer.is_built_in() { 6 } else { 0 } + DRIVERS;
+/// The index of the state of the first driver in [`SINGLES`].
+#[cfg(feature = "drivers")]
+pub const FIRST_DRIVER: u8 = (SINGLE_COUNT - 1 - DRIVERS) as u8;
 /// The number of rows of [`VECTORS`].
 pub const VECTOR_COUNT: usize = 17;
 /// The index of the vector `g92`.
@@ -199,6 +204,8 @@ const MOTION: Text = text!(
      G3  - counter clockwise arc feed|G80 - cancel motion mode (none active)|\
      G38.2 - probe|G81|G82|G83|G84|G85|G86|G87|G88|G89|G73|G38.3|G38.4|G38.5|G33|G76|G33.1"
 );
+#[cfg(feature = "drivers")]
+const DRIVER: Text = text!("OK|No answer|Not set|Overheated|Shorted|Supply low|Hot|Open wire");
 const FEED: Text = text!(
     "G93 - inverse time mode|G94 - units-per-minute mode (i.e. feedrate mode)|\
      G95 - units-per-revolution mode"
@@ -307,6 +314,14 @@ progmem! {
         single("he1o", of(Value::HeaterPower(0)), Form::Factor),
         #[cfg(feature = "printer")]
         single("he3o", of(Value::HeaterPower(1)), Form::Factor),
+        #[cfg(feature = "drivers")]
+        count("drx1", of(Value::Driver(0)), text!("Driver 1:"), DRIVER),
+        #[cfg(feature = "drivers")]
+        count("drx2", of(Value::Driver(1)), text!("Driver 2:"), DRIVER),
+        #[cfg(feature = "drivers")]
+        count("drx3", of(Value::Driver(2)), text!("Driver 3:"), DRIVER),
+        #[cfg(feature = "drivers")]
+        count("drx4", of(Value::Driver(3)), text!("Driver 4:"), DRIVER),
         count("prbe", of(Value::ProbeState), text!("Probe state:"), text!("Failed|Succeeded|Waiting")),
     ];
 

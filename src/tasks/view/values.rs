@@ -5,6 +5,8 @@ use kerf_macros::small;
 use super::{View, queue_free};
 use crate::boards::outputs;
 use crate::gcode::modal::{Coolant, Turn};
+#[cfg(feature = "drivers")]
+use crate::hal::drivers;
 use crate::hal::serial::capacity;
 use crate::hal::{encoder, gpio, uart, watchdog};
 use crate::machine;
@@ -91,6 +93,10 @@ pub(super) fn value(view: &mut View<'_>, value: Value) -> i32 {
         Value::Temperature(heater) => view.standing(heater).now.into(),
         Value::WantedTemperature(heater) => view.standing(heater).to.into(),
         Value::HeaterPower(heater) => i32::from(view.standing(heater).power) * 1_000 / 255,
+        #[cfg(feature = "drivers")]
+        Value::Driver(motor) => drivers::watch(motor).state() as i32,
+        #[cfg(feature = "drivers")]
+        Value::DriverStatus(motor) => drivers::watch(motor).status() as i32,
         Value::Kept => view.links.storage.is_done().into(),
         Value::Home => view.home_state(),
         Value::Door if !view.links.signs.door.get() => 0,

@@ -1,7 +1,7 @@
 // node bridge.mjs: an emulated board for a program that talks to it over standard input and output. Each line of the input is a request in JSON, each line of
 // the output its answer:
 //
-//   {"board": {"elf": "file", "motors": [[step, dir], ...]}, "cut": true, "stick": true, "panic": "file", "crash": "stack", "reset": true, "sense": [[channel, value]], "send": [[port, "hex"]], "now": [[port, byte]], "usb": {"open": bool, "reads": bool}, "faults": [["sleep", ms], ...], "ask": [[byte, ...]], "unmasked": true, "loaded": true, "baud": [[port, rate]], "drive": [[gpio, high]], "wire": [...], "spindle": {"index": gpio, "sync": gpio, "pulses": n}, "noise": {"gpio": gpio, "period": cycles}, "marks": n, "turn": rpm, "drivers": [...], "record": bool, "until": cycle, "line": true}
+//   {"board": {"elf": "file", "motors": [[step, dir], ...], "drivers": [address, ...]}, "cut": true, "stick": true, "panic": "file", "crash": "stack", "reset": true, "sense": [[channel, value]], "send": [[port, "hex"]], "now": [[port, byte]], "usb": {"open": bool, "reads": bool}, "faults": [["sleep", ms], ...], "ask": [[byte, ...]], "unmasked": true, "loaded": true, "baud": [[port, rate]], "drive": [[gpio, high]], "wire": [...], "spindle": {"index": gpio, "sync": gpio, "pulses": n}, "noise": {"gpio": gpio, "period": cycles}, "marks": n, "turn": rpm, "drivers": [...], "ails": [{"address": n, "powered": bool, "deaf": bool, "reset": true, "status": bits, "global": bits}], "record": bool, "until": cycle, "line": true}
 //
 // `board` comes first, and again where another board is to take the place of the one before. Ports are 0 and 1 for the UARTs, and 2 for USB; `usb` says what the program at its other end does, `faults` what goes wrong there (`trouble`), `ask` which requests the computer makes.
 // With `record` edges of steps are recorded from there on, or what has been recorded is told and no more is. With `cut` the supply fails, and comes again; with `stick` the CPU gets stuck. What is sent and driven comes next; then the board runs to the cycle, or, with `line`, to the end of the next line that it says.
@@ -21,7 +21,7 @@ function powerUp(board) {
   ({ elf } = board);
   machine = new Machine(elf);
   motors = new Motors(machine, board.motors.map(([step, dir]) => ({ step, dir })));
-  drivers = new Drivers(machine, motors);
+  drivers = new Drivers(machine, motors, board.drivers);
 }
 
 function act(request) {
@@ -43,6 +43,7 @@ function act(request) {
   for (const [gpio, high] of request.drive ?? []) motors.drive(gpio, high);
   if (request.wire) motors.wire(request.wire);
   if (request.drivers) drivers.wire(request.drivers);
+  drivers.ail(request.ails ?? []);
   if (request.spindle) machine.spindle = new Spindle(machine, request.spindle);
   if (request.noise) machine.noise = new Noise(machine, request.noise);
   if (request.marks !== undefined) machine.spindle.setMarks(request.marks);
@@ -86,6 +87,8 @@ function answer() {
     rotors: drivers.rotors,
     levels: machine.levels.reduce((bits, level, gpio) => bits + (level === 1 ? 2 ** gpio : 0), 0),
     shares: shares(),
+    floated: machine.floated >>> 0,
+    strong: machine.mcu.gpio.reduce((bits, { padValue }, gpio) => bits + ((padValue >> 4 & 3) === 3 ? 2 ** gpio : 0), 0),
     asleep: machine.asleep,
     spent: machine.spent,
     masked: machine.masked,

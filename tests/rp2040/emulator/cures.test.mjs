@@ -401,3 +401,8 @@ test('an alarm of the timer goes off when the count is its value', () => {
   m.run(128 * 20);
   assert.equal(seen, due);
 });
+
+test('pads are as after a reset: pulled down, 4 mA', () => {
+  const { gpio } = machine(LOOP).mcu;
+  assert.ok(gpio.every(({ padValue }) => padValue === 0x56));
+});

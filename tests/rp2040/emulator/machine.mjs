@@ -43,6 +43,10 @@ const RAM = 0x20000000;
 const PAINT = 0xa5;
 const HARD_FAULT = 3;
 const XIP_FLUSH = 4;
+// A pad after a reset: input, pulled down, 4 mA (RP2040 data sheet, 2.19.6.3); that of rp2040js drives 12.
+const PAD = 0x56;
+// The state of a pin that nobody drives or pulls.
+const FLOATS = 2;
 
 // XIP_CTRL, which rp2040js lacks: never streaming. What is written to one register empties the cache.
 class XipControl extends BasePeripheral {
@@ -245,6 +249,8 @@ export class Machine {
   boot(before, sram) {
     const mcu = new RP2040();
     this.mcu = mcu;
+    // The pins that were neither driven nor pulled since, as bits.
+    this.floated = 0;
     mcu.logger = new ConsoleLogger(LogLevel.Error, true);
     this.cache.flush();
     mcu.peripherals[0x14000] = new XipControl(mcu, 'XIP_CTRL', this.cache);
@@ -280,6 +286,7 @@ export class Machine {
     };
     this.pios = mcu.pio.map((pio) => new Pio(pio));
     for (const [gpio, pin] of mcu.gpio.entries()) {
+      pin.padValue = PAD;
       pin.addListener((state) => this.changed(gpio, state));
       pin.setInputValue(this.inputs.get(gpio) ?? true);
     }
@@ -315,6 +322,7 @@ export class Machine {
 
   // An output has changed.
   changed(gpio, state) {
+    if (state === FLOATS) this.floated |= 1 << gpio;
     if (state > 1 || this.levels[gpio] === state) return;
     this.levels[gpio] = state;
     const cycle = this.pios[0].now ?? this.cycle;

@@ -45,25 +45,48 @@ export class Motors {
     // While someone records: when each motor's steps rise, and the shortest pulse.
     this.times = undefined;
     this.shortest = Infinity;
+    this.watchDirections();
     machine.edgeListeners.push((gpio, level, cycle) => { level ? this.rose(gpio, cycle) : this.fell(gpio, cycle); });
   }
 
   // Begins to record, or ends: then all that has been recorded.
   record(on) {
     const { times, shortest } = this;
+    const [hold, setup] = [this.hold, this.setup].map((least) => (Number.isFinite(least) ? least : null));
     this.times = on ? this.pins.map(() => []) : undefined;
     this.shortest = Infinity;
-    return { times, shortest };
+    this.watchDirections();
+    return { times, shortest, hold, setup };
+  }
+
+  // The least time from the end of a pulse to the next change of the motor's direction, and from there to the next pulse.
+  watchDirections() {
+    [this.hold, this.setup] = [Infinity, Infinity];
+    this.fallen = this.pins.map(() => -Infinity);
+    this.turned = this.pins.map(() => -Infinity);
+  }
+
+  turns(gpio, cycle) {
+    const motor = this.pins.findIndex((pins) => pins.dir === gpio);
+    if (motor < 0) return;
+    this.hold = Math.min(this.hold, cycle - this.fallen[motor]);
+    this.turned[motor] = cycle;
   }
 
   fell(gpio, cycle) {
-    const motor = this.times ? this.pins.findIndex((pins) => pins.step === gpio) : -1;
-    if (motor >= 0) this.shortest = Math.min(this.shortest, cycle - (this.last[motor] ?? -Infinity));
+    if (!this.times) return;
+    this.turns(gpio, cycle);
+    const motor = this.pins.findIndex((pins) => pins.step === gpio);
+    if (motor < 0) return;
+    this.shortest = Math.min(this.shortest, cycle - (this.last[motor] ?? -Infinity));
+    this.fallen[motor] = cycle;
   }
 
   rose(gpio, cycle) {
+    if (this.times) this.turns(gpio, cycle);
     const motor = this.pins.findIndex((pins) => pins.step === gpio);
     if (motor < 0) return;
+    if (this.times) this.setup = Math.min(this.setup, cycle - this.turned[motor]);
     const sign = this.machine.levels[this.pins[motor].dir] ? -1 : 1;
     this.positions[motor] += sign;
     this.totals[motor]++;

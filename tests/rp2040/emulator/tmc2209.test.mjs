@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { CLOCK_HZ } from './machine.mjs';
-import { Drivers } from './tmc2209.mjs';
+import { checksum, Drivers } from './tmc2209.mjs';
 
 const FULL_STEP = 8;
 // Eight microsteps of which each takes so many cycles: 1,000 full steps a second.
@@ -84,4 +84,46 @@ test('no stall is told below the speed, without a threshold, with spreadCycle, o
 test('a slow motor looks like a stall', () => {
   const slow = [...TCOOLTHRS.slice(0, 5), 0x10, 0];
   assert.equal(told(GCONF, CHOPCONF, slow, SGTHRS).down(4 * FULL_STEP, 20 * GAP), true);
+});
+
+test('a driver counts what it has taken, and answers what it is asked, on the one wire', () => {
+  const heard = [];
+  const alarms = [];
+  const machine = {
+    cycle: 0,
+    byteListeners: [],
+    drive: () => {},
+    uarts: [undefined, { bit: 1e9 / 115200, feed: (byte) => heard.push(byte) }],
+    send: (port, bytes) => heard.push(...bytes),
+    mcu: { clock: { createAlarm: (end) => ({ schedule: (nanos) => alarms.push([nanos, end]) }) } },
+  };
+  const drivers = new Drivers(machine, { stepListeners: [] }, [0, 2, 1, 3]);
+  const say = (bytes) => {
+    heard.length = 0;
+    bytes.forEach((byte) => machine.byteListeners[0](1, byte));
+    const [due] = alarms.splice(0);
+    due?.[1]();
+    return { echo: heard.slice(0, bytes.length), answer: heard.slice(bytes.length), pause: due?.[0] };
+  };
+  const withSum = (bytes) => [...bytes, checksum(bytes)];
+  // By the data sheet's algorithm.
+  assert.equal(checksum([5, 0, 0]), 0x48);
+  const count = withSum([5, 2, 2]);
+  assert.deepEqual(say(count).echo, count);
+  assert.deepEqual(say(count).answer, withSum([5, 0xff, 2, 0, 0, 0, 0]));
+  assert.equal(Math.round(say(count).pause), Math.round(8e9 / 115200));
+  assert.deepEqual(say(withSum([5, 2, 0x83, 0, 0, 2, 0])).answer, []);
+  assert.deepEqual(say(count).answer, withSum([5, 0xff, 2, 0, 0, 0, 1]));
+  assert.equal(Math.round(say(count).pause), Math.round(24e9 / 115200));
+  // It was reset, until that is cleared.
+  assert.equal(say(withSum([5, 2, 1])).answer[6], 1);
+  say(withSum([5, 2, 0x81, 0, 0, 0, 7]));
+  assert.equal(say(withSum([5, 2, 1])).answer[6], 0);
+  drivers.ail([{ address: 2, deaf: true }]);
+  assert.deepEqual(say(count).answer, []);
+  drivers.ail([{ deaf: false, reset: true, status: 3 }]);
+  assert.equal(say(withSum([5, 2, 1])).answer[6], 1);
+  assert.equal(say(withSum([5, 2, 0x6f])).answer[6], 3);
+  // A damaged request is none.
+  assert.deepEqual(say([5, 2, 2, 0]).answer, []);
 });

@@ -74,7 +74,7 @@ impl Printer {
 
     /// Runs for `ms` milliseconds, and calls `look` after each.
     fn run(&mut self, ms: u64, mut look: impl FnMut(&Self)) {
-        let Heaters { heaters: [hot_end, bed], fan } = heaters();
+        let Heaters { heaters: [hot_end, bed], fan, .. } = heaters();
         for _ in 0..ms {
             let fan = self.machine.power_at(fan);
             self.hot_end.pass(0.001, self.machine.power_at(hot_end.pin), fan);
@@ -295,7 +295,7 @@ fn a_missing_thermocouple_does_not_heat() {
 #[test]
 fn power_is_pulses_of_a_timer_and_off_lets_go_of_the_pin() {
     let mut printer = Printer::at(60.0);
-    let Heaters { heaters: [hot_end, bed], fan } = heaters();
+    let Heaters { heaters: [hot_end, bed], fan, .. } = heaters();
     let connected = |printer: &Printer| printer.machine.peek(0xB0) & 0xF0;
     assert_eq!(connected(&printer), 0);
     for line in ["m104 s65", "m140 s60", "m106 s64"] {

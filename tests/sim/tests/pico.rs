@@ -7,8 +7,10 @@ use kerf::boards::inputs::{ENDS, PROBE};
 use kerf::boards::{Board, PICO_CNC, PICO_CNC6, SKR_PICO, gp};
 use kerf_sim::bench::{ideal, spiral};
 use kerf_sim::emulated::even::{FAST, evenness};
+use kerf_sim::emulated::heat::Heat;
 use kerf_sim::emulated::{Emulated, Near, job};
 use kerf_sim::job::{Options, lines_of};
+use kerf_sim::thermal::{HOT_END, Plant};
 use kerf_sim::{AUX, Host, LINES_IN_FLIGHT, Runs, USB};
 
 use crate::common::share::{is_long, share_of};
@@ -320,6 +322,43 @@ fn a_panic_stops_everything_and_is_told_after_the_reset() {
     assert!(said.contains("SYSTEM READY") && !said.contains("panic"), "once: {said}");
 }
 
+#[test]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
+fn outputs_are_strong_and_none_of_them_floats() {
+    for board in [&PICO_CNC, &SKR_PICO] {
+        let mut machine = Emulated::load(&image(board), board).unwrap();
+        machine.run_for_ms(300).unwrap();
+        let motors = board.motors.iter().flat_map(|m| [Some(m.step), Some(m.dir), m.enable]);
+        let outputs = motors.chain(board.outputs).chain([board.enable_all]).flatten();
+        for pin in outputs.chain(board.hazards.iter().copied()) {
+            assert!(machine.is_strong(pin), "{pin:?} of {}", board.name);
+        }
+        let spindle = board.outputs[0].unwrap();
+        assert!(!machine.floated(spindle) && !machine.is_high(spindle), "{}", board.name);
+    }
+}
+
+#[test]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
+fn directions_stand_before_and_behind_pulses() {
+    for (pulse_us, setup_us) in [(0, 1), (1, 0), (2, 1), (5, 20)] {
+        let (mut board, mut host) = booted();
+        let fast = "{x:{vm:20000,fr:20000,ac:3000,jm:1e6},y:{vm:20000,fr:20000,ac:3000,jm:1e6}}";
+        for line in [fast, &format!("{{spw:{pulse_us},dsu:{setup_us}}}")] {
+            set(&mut board, &mut host, line);
+        }
+        let mut lines = String::from("g1 f20000 x9 y5\n");
+        for _ in 0..4 {
+            lines += "g2 x1 i-4\ng3 x9 i4\nx9.01\nx9\ny0 x0\nx9 y5\n";
+        }
+        board.send_to(USB, lines.as_bytes());
+        let recorded = board.record_for_ms(3_000).unwrap();
+        let [hold, setup] = [recorded.hold, recorded.setup].map(|least| least.unwrap() / 128.0);
+        println!("pulses of {pulse_us} us: {hold:.2} us behind, {setup:.2} us before");
+        assert!(hold >= 1.0 && setup >= f64::from(setup_us), "{hold} {setup}");
+    }
+}
+
 /// Returns what the converter reads from a thermistor of this resistance with 4,700 ohms to the supply.
 fn reading(ohms: f64) -> u16 {
     (4_095.0 * ohms / (ohms + 4_700.0)) as u16
@@ -349,6 +388,46 @@ fn an_skr_pico_heats() {
     host.run_for_ms(&mut board, 500).unwrap();
     assert!(!board.is_high(gp(23)), "a fault switches it off");
     assert_eq!(value(&mut board, &mut host, "stat"), 2.0);
+}
+
+/// Runs an SKR Pico with its heaters for a time. Returns whether the fan of the heatbreak, FAN2, turns.
+fn cools_after(board: &mut Emulated, heat: &mut Heat, ms: u64) -> bool {
+    let until = board.cycle() + board.cycles(ms);
+    heat.run_until(board, until).unwrap();
+    board.is_high(gp(18))
+}
+
+#[test]
+#[ignore = "needs the emulator, which `cargo xtask test` installs"]
+fn the_heatbreak_is_cooled_while_the_hot_end_is_hot_or_may_be() {
+    let mut board = Emulated::load(&image(&SKR_PICO), &SKR_PICO).unwrap();
+    let mut heat = Heat::of(&mut board);
+    let mut host = Host::new(LINES_IN_FLIGHT);
+    host.boot(&mut board, 1_000).unwrap();
+    set(&mut board, &mut host, "{he1k:1,he3k:1}");
+    assert!(!cools_after(&mut board, &mut heat, 500), "cold");
+    set(&mut board, &mut host, "m104 s60");
+    assert!(cools_after(&mut board, &mut heat, 500), "with a target, before it is hot");
+    assert!(cools_after(&mut board, &mut heat, 17_000));
+    let felt = value(&mut board, &mut host, "he1t");
+    assert!(felt > 51.0, "{felt}");
+    for line in ["m104 s0", "{alarm:n}", "{alarm:1}"] {
+        host.ask(&mut board, line, 1_000).unwrap();
+        assert!(cools_after(&mut board, &mut heat, 300), "still hot after {line}");
+    }
+    let thermal = heat.thermal_mut().unwrap();
+    // The sensor's wire breaks, and the hot end cools down: nobody knows.
+    thermal.break_wire(HOT_END, Some(5_000));
+    *thermal.plant_mut(HOT_END) = Plant::hot_end();
+    assert!(cools_after(&mut board, &mut heat, 1_000), "its sensor is broken");
+    heat.thermal_mut().unwrap().break_wire(HOT_END, None);
+    assert!(!cools_after(&mut board, &mut heat, 200), "cool");
+    assert!(!board.is_high(gp(23)), "the heater is off");
+    // After a panic it turns at full speed, whatever was before.
+    board.panic("src/some.rs");
+    board.run_for_ms(100).unwrap();
+    let on = [18, 17, 20, 23, 21].map(|pin| board.is_high(gp(pin)));
+    assert_eq!(on, [true, false, false, false, false]);
 }
 
 /// Longest time from the edge of a limit switch to the last step, us: two samples, the entry of the interrupt, which

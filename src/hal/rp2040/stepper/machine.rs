@@ -137,7 +137,7 @@ pub(super) fn start() {
             });
             execute(SET_PINS);
             execute(SET_PINDIRS);
-            gpio::connect(pin, gpio::Unit::Pio0);
+            gpio::connect_output(pin, gpio::Unit::Pio0);
         }
     }
     // All pins of the chip. Only the motors' pins are connected to the state machine.

@@ -7,7 +7,8 @@
 //! ```
 //!
 //! Ticks without a step have no entry; they lengthen the rest before the next entry. Directions change after the last
-//! pulse with the old directions, one tick before the first pulse with the new ones.
+//! pulse with the old directions, one tick before the first pulse with the new ones. Between the end of that pulse and
+//! the change is [`HOLD`], in entries of its own: drivers read the direction some time after the edge of a step.
 //!
 //! Time is counted in cycles of the system clock. An entry lasts at least [`Writer::least`]. An entry that ought to be
 //! shorter is extended to that, and the rests of the entries after it make up for the delay.
@@ -31,8 +32,14 @@ const PULSE_LEAST: i32 = 3;
 const AROUND: i32 = 7;
 const CHANGE: i32 = 8;
 
+/// Least cycles from the end of a pulse to a change of directions: a microsecond.
+const HOLD: i32 = CYCLES_PER_US as i32;
+
+/// Entries that hold directions for as long, if pulses are wider.
+const HOLDS: usize = (HOLD / CHANGE) as usize;
+
 /// Entries that a segment makes besides those of its ticks.
-pub const OF_A_SEGMENT: usize = 1;
+pub const OF_A_SEGMENT: usize = HOLDS + 1;
 /// Entries that the end of a chunk, or of a motion, takes.
 pub const OF_THE_END: usize = 2;
 
@@ -241,6 +248,17 @@ impl Writer {
         }
     }
 
+    /// Puts entries that last for [`HOLD`]: one without a pulse, or, if that would last longer, some that change nothing.
+    fn hold(&mut self, to: &mut List) {
+        let rest = HOLD - self.least();
+        if rest >= 0 {
+            to.put([head(rest), self.low]);
+        } else {
+            (0..HOLDS).for_each(|_| to.put([CHANGES, self.low]));
+        }
+        self.age -= HOLD;
+    }
+
     /// Puts an entry without a pulse for the time that has passed. The next entry begins behind it.
     pub fn close(&mut self, to: &mut List) {
         if self.age > 0 {
@@ -301,6 +319,7 @@ impl Pins for Out<'_, '_> {
     fn fall(&mut self, _motors: u8) {}
 
     fn direction(&mut self, backwards: u8) {
+        self.writer.hold(self.to);
         self.writer.low = self.writer.wiring.turned(backwards);
         self.writer.age -= CHANGE;
         self.to.put([CHANGES, self.writer.low]);
@@ -466,7 +485,7 @@ mod tests {
             segments in prop::collection::vec(
                 (
                     prop::array::uniform4(prop_oneof![Just(0), Just(STEP), 0u16..=STEP]),
-                    1u16..60, 90u16..5_000, 0u8..16,
+                    1u16..60, 110u16..5_000, 0u8..16,
                 ),
                 1..7,
             ),

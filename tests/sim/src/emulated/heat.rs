@@ -26,6 +26,11 @@ impl Heat {
         heat
     }
 
+    /// Returns the heaters; `None` at a board without.
+    pub fn thermal_mut(&mut self) -> Option<&mut Thermal> {
+        self.0.as_mut()
+    }
+
     /// Runs a board up to a cycle, and its heaters with it.
     pub fn run_until(&mut self, board: &mut Emulated, until: u64) -> Result<()> {
         loop {

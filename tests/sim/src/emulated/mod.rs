@@ -47,6 +47,7 @@ struct Request {
     wire: Option<Vec<Near>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     drivers: Option<Vec<Driver>>,
+    ails: Vec<Ails>,
     #[serde(skip_serializing_if = "Option::is_none")]
     spindle: Option<Sensors>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -76,6 +77,8 @@ struct PowerUp {
     elf: PathBuf,
     /// The step pin and the direction pin of each motor.
     motors: Vec<(u8, u8)>,
+    /// The address of each motor's driver, if the board has them.
+    drivers: Vec<u8>,
 }
 
 /// The state of the program at the other end of USB.
@@ -194,6 +197,28 @@ pub struct Driver {
     pub powered: bool,
 }
 
+/// What becomes of a driver; of all of them without an address.
+#[derive(Serialize, Clone, Copy, Default, Debug)]
+pub struct Ails {
+    /// Address of the driver.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub address: Option<u8>,
+    /// Whether it has motor power from now on. Without, it forgets everything.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub powered: Option<bool>,
+    /// Whether its UART is dead from now on.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub deaf: Option<bool>,
+    /// Whether it resets.
+    pub reset: bool,
+    /// DRV_STATUS from now on.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub status: Option<u32>,
+    /// Bits of GSTAT that become set.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub global: Option<u32>,
+}
+
 /// The sensors of a spindle, which pull their pins low.
 #[derive(Serialize, Clone, Copy, Debug)]
 struct Sensors {
@@ -226,6 +251,10 @@ struct Answer {
     levels: u32,
     #[serde(default)]
     shares: Vec<(u8, f64)>,
+    #[serde(default)]
+    floated: u32,
+    #[serde(default)]
+    strong: u32,
     #[serde(default)]
     asleep: f64,
     #[serde(default)]
@@ -263,6 +292,12 @@ pub struct Recorded {
     /// The shortest pulse, cycles.
     #[serde(default)]
     pub shortest: Option<f64>,
+    /// The shortest time from the end of a pulse to a change of the motor's direction, cycles.
+    #[serde(default)]
+    pub hold: Option<f64>,
+    /// The shortest time from such a change to the motor's next pulse, cycles.
+    #[serde(default)]
+    pub setup: Option<f64>,
 }
 
 /// An emulated board.
@@ -296,7 +331,8 @@ impl Emulated {
             program.display()
         );
         let pins = board.motors.iter().map(|motor| (motor.step.bit, motor.dir.bit));
-        let power_up = PowerUp { elf: elf.to_owned(), motors: pins.collect() };
+        let drivers = board.drivers.map_or(vec![], |drivers| drivers.addresses.to_vec());
+        let power_up = PowerUp { elf: elf.to_owned(), motors: pins.collect(), drivers };
         let mut board = Emulated {
             board,
             process: Lent::take(program)?,
@@ -427,6 +463,11 @@ impl Emulated {
         self.request.drivers = Some(drivers.to_vec());
     }
 
+    /// Lets something become of a driver.
+    pub fn ail(&mut self, ails: Ails) {
+        self.request.ails.push(ails);
+    }
+
     /// Positions of the drivers' motors, full steps from where they were put.
     pub fn rotors(&self) -> &[f64] {
         &self.answer.rotors
@@ -489,6 +530,16 @@ impl Emulated {
     /// Whether an output is high.
     pub fn is_high(&self, pin: Pin) -> bool {
         self.answer.levels >> pin.bit & 1 != 0
+    }
+
+    /// Whether a pin has been neither driven nor pulled since the chip started.
+    pub fn floated(&self, pin: Pin) -> bool {
+        self.answer.floated >> pin.bit & 1 != 0
+    }
+
+    /// Whether an output may drive 12 mA.
+    pub fn is_strong(&self, pin: Pin) -> bool {
+        self.answer.strong >> pin.bit & 1 != 0
     }
 
     /// Duty cycle of a pin that pulses: the share of its period in which it is high.
