@@ -291,15 +291,20 @@ struct Session<S> {
     back: VecDeque<(u64, Vec<u8>)>,
 }
 
+/// Takes what arrives first, if it has arrived.
+fn due<T>(under_way: &mut VecDeque<(u64, T)>, now: u64) -> Option<(u64, T)> {
+    under_way.front().is_some_and(|(at, _)| *at <= now).then(|| under_way.pop_front())?
+}
+
 impl<S: Side> Session<S> {
     fn run(&mut self) {
-        while let Some((_, bytes)) = self.there.pop_front_if(|(at, _)| *at <= self.now) {
+        while let Some((_, bytes)) = due(&mut self.there, self.now) {
             self.side.send(bytes);
         }
         self.side.run_ms(1);
         self.now += 1;
         self.back.push_back((self.now + self.latency, self.side.heard()));
-        while let Some((_, bytes)) = self.back.pop_front_if(|(at, _)| *at <= self.now) {
+        while let Some((_, bytes)) = due(&mut self.back, self.now) {
             self.heard += &String::from_utf8_lossy(&bytes);
         }
     }

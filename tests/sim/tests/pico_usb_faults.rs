@@ -38,7 +38,7 @@ fn hear(board: &mut Emulated, ms: u64) -> String {
 fn value(board: &mut Emulated, token: &str) -> i64 {
     let heard = ask(board, &format!("{{{token}:n}}\n"), 50);
     let found = heard.lines().filter_map(|line| serde_json::from_str::<Value>(line).ok());
-    let found = found.filter_map(|line| line["r"][token].as_i64()).last();
+    let found = found.rev().find_map(|line| line["r"][token].as_i64());
     found.unwrap_or_else(|| panic!("{token}: {heard}"))
 }
 

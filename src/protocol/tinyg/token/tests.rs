@@ -34,7 +34,7 @@ fn every_token_has_a_name_that_finds_it() {
             + 3 * 15
             + 18
             + 2 * 9
-            + 42
+            + 44
             + 48
             + 2 * 6
             + 2
