@@ -27,7 +27,7 @@ pub fn root(x: u32) -> u16 {
 /// The length of a vector, from its square.
 #[derive(Clone, Copy, Debug)]
 pub struct Size {
-    /// From 2^15 on: the length, or twice the length if `is_twice`.
+    /// From 2^15 - 1 on: the length, or twice the length if `is_twice`.
     pub length: u16,
     /// Whether `length` is twice the length.
     pub is_twice: bool,
@@ -47,6 +47,8 @@ impl Size {
         if is_twice {
             upper = upper << 2 | u16::from(next >> 6);
         }
+        // The greatest number has a root that is rounded up: its length would have 17 bits.
+        let upper = upper.min(u16::MAX - 1);
         let root = inverse_root(upper);
         Self {
             length: (product(upper, root) >> 15) as u16,
@@ -77,6 +79,20 @@ mod tests {
         }
     }
 
+    /// All numbers of which a size is made.
+    #[test]
+    fn no_size_is_out_of_range() {
+        for upper in 1u32 << 12..1 << 16 {
+            for lower in [0, 0x3FFF, 0x4000, 0x7FFF, 0x8000, 0xBFFF, 0xC000, 0xFFFF] {
+                let square = upper << 16 | lower;
+                let size = Size::of_square(square);
+                let length = f64::from(size.length) / if size.is_twice { 2.0 } else { 1.0 };
+                let off = length / f64::from(square).sqrt() - 1.0;
+                assert!(off.abs() < 1e-4, "{square:#x}: {size:?}");
+            }
+        }
+    }
+
     proptest! {
         #[test]
         fn sizes(square in 1u32 << 28..) {
@@ -85,7 +101,7 @@ mod tests {
             let length = f64::from(size.length) / if size.is_twice { 2.0 } else { 1.0 };
             prop_assert!((length / exact - 1.0).abs() < 1e-4, "{size:?}");
             prop_assert!((f64::from(size.reciprocal) * exact / f64::from(1 << 30) - 1.0).abs() < 1e-4, "{size:?}");
-            prop_assert!(size.length >= 1 << 15);
+            prop_assert!(size.length >= (1 << 15) - 1);
         }
 
         #[test]

@@ -1,8 +1,9 @@
 //! The power task: gives motors power, and takes it from them when they have been idle.
 //!
 //! Reads the settings, the milliseconds and exec's snapshot; writes the drivers' enables. Runs every [`LOOK_MS`], and
-//! also checks the [`health`] of the firmware, and tells a chip with USB whether the machine rests. Exec calls [`segment`] before it queues a segment, so that a driver is
-//! on before its step; that costs 40 cycles a segment. All others change the state under the ceiling.
+//! also checks the [`health`] of the firmware, and tells a chip with USB whether the machine rests. Exec calls
+//! [`segment`] before it queues a segment, so that a driver is on before its step; that costs 40 cycles a segment. All
+//! others change the state under the ceiling.
 
 use super::common;
 use super::drivers;
