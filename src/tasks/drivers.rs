@@ -1,9 +1,9 @@
 //! Drivers that are set up by UART: their settings, and what they report. Empty in an image without such drivers.
 //!
-//! The power task [looks](look) at them every 20 ms. While a driver of an axis in use has not taken its settings, or has
-//! switched its motor off, lines that move are refused; if that begins in motion it is an alarm, and so is a reset of a
-//! driver in motion. In the first half second after the start such lines wait. Homes are forgotten then. A reset at rest is told, and so are warnings: one of them each turn.
-//! Thread mode. Cost: 600 cycles a turn.
+//! The power task [looks](look) at them every 20 ms. While a driver of an axis in use has not taken its settings, or
+//! has switched its motor off, lines that move are refused; if that begins in motion it is an alarm, and so is a reset
+//! of a driver in motion. In the first half second after the start such lines wait. Homes are forgotten then. A reset
+//! at rest is told, and so are warnings: one of them each turn. Thread mode. Cost: 600 cycles a turn.
 
 use super::links::Links;
 use super::storage::Storage;

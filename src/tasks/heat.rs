@@ -13,7 +13,8 @@
 //! [locks](lock) them, and raises an alarm. Any alarm switches them off. While a wait is on ([`Heaters::begin_wait`]),
 //! the planner is woken when the wait is over.
 //!
-//! The fan of the heatbreak ([`cooler`]), on boards that have one, is decided at each reading of the hot end, also in an alarm.
+//! The fan of the heatbreak ([`cooler`]), on boards that have one, is decided at each reading of the hot end, also in
+//! an alarm.
 //!
 //! Thread mode. Cost of a turn: 3,500 cycles; 8,000 in every fifth turn. A late turn switches the heaters late. Under
 //! the hardest motion a turn may be half a second late, because thread mode has little of the CPU.

@@ -71,8 +71,9 @@ impl Scan {
         self.stops != 0
     }
 
-    /// Scans further, and takes the lines that overtake, as long as there is room for them: in an alarm only one. Returns
-    /// whether there were any. If the ring `closes` behind them, it has fewer bytes afterwards, and the difference is to be released.
+    /// Scans further, and takes the lines that overtake, as long as there is room for them: in an alarm only one.
+    /// Returns whether there were any. If the ring `closes` behind them, it has fewer bytes afterwards, and the
+    /// difference is to be released.
     #[inline(never)]
     #[small]
     pub fn run(

@@ -4,8 +4,8 @@
 //! Thread mode calls it each millisecond. Each [`EVERY_MS`] it takes a step of a driver's [`ROUND`]: a datagram of 8
 //! bytes, or a request of 4 bytes, whose answer it looks for [`ANSWER_MS`] later. While a register has a new value it
 //! takes a step each millisecond in which the line is free. Nothing waits: all bytes of a step find room in the UART's
-//! FIFOs. After the start the first [`FIRST_STEPS`] follow each other as closely. A late call delays the next step. An answer that is damaged, or does not come, counts as missed.
-//! Cost: 2,000 cycles a step.
+//! FIFOs. After the start the first [`FIRST_STEPS`] follow each other as closely. A late call delays the next step. An
+//! answer that is damaged, or does not come, counts as missed. Cost: 2,000 cycles a step.
 
 use core::cell::Cell;
 use core::sync::atomic::{AtomicU32, Ordering};

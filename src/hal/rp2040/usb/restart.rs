@@ -4,8 +4,8 @@
 //!
 //! The interface has no endpoints; its two requests say what is to be started: the boot loader in ROM (1), or the
 //! firmware (2). They are refused by a stall while the machine does not rest ([`set_rests`]): something moves or is
-//! queued, a heater or the spindle is on, a hold is on, or settings are being stored. Otherwise the request is answered, and
-//! thread mode restarts the chip [`ANSWER_MS`] later, if the machine still rests.
+//! queued, a heater or the spindle is on, a hold is on, or settings are being stored. Otherwise the request is
+//! answered, and thread mode restarts the chip [`ANSWER_MS`] later, if the machine still rests.
 //!
 //! The serial port stays what it was: its two interfaces are one function, which a descriptor (IAD) says, and this one
 //! is another. On Windows, Microsoft's descriptors select WinUSB for this one; no driver has to be installed.
