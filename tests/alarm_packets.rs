@@ -5,7 +5,8 @@ use std::thread;
 
 use kerf::hal::imp::Machine;
 
-use crate::seeds::{seeds, try_each};
+use crate::heat_patterns::Random;
+use crate::seeds::try_all;
 
 /// How a dialect says things.
 struct Words {
@@ -41,20 +42,6 @@ const REPRAP: Words = Words {
     refused: "Error:",
 };
 
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, most: usize) -> usize {
-        self.0 =
-            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) as usize % most
-    }
-
-    fn one_of(&mut self, of: &[&'static str]) -> &'static str {
-        of[self.below(of.len())]
-    }
-}
-
 fn hear(machine: &Machine, ms: u64) -> String {
     machine.run_ms(ms);
     String::from_utf8(machine.received()).expect("UTF-8")
@@ -62,7 +49,7 @@ fn hear(machine: &Machine, ms: u64) -> String {
 
 fn packets(words: &Words, seed: u64) -> Result<(), String> {
     let machine = Machine::boot(115_200).expect("one machine for each thread");
-    let mut random = Random(seed);
+    let mut random = Random::new(seed);
     hear(&machine, 200);
     for line in words.first {
         machine.send(format!("{line}\n").as_bytes());
@@ -80,9 +67,9 @@ fn packets(words: &Words, seed: u64) -> Result<(), String> {
             let line = match random.below(4) {
                 0 => {
                     ended = true;
-                    random.one_of(words.ends)
+                    words.ends[random.below(words.ends.len())]
                 }
-                1 => random.one_of(words.asks),
+                1 => words.asks[random.below(words.asks.len())],
                 _ => {
                     let count = if ended { &mut moves } else { &mut refused };
                     *count += 1;
@@ -106,7 +93,7 @@ fn packets(words: &Words, seed: u64) -> Result<(), String> {
 }
 
 fn try_packets(words: &'static Words) {
-    try_each(seeds(60), |seed| {
+    try_all(60, |seed| {
         thread::spawn(move || packets(words, seed)).join().unwrap_or_else(|_| Err("a panic".into()))
     });
 }

@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { CLOCK_HZ, Machine } from './machine.mjs';
 import { Cache } from './xip.mjs';
-import { Motors, Spindle } from './pins.mjs';
+import { Motors, Noise, Spindle } from './pins.mjs';
 
 const RAM_END = 0x20042000;
 const CODE = 0x200;
@@ -405,4 +405,39 @@ test('an alarm of the timer goes off when the count is its value', () => {
 test('pads are as after a reset: pulled down, 4 mA', () => {
   const { gpio } = machine(LOOP).mcu;
   assert.ok(gpio.every(({ padValue }) => padValue === 0x56));
+});
+
+// movs r0, #3; lsls r0, r0, #28; ldr r1, [r0]; b .
+const NOWHERE = [0x2003, 0x0700, 0x6801, 0xe7fe];
+
+test('an access where nothing is faults, at its own address', () => {
+  const m = machine(NOWHERE, LOOP);
+  m.run(100);
+  const { core } = m.mcu;
+  assert.deepEqual([core.IPSR, core.PC], [3, 0x10000000 + HANDLER]);
+  assert.equal(m.mcu.readUint32(core.SPmain + 0x18), 0x10000000 + CODE + 4);
+});
+
+test('without a place for the frame of a fault the CPU stands still', () => {
+  for (const sp of [0x20000000, 0x20000018]) {
+    const m = machine(NOWHERE, LOOP);
+    m.mcu.core.SPmain = sp;
+    m.run(100);
+    assert.ok(m.mcu.core.waiting);
+  }
+});
+
+test('the stack tells how deep it has been', () => {
+  const m = machine([0xb40f, 0xbc0f, 0xe7fe]); // push {r0-r3}; pop {r0-r3}; b .
+  m.run(100);
+  assert.equal(m.deepest(), 16);
+});
+
+test('noise changes the level of a pin twice in a period', () => {
+  const m = machine(LOOP);
+  const edges = [];
+  m.drive = (gpio, high) => edges.push([gpio, high]);
+  m.noise = new Noise(m, { gpio: 5, period: 64 });
+  m.run(130);
+  assert.deepEqual(edges, [[5, false], [5, true], [5, false], [5, true]]);
 });
