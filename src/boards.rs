@@ -14,10 +14,10 @@ mod mega2560_grbl;
 mod mega2560_grbl_lathe;
 #[path = "../boards/mega2560-lathe.rs"]
 mod mega2560_lathe;
-#[path = "../boards/pico-cnc.rs"]
-mod pico_cnc;
-#[path = "../boards/pico-cnc6.rs"]
-mod pico_cnc6;
+#[path = "../boards/pico.rs"]
+mod pico;
+#[path = "../boards/pico6.rs"]
+mod pico6;
 #[path = "../boards/ramps14.rs"]
 mod ramps14;
 #[path = "../boards/ramps14-cnc.rs"]
@@ -34,8 +34,8 @@ pub use pins::{Interrupt, Pin, Port, gp, pin};
 pub use mega2560_grbl::MEGA2560_GRBL;
 pub use mega2560_grbl_lathe::MEGA2560_GRBL_LATHE;
 pub use mega2560_lathe::MEGA2560_LATHE;
-pub use pico_cnc::PICO_CNC;
-pub use pico_cnc6::PICO_CNC6;
+pub use pico::PICO;
+pub use pico6::PICO6;
 pub use ramps14::RAMPS14;
 pub use ramps14_cnc::RAMPS14_CNC;
 pub use skr_pico::SKR_PICO;
@@ -81,13 +81,13 @@ macro_rules! each_motor {
 pub(crate) use each_motor;
 
 /// Calls the macro `$call` with the tokens that follow and the numbers of all motors.
-#[cfg(not(feature = "board-pico-cnc6"))]
+#[cfg(not(feature = "board-pico6"))]
 macro_rules! motor_numbers {
     ($call:ident, $($given:tt)*) => {
         $call!($($given)*; 0 1 2 3)
     };
 }
-#[cfg(feature = "board-pico-cnc6")]
+#[cfg(feature = "board-pico6")]
 macro_rules! motor_numbers {
     ($call:ident, $($given:tt)*) => {
         $call!($($given)*; 0 1 2 3 4 5)
@@ -207,8 +207,8 @@ pub const ALL: [&Board; 8] = [
     &MEGA2560_GRBL,
     &MEGA2560_GRBL_LATHE,
     &MEGA2560_LATHE,
-    &PICO_CNC,
-    &PICO_CNC6,
+    &PICO,
+    &PICO6,
     &RAMPS14,
     &RAMPS14_CNC,
     &SKR_PICO,
@@ -240,11 +240,11 @@ pub const ACTIVE: &Board = &MEGA2560_GRBL_LATHE;
 #[cfg(feature = "board-mega2560-lathe")]
 pub const ACTIVE: &Board = &MEGA2560_LATHE;
 /// The board that this image is built for.
-#[cfg(feature = "board-pico-cnc")]
-pub const ACTIVE: &Board = &PICO_CNC;
+#[cfg(feature = "board-pico")]
+pub const ACTIVE: &Board = &PICO;
 /// The board that this image is built for.
-#[cfg(feature = "board-pico-cnc6")]
-pub const ACTIVE: &Board = &PICO_CNC6;
+#[cfg(feature = "board-pico6")]
+pub const ACTIVE: &Board = &PICO6;
 /// The board that this image is built for.
 #[cfg(feature = "board-skr-pico")]
 pub const ACTIVE: &Board = &SKR_PICO;
@@ -254,8 +254,8 @@ pub const ACTIVE: &Board = &SKR_PICO;
     feature = "board-ramps14-cnc",
     feature = "board-mega2560-grbl-lathe",
     feature = "board-mega2560-lathe",
-    feature = "board-pico-cnc",
-    feature = "board-pico-cnc6",
+    feature = "board-pico",
+    feature = "board-pico6",
     feature = "board-skr-pico"
 )))]
 pub const ACTIVE: &Board = &MEGA2560_GRBL;

@@ -166,14 +166,14 @@ fn about(board: &Board) -> &'static str {
         "ramps14" => {
             "An Arduino Mega 2560 with RAMPS 1.4: X, Y, Z and the first extruder (E0) as A. `ramps14-cnc` has the same pins, without heaters."
         }
-        "pico-cnc" => {
+        "pico" => {
             "A Raspberry Pi Pico on a breakout board, with four drivers. **Its pins are 3.3 V** and tolerate no more: see [the RP2040](rp2040.md)."
         }
-        "pico-cnc6" => {
-            "A Raspberry Pi Pico with six drivers: the two additional motors may share an axis with another motor, or move B and C. **3.3 V**, as `pico-cnc`."
+        "pico6" => {
+            "A Raspberry Pi Pico with six drivers: the two additional motors may share an axis with another motor, or move B and C. **3.3 V**, as `pico`."
         }
         "skr-pico" => {
-            "A BTT SKR Pico v1.0: motor 4 is its driver E. FAN1 cools the print, FAN2 the heatbreak of the hot end; FAN3 is the spindle's enable, the servo pin is the spindle's PWM. **3.3 V**, as `pico-cnc`. \
+            "A BTT SKR Pico v1.0: motor 4 is its driver E. FAN1 cools the print, FAN2 the heatbreak of the hot end; FAN3 is the spindle's enable, the servo pin is the spindle's PWM. **3.3 V**, as `pico`. \
              A DIAG jumper connects the driver's pin instead of the switch of X, Y or Z, for [homing by a stall](rp2040.md#homing-by-a-stall): remove the switch then. \
              Leave the jumper of E off: its pin is the emergency stop's."
         }

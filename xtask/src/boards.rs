@@ -22,11 +22,11 @@ pub enum Board {
     #[value(name = "mega2560-lathe")]
     Mega2560Lathe,
     /// Raspberry Pi Pico on a breakout board
-    #[value(name = "pico-cnc")]
-    PicoCnc,
+    #[value(name = "pico")]
+    Pico,
     /// Raspberry Pi Pico on a breakout board with six drivers
-    #[value(name = "pico-cnc6")]
-    PicoCnc6,
+    #[value(name = "pico6")]
+    Pico6,
     /// Arduino Mega 2560 with RAMPS 1.4, as a printer
     #[value(name = "ramps14")]
     Ramps14,
@@ -67,7 +67,7 @@ impl Board {
 
     /// Whether its chip is the RP2040; otherwise it is the ATmega2560.
     pub fn is_rp2040(self) -> bool {
-        matches!(self, Board::PicoCnc | Board::PicoCnc6 | Board::SkrPico)
+        matches!(self, Board::Pico | Board::Pico6 | Board::SkrPico)
     }
 
     /// The name in `boards/`, on the command line and after `board-` in the package's features.
@@ -76,8 +76,8 @@ impl Board {
             Board::Mega2560Grbl => "mega2560-grbl",
             Board::Mega2560GrblLathe => "mega2560-grbl-lathe",
             Board::Mega2560Lathe => "mega2560-lathe",
-            Board::PicoCnc => "pico-cnc",
-            Board::PicoCnc6 => "pico-cnc6",
+            Board::Pico => "pico",
+            Board::Pico6 => "pico6",
             Board::Ramps14 => "ramps14",
             Board::Ramps14Cnc => "ramps14-cnc",
             Board::SkrPico => "skr-pico",

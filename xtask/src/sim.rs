@@ -78,7 +78,7 @@ pub struct BenchArgs {
     /// Measure only this row; may be given more than once
     #[arg(long, value_name = "NAME")]
     row: Vec<String>,
-    /// The board: the one that the other firmwares were measured on, or `pico-cnc`
+    /// The board: the one that the other firmwares were measured on, or `pico`
     #[arg(long, value_enum, default_value_t)]
     board: Board,
 }
@@ -116,9 +116,9 @@ pub fn serve(args: &ServeArgs) -> Result<ExitCode> {
 /// Builds and measures, on the board that other firmwares were measured on.
 pub fn bench(args: &BenchArgs) -> Result<ExitCode> {
     let elf = prepare(args.board, Machine::default())?;
-    if args.board == Board::PicoCnc {
+    if args.board == Board::Pico {
         // The rows with six motors need this image.
-        firmware::build(Board::PicoCnc6, Machine::default())?;
+        firmware::build(Board::Pico6, Machine::default())?;
         return pass_through(&mut bench_command(args, &elf));
     }
     ensure!(args.board == Board::default(), "there are no rows of {}", args.board.name());

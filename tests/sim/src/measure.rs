@@ -24,7 +24,7 @@ pub fn bench(args: &BenchArgs) -> Result<bool> {
     bench::print(&bed, &rows, &mut stdout().lock())
 }
 
-/// As [`bench`], of `pico-cnc`.
+/// As [`bench`], of `pico`.
 fn bench_emulated(args: &BenchArgs) -> Result<bool> {
     let known: Vec<_> = emulated::ROWS.iter().map(|row| row.name).collect();
     let asked: Vec<_> = match args.rows.is_empty() {

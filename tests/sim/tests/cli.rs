@@ -61,7 +61,7 @@ fn mistakes_are_explained() {
             &elf,
             &job,
             &["--board", "uno"],
-            "no board uno; there are mega2560-grbl, mega2560-grbl-lathe, mega2560-lathe, pico-cnc, pico-cnc6, ramps14, \
+            "no board uno; there are mega2560-grbl, mega2560-grbl-lathe, mega2560-lathe, pico, pico6, ramps14, \
              ramps14-cnc, skr-pico",
         ),
     ];

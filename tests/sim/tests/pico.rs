@@ -1,10 +1,10 @@
-//! The image of `pico-cnc` on the emulated RP2040. `cargo xtask test` runs these tests, and installs the emulator.
-//! They also run with `cargo test -p kerf-sim-tests pico -- --ignored`, after a `cargo xtask sim --board pico-cnc`.
+//! The image of `pico` on the emulated RP2040. `cargo xtask test` runs these tests, and installs the emulator.
+//! They also run with `cargo test -p kerf-sim-tests pico -- --ignored`, after a `cargo xtask sim --board pico`.
 
 use std::path::Path;
 
 use kerf::boards::inputs::{ENDS, PROBE};
-use kerf::boards::{Board, PICO_CNC, PICO_CNC6, SKR_PICO, gp};
+use kerf::boards::{Board, PICO, PICO6, SKR_PICO, gp};
 use kerf_sim::bench::{ideal, spiral};
 use kerf_sim::emulated::even::{FAST, evenness};
 use kerf_sim::emulated::heat::Heat;
@@ -20,7 +20,7 @@ use crate::transcript::{self, Transcript};
 use crate::transcripts::ELSEWHERE;
 
 fn board() -> Emulated {
-    Emulated::load(&image(&PICO_CNC), &PICO_CNC).unwrap()
+    Emulated::load(&image(&PICO), &PICO).unwrap()
 }
 
 impl Side for Emulated {
@@ -223,7 +223,7 @@ fn a_million_steps_a_second_of_each_motor() {
 #[test]
 #[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn half_a_million_steps_a_second_of_six_motors() {
-    let mut board = Emulated::load(&image(&PICO_CNC6), &PICO_CNC6).unwrap();
+    let mut board = Emulated::load(&image(&PICO6), &PICO6).unwrap();
     let mut host = Host::new(LINES_IN_FLIGHT);
     host.boot(&mut board, 1_000).unwrap();
     FAST.iter().for_each(|line| set(&mut board, &mut host, line));
@@ -248,7 +248,7 @@ fn half_a_million_steps_a_second_of_six_motors() {
 #[test]
 #[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn six_unlike_motors_leave_time() {
-    let mut board = Emulated::load(&image(&PICO_CNC6), &PICO_CNC6).unwrap();
+    let mut board = Emulated::load(&image(&PICO6), &PICO6).unwrap();
     let mut host = Host::new(LINES_IN_FLIGHT);
     host.boot(&mut board, 1_000).unwrap();
     FAST.iter().for_each(|line| set(&mut board, &mut host, line));
@@ -277,7 +277,7 @@ fn a_stuck_chip_is_bitten_and_says_so() {
     assert_eq!(board.resets(), 0);
     board.run_for_ms(30).unwrap();
     assert_eq!(board.resets(), 1, "half a second has passed");
-    assert!(!board.is_high(PICO_CNC.outputs[0].unwrap()));
+    assert!(!board.is_high(PICO.outputs[0].unwrap()));
     board.run_for_ms(300).unwrap();
     let said = String::from_utf8(board.receive_from(USB)).unwrap();
     assert!(said.contains("SYSTEM READY") && said.contains("ALARM:3\r\n"), "{said}");
@@ -311,7 +311,7 @@ fn a_panic_stops_everything_and_is_told_after_the_reset() {
     let stands = Emulated::steps(&board);
     board.run_for_ms(2_000).unwrap();
     assert_eq!((Emulated::steps(&board), board.resets()), (stands, 0), "it waits");
-    assert!(!board.is_high(PICO_CNC.outputs[0].unwrap()));
+    assert!(!board.is_high(PICO.outputs[0].unwrap()));
     board.reset();
     board.run_for_ms(300).unwrap();
     let said = String::from_utf8(board.receive_from(USB)).unwrap();
@@ -325,7 +325,7 @@ fn a_panic_stops_everything_and_is_told_after_the_reset() {
 #[test]
 #[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn outputs_are_strong_and_none_of_them_floats() {
-    for board in [&PICO_CNC, &SKR_PICO] {
+    for board in [&PICO, &SKR_PICO] {
         let mut machine = Emulated::load(&image(board), board).unwrap();
         machine.run_for_ms(300).unwrap();
         let motors = board.motors.iter().flat_map(|m| [Some(m.step), Some(m.dir), m.enable]);
@@ -463,12 +463,12 @@ fn stops_at_once(is_streamed: bool) {
         let until = board.cycle() + wait_us * 128;
         host.run_until(&mut board, until).unwrap();
         let edge = board.cycle();
-        board.drive(PICO_CNC.inputs[0].unwrap(), false);
+        board.drive(PICO.inputs[0].unwrap(), false);
         board.run_for_ms(100).unwrap();
         let after = board.last_step().unwrap().saturating_sub(edge) as f64 / 128.0;
         slowest = slowest.max(after);
         assert!(after <= STOP_US, "{after} us, {wait_us} us behind a millisecond");
-        board.drive(PICO_CNC.inputs[0].unwrap(), true);
+        board.drive(PICO.inputs[0].unwrap(), true);
         // What was sent comes to its end: it is refused.
         board.run_for_ms(700).unwrap();
         board.receive_from(USB);
@@ -561,7 +561,7 @@ fn noise_at_a_switch_does_not_delay_motors() {
     FAST.iter().for_each(|line| set(&mut board, &mut host, line));
     set(&mut board, &mut host, "g0 x100 y100 z100 a100");
     host.run_for_ms(&mut board, 105).unwrap();
-    let probe = PICO_CNC.inputs[PROBE].unwrap().bit;
+    let probe = PICO.inputs[PROBE].unwrap().bit;
     for period in [640, 700, 173, 2_560] {
         board.disturb(probe, period);
         let recorded = board.record_for_ms(2).unwrap();
@@ -585,7 +585,7 @@ fn a_fault_of_the_cpu_stops_everything_and_is_told_after_the_reset() {
     board.crash("address");
     board.run_for_ms(1).unwrap();
     let stands = Emulated::steps(&board);
-    assert!(!board.is_high(PICO_CNC.outputs[0].unwrap()));
+    assert!(!board.is_high(PICO.outputs[0].unwrap()));
     board.run_for_ms(2_000).unwrap();
     assert_eq!((Emulated::steps(&board), board.resets()), (stands, 0), "it waits");
     board.reset();
@@ -605,7 +605,7 @@ fn a_stack_that_is_too_deep_is_a_reset() {
     board.crash("stack");
     board.run_for_ms(520).unwrap();
     let stands = Emulated::steps(&board);
-    assert!(!board.is_high(PICO_CNC.outputs[0].unwrap()) && board.resets() == 1);
+    assert!(!board.is_high(PICO.outputs[0].unwrap()) && board.resets() == 1);
     board.run_for_ms(1_000).unwrap();
     assert_eq!(Emulated::steps(&board), stands);
 }
@@ -773,7 +773,7 @@ fn the_image_keeps_to_the_transcripts() {
     due.extend(share_of(&also, 4).cloned());
     let (printing, others): (Vec<_>, Vec<_>) =
         due.into_iter().partition(|one| begins(&PRINTING, one));
-    transcript::play_all(others, 2, || greeted(&PICO_CNC));
+    transcript::play_all(others, 2, || greeted(&PICO));
     transcript::play_all(printing, 2, || greeted(&SKR_PICO));
 }
 

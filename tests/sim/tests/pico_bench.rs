@@ -1,6 +1,6 @@
-//! Every row of the bench of `pico-cnc` keeps to its floor. The tests run like those of `pico.rs`.
+//! Every row of the bench of `pico` keeps to its floor. The tests run like those of `pico.rs`.
 
-use kerf::boards::{PICO_CNC, PICO_CNC6};
+use kerf::boards::{PICO, PICO6};
 use kerf_sim::bench::emulated::{PicoBed, ROWS, named};
 
 use crate::common::image;
@@ -15,8 +15,8 @@ fn keeps_to_its_floor(name: &str) {
     }
     let row = named(name).unwrap();
     // The bench looks for this image beside the other one.
-    image(&PICO_CNC6);
-    row.keep_to_floor(&PicoBed::new(&image(&PICO_CNC))).unwrap();
+    image(&PICO6);
+    row.keep_to_floor(&PicoBed::new(&image(&PICO))).unwrap();
 }
 
 rows! {

@@ -1,7 +1,7 @@
 //! USB of the emulated RP2040: the port, back-pressure, a program that does not listen, both ports at once. The tests
 //! run like those of `pico.rs`.
 
-use kerf::boards::PICO_CNC;
+use kerf::boards::PICO;
 use kerf_sim::emulated::{Emulated, Talks};
 use kerf_sim::{AUX, Host, USB};
 
@@ -9,7 +9,7 @@ use crate::common::image;
 
 /// A board that has just been powered up.
 fn board() -> Emulated {
-    Emulated::load(&image(&PICO_CNC), &PICO_CNC).unwrap()
+    Emulated::load(&image(&PICO), &PICO).unwrap()
 }
 
 /// A board that has greeted, and speaks TinyG's dialect on both ports.

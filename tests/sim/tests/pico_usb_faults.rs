@@ -4,7 +4,7 @@
 
 use std::ops::Range;
 
-use kerf::boards::PICO_CNC;
+use kerf::boards::PICO;
 use kerf_sim::emulated::{Emulated, Fault};
 use kerf_sim::mechanics::Random;
 use kerf_sim::{Host, USB};
@@ -16,7 +16,7 @@ use crate::seeds;
 
 /// A board that has greeted, and speaks TinyG's dialect.
 fn booted() -> Emulated {
-    let mut board = Emulated::load(&image(&PICO_CNC), &PICO_CNC).unwrap();
+    let mut board = Emulated::load(&image(&PICO), &PICO).unwrap();
     Host::new(1).boot(&mut board, 1_000).unwrap();
     let heard = ask(&mut board, "{x:{vm:5000,fr:5000,ac:1000},sv:0}\n", 50);
     assert!(heard.contains("\"f\":[1,0,"), "{heard}");

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use embassy_futures::block_on;
-use kerf::boards::PICO_CNC;
+use kerf::boards::PICO;
 use kerf_sim::emulated::Emulated;
 use kerf_sim::{Runs, USB};
 use kerf_verify::{Dialect, Image as Which, Outcome, Plan, dialect, verify};
@@ -62,7 +62,7 @@ impl kerf_verify::Board for Pico {
 
 fn plan(dialect: &'static Dialect) -> Plan {
     Plan {
-        board: PICO_CNC.name.to_owned(),
+        board: PICO.name.to_owned(),
         version: env!("CARGO_PKG_VERSION").to_owned(),
         dialect,
         clock_hz: None,
@@ -77,7 +77,7 @@ fn plan(dialect: &'static Dialect) -> Plan {
 #[test]
 #[ignore = "needs the emulator"]
 fn kerf_on_a_pico_has_no_finding() {
-    let mut pico = Pico(Emulated::load(&image(&PICO_CNC), &PICO_CNC).unwrap());
+    let mut pico = Pico(Emulated::load(&image(&PICO), &PICO).unwrap());
     let report = block_on(verify(&mut pico, &plan(&dialect::TINYG)));
     let sound = report.findings().iter().filter(|one| one.outcome == Outcome::Sound).count();
     assert!(report.is_sound() && sound == 6, "{report}");

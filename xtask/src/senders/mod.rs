@@ -44,7 +44,7 @@ pub struct SendersArgs {
     /// The G-code file that they send
     #[arg(long, value_name = "JOB")]
     job: Option<PathBuf>,
-    /// The board: pico-cnc, which is emulated, or mega2560-grbl; for printing hosts skr-pico, which is emulated, or ramps14
+    /// The board: pico, which is emulated, or mega2560-grbl; for printing hosts skr-pico, which is emulated, or ramps14
     #[arg(long, value_enum)]
     board: Option<Board>,
     /// Install the senders and run none
@@ -128,7 +128,7 @@ impl Sender {
     fn boards(self) -> [Board; 2] {
         match self.prints() {
             true => [Board::Ramps14, Board::SkrPico],
-            false => [Board::default(), Board::PicoCnc],
+            false => [Board::default(), Board::Pico],
         }
     }
 

@@ -1,9 +1,9 @@
-//! The rows of `pico-cnc`, whose chip is emulated. The targets are what users may expect of a chip like the RP2040.
+//! The rows of `pico`, whose chip is emulated. The targets are what users may expect of a chip like the RP2040.
 
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
-use kerf::boards::{Board, PICO_CNC, PICO_CNC6};
+use kerf::boards::{Board, PICO, PICO6};
 
 use super::Better::{Higher, Lower};
 use super::workload::{How, USUAL_JERK, disturbances, settings};
@@ -56,7 +56,7 @@ pub const ROWS: [Row<PicoBed>; 13] = [
     Row {
         target: Some(500e3),
         floor: Some(500e3),
-        ..row("rate-6", "rate held, 6 motors, each (pico-cnc6)", "steps/s", six)
+        ..row("rate-6", "rate held, 6 motors, each (pico6)", "steps/s", six)
     },
     Row {
         better: Lower,
@@ -126,7 +126,7 @@ pub fn named(name: &str) -> Option<&'static Row<PicoBed>> {
     ROWS.iter().find(|row| row.name == name)
 }
 
-/// The image of `pico-cnc`. The image of the board with six motors lies in the same folder.
+/// The image of `pico`. The image of the board with six motors lies in the same folder.
 pub struct PicoBed {
     elf: PathBuf,
 }
@@ -180,30 +180,30 @@ fn rate(recorded: &Recorded, motors: usize) -> Result<Figure> {
 }
 
 fn one(bed: &PicoBed) -> Result<Figure> {
-    rate(&cruise(bed, &PICO_CNC, &[], "g0 x100")?, 1)
+    rate(&cruise(bed, &PICO, &[], "g0 x100")?, 1)
 }
 
 fn four(bed: &PicoBed) -> Result<Figure> {
-    rate(&cruise(bed, &PICO_CNC, &[], "g0 x100 y100 z100 a100")?, 4)
+    rate(&cruise(bed, &PICO, &[], "g0 x100 y100 z100 a100")?, 4)
 }
 
 /// Six motors: X, A, and two motors each of Y and Z.
 fn six(bed: &PicoBed) -> Result<Figure> {
     let more = ["{5ma:1,5tr:1.25,6ma:2,6tr:1.25}"];
-    rate(&cruise(bed, &PICO_CNC6, &more, "g1 f46875 x60 y60 z60 a60")?, 6)
+    rate(&cruise(bed, &PICO6, &more, "g1 f46875 x60 y60 z60 a60")?, 6)
 }
 
 /// Four motors, each at its own rate.
 const UNLIKE: &str = "g0 x100 y87.3 z-61.8 a29";
 
 fn leading(bed: &PicoBed) -> Result<Figure> {
-    let recorded = cruise(bed, &PICO_CNC, &[], UNLIKE)?;
+    let recorded = cruise(bed, &PICO, &[], UNLIKE)?;
     let first = recorded.times.first().context("no motor")?;
     Ok((evenness(first).1 as f64 * 1e3 / PER_US).into())
 }
 
 fn minor(bed: &PicoBed) -> Result<Figure> {
-    let recorded = cruise(bed, &PICO_CNC, &[], UNLIKE)?;
+    let recorded = cruise(bed, &PICO, &[], UNLIKE)?;
     Ok(recorded.times.iter().map(|times| evenness(times).2).fold(0.0, f64::max).into())
 }
 
@@ -228,7 +228,7 @@ fn lines_xyzf(bed: &PicoBed) -> Result<Figure> {
 /// answered in a second.
 fn stream(bed: &PicoBed, moves: [i64; 3], line: impl Fn(f64) -> String) -> Result<Figure> {
     const LINES: usize = 2_000;
-    let (mut board, mut host) = bed.board(&PICO_CNC, &fast())?;
+    let (mut board, mut host) = bed.board(&PICO, &fast())?;
     ask(&mut board, &mut host, "g1f40000")?;
     let text: String = (1..=LINES).map(|n| line(n as f64)).collect();
     let (begun, mut heard) = (board.cycle(), Vec::new());
@@ -258,7 +258,7 @@ fn stream(bed: &PicoBed, moves: [i64; 3], line: impl Fn(f64) -> String) -> Resul
 
 /// Returns a board that has just begun a spiral of 2,000 moves of 0.1 mm at 6,000 mm/min.
 fn begun(bed: &PicoBed, jerk: Option<f64>) -> Result<Emulated> {
-    let (mut board, _) = bed.board(&PICO_CNC, &settings(How { jerk, ..How::default() }, true))?;
+    let (mut board, _) = bed.board(&PICO, &settings(How { jerk, ..How::default() }, true))?;
     board.send_to(USB, spiral(0.1).as_bytes());
     while board.totals() == [0; 4] {
         board.run_for_ms(1)?;
@@ -317,7 +317,7 @@ fn late(bed: &PicoBed, jerk: Option<f64>) -> Result<Figure> {
             interjections: if disturbed { disturbances(seed) } else { Vec::new() },
             ..Options::default()
         };
-        let mut board = Emulated::load(&bed.elf, &PICO_CNC)?;
+        let mut board = Emulated::load(&bed.elf, &PICO)?;
         let report = job::run(&mut board, &lines_of(text), &options, |_| ())?;
         let problems = report.problems.join("; ");
         ensure!(problems.is_empty() || report.late > 0, "{name}: {problems}");

@@ -327,7 +327,7 @@ impl Emulated {
         let program = program(elf);
         ensure!(
             program.exists(),
-            "no {}: `cargo xtask sim --board pico-cnc` puts it there",
+            "no {}: `cargo xtask sim --board pico` puts it there",
             program.display()
         );
         let pins = board.motors.iter().map(|motor| (motor.step.bit, motor.dir.bit));
@@ -651,7 +651,7 @@ mod tests {
 
     #[test]
     fn the_emulator_lies_beside_the_images() {
-        let program = program(Path::new("target/firmware/pico-cnc.elf"));
+        let program = program(Path::new("target/firmware/pico.elf"));
         assert_eq!(program, Path::new("target/rp2040-emulator/bridge.mjs"));
     }
 }

@@ -4,8 +4,8 @@
 use super::{Board, Encoder, MotorPins, NATIVE_USB, Pwm, Serial, Timer, Usart, gp};
 
 /// Raspberry Pi Pico on a breakout board.
-pub const PICO_CNC: Board = Board {
-    name: "pico-cnc",
+pub const PICO: Board = Board {
+    name: "pico",
     features: &[
         "dialect-tinyg",
         "dialect-grbl",

@@ -1,11 +1,11 @@
 //! Raspberry Pi Pico on a breakout board with six drivers, for example two motors each on Y and Z, and one each on X
-//! and A. The other functions move to higher pins than on `pico-cnc`.
+//! and A. The other functions move to higher pins than on `pico`.
 
-use super::{Board, Encoder, MotorPins, PICO_CNC, Pwm, Timer, gp};
+use super::{Board, Encoder, MotorPins, PICO, Pwm, Timer, gp};
 
 /// Raspberry Pi Pico with six drivers.
-pub const PICO_CNC6: Board = Board {
-    name: "pico-cnc6",
+pub const PICO6: Board = Board {
+    name: "pico6",
     features: &[
         "dialect-tinyg",
         "dialect-grbl",
@@ -33,7 +33,7 @@ pub const PICO_CNC6: Board = Board {
     outputs: [Some(gp(15)), None, None, Some(gp(17))],
     pwm: Some(Pwm { timer: Timer::Slices, channel: 16 }),
     // USB; then transmit GP0, receive GP1
-    serial: PICO_CNC.serial,
+    serial: PICO.serial,
     inputs: [
         // One switch input for both ends of an axis
         Some(gp(18)),
@@ -50,5 +50,5 @@ pub const PICO_CNC6: Board = Board {
         Some(gp(26)),
     ],
     encoder: Some(Encoder { index: gp(27), sync: gp(28), second: None }),
-    ..PICO_CNC
+    ..PICO
 };
