@@ -1,7 +1,7 @@
 //! Arduino Mega 2560 with RAMPS 1.4, as a printer: X, Y, Z and the first extruder, for the dialect of printing hosts.
 
 use super::Port::{A, B, D, E, F, G, H, J, K, L};
-use super::{Board, Encoder, Heater, Heaters, MotorPins, Pwm, Timer, USB, pin};
+use super::{Board, Encoder, Heater, Heaters, MotorPins, Pwm, SdCard, Timer, USB, pin};
 
 /// Arduino Mega 2560 with RAMPS 1.4, as a printer.
 pub const RAMPS14: Board = Board {
@@ -60,7 +60,7 @@ pub const RAMPS14: Board = Board {
         cooler: None,
     }),
     // Chip select D53, as on the displays for RAMPS
-    card: Some(pin(B, 0)),
+    card: Some(SdCard::on_spi(pin(B, 0))),
     step_timer: Timer::T1,
     tick_timer: Timer::T0,
 };

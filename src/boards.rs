@@ -26,8 +26,8 @@ mod ramps14_cnc;
 mod skr_pico;
 
 pub use parts::{
-    Encoder, Handshake, Heater, Heaters, MotorPins, NATIVE_USB, Pwm, Serial, Timer, Tmc2209, USB,
-    Usart, inputs, outputs,
+    Encoder, Handshake, Heater, Heaters, MotorPins, NATIVE_USB, Pwm, SdCard, Serial, Timer,
+    Tmc2209, USB, Usart, inputs, outputs,
 };
 pub use pins::{Interrupt, Pin, Port, gp, pin};
 
@@ -137,8 +137,8 @@ pub struct Board {
     pub drivers: Option<Tmc2209>,
     /// The heaters, for an image that can print.
     pub heaters: Option<Heaters>,
-    /// The select pin of an SD card on the SPI of the ATmega2560, active low. The SS pin of the SPI may serve as it.
-    pub card: Option<Pin>,
+    /// The pins of an SD card.
+    pub card: Option<SdCard>,
     /// Timer of the step interrupt (16 bit).
     pub step_timer: Timer,
     /// Timer of the 1 kHz tick.
@@ -177,9 +177,13 @@ impl Board {
         bits
     }
 
-    /// Whether the board has a device on the SPI.
+    /// Whether the board has a device on the SPI of the ATmega2560.
     pub const fn has_spi(&self) -> bool {
-        self.card.is_some() || self.has_max6675(0) || self.has_max6675(1)
+        let has_card = match self.card {
+            Some(card) => card.is_on_spi(),
+            None => false,
+        };
+        has_card || self.has_max6675(0) || self.has_max6675(1)
     }
 
     /// Whether a heater (0 hot end, 1 bed) may have a MAX6675.

@@ -27,8 +27,10 @@ pub enum Capability {
     Printer,
     /// Motors that drive X and Y together, as on a CoreXY machine.
     CoreXy,
-    /// Printing from an SD card.
+    /// Running files of an SD card.
     Sd,
+    /// Writing files to an SD card. It needs [`Capability::Sd`] as well.
+    CardWrite,
     /// Stepper drivers that are set up over a UART, and homing by the load that these drivers measure.
     Drivers,
     /// Moves that follow the plane of a tilted bed: G29 and M420.
@@ -37,7 +39,7 @@ pub enum Capability {
 
 impl Capability {
     /// All capabilities.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::Cycles,
         Self::Boring,
         Self::Probing,
@@ -48,6 +50,7 @@ impl Capability {
         Self::Printer,
         Self::CoreXy,
         Self::Sd,
+        Self::CardWrite,
         Self::Drivers,
         Self::BedPlane,
     ];
@@ -66,6 +69,7 @@ impl Capability {
             Self::Printer => cfg!(feature = "printer"),
             Self::CoreXy => cfg!(feature = "corexy"),
             Self::Sd => cfg!(feature = "sd"),
+            Self::CardWrite => cfg!(feature = "card-write"),
             Self::Drivers => cfg!(feature = "drivers"),
             Self::BedPlane => cfg!(feature = "bed-plane"),
         }
@@ -91,6 +95,7 @@ impl Capability {
             Self::Printer => "printer",
             Self::CoreXy => "corexy",
             Self::Sd => "sd",
+            Self::CardWrite => "card-write",
             Self::Drivers => "drivers",
             Self::BedPlane => "bed-plane",
         }

@@ -57,6 +57,9 @@ pub enum Status {
     #[cfg(feature = "drivers")]
     DriverOpen,
     CardError,
+    /// No room on the SD card for a file, or for its entry.
+    #[cfg(feature = "card-write")]
+    CardFull,
     UnrecognizedName,
     MalformedCommand,
     BadNumber,

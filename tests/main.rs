@@ -50,6 +50,8 @@ mod requests;
 mod rig;
 #[path = "support/schema.rs"]
 mod schema;
+#[path = "support/sd_image.rs"]
+mod sd_image;
 #[path = "support/seeds.rs"]
 mod seeds;
 #[path = "support/sender.rs"]
@@ -77,6 +79,7 @@ mod builder;
 mod cam_files;
 mod canon_props;
 mod card;
+mod card_files;
 mod chain;
 mod check;
 mod control;

@@ -79,11 +79,17 @@ impl Board {
             (pins[n], pins[n + 1], pins[n + 2]) = (hot_end.select, bed.select, cooler);
             n += 3;
         }
-        if let Some(card) = self.card
-            && !card.is(SPI[0])
-        {
-            pins[n] = Some(card);
-            n += 1;
+        if let Some(card) = self.card {
+            card.check();
+            if !card.select.is(SPI[0]) {
+                pins[n] = Some(card.select);
+                n += 1;
+            }
+            if !card.is_on_spi() {
+                let [clock, to, from] = card.bus;
+                (pins[n], pins[n + 1], pins[n + 2]) = (Some(clock), Some(to), Some(from));
+                n += 3;
+            }
         }
         let mut s = 0;
         while s < SPI.len() && self.has_spi() {

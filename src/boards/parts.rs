@@ -1,5 +1,6 @@
 //! The parts of a board: drivers, timers, serial ports, inputs and outputs, sensors, heaters.
 
+use super::SPI;
 use super::pins::{Interrupt, Pin, Port, gp, pin};
 
 /// The pins of one stepper driver.
@@ -11,6 +12,39 @@ pub struct MotorPins {
     pub dir: Pin,
     /// Active low; `None` when the driver has no enable of its own.
     pub enable: Option<Pin>,
+}
+
+/// The pins of an SD card.
+#[derive(Clone, Copy, Debug)]
+pub struct SdCard {
+    /// Selects the card, active low. On an ATmega2560 the SS pin of the SPI may serve as it.
+    pub select: Pin,
+    /// Clock, data to the card, data from it: those of the ATmega2560's SPI, or three of one SPI of the RP2040.
+    pub bus: [Pin; 3],
+}
+
+impl SdCard {
+    /// Returns a card on the SPI of the ATmega2560.
+    pub const fn on_spi(select: Pin) -> Self {
+        Self { select, bus: [SPI[1], SPI[2], SPI[3]] }
+    }
+
+    /// Whether the card is on the SPI of the ATmega2560.
+    pub const fn is_on_spi(&self) -> bool {
+        self.bus[0].is(SPI[1])
+    }
+
+    /// Checks that the pins are those of one SPI (RP2040 data sheet, 2.19.2): of each four, data from the card, a
+    /// select, the clock, data to the card; SPI1 has every other eight.
+    pub(super) const fn check(&self) {
+        if self.is_on_spi() {
+            return;
+        }
+        let [clock, to, from] = self.bus;
+        assert!(clock.bit % 4 == 2 && to.bit % 4 == 3 && from.bit % 4 == 0, "pins of an SPI");
+        let unit = clock.bit / 8 % 2;
+        assert!(to.bit / 8 % 2 == unit && from.bit / 8 % 2 == unit, "pins of one SPI");
+    }
 }
 
 /// A 16-bit or 8-bit timer of the ATmega2560, or its counterpart on the RP2040.

@@ -181,8 +181,14 @@ const ADVICE: &[(Status, &str, &str)] = &[
     ),
     (
         CardError,
-        "The SD card, or the file being printed from it, cannot be read. The print has ended.",
-        "Check the card and its wires (printing.md). Then M21, M23 and M24 again.",
+        "The SD card, or the file that runs from it, cannot be read. The run has ended.",
+        "Check the card and its wires (card.md). Then choose the file again.",
+    ),
+    #[cfg(feature = "card-write")]
+    (
+        CardFull,
+        "The SD card has no room for the file, or its root folder has none for another entry. The file is not there.",
+        "Delete files, or use another card.",
     ),
     (
         UnrecognizedName,

@@ -2,7 +2,8 @@
 //!
 //! The answer to a command comes within some bytes. A block is requested (CMD17) and comes at most 100 ms later.
 //! [`Blocks::read`] waits for the block if it is [patient](Blocks::patient). Otherwise it returns [`Fault::Later`], and
-//! has to be called again for this block. The card stays selected meanwhile.
+//! has to be called again for this block. The card stays selected meanwhile. A block that is written has been sent when
+//! the function returns; the card is busy with it for up to 250 ms, and the next command waits for that.
 
 use crate::hal::{card, time::millis};
 
@@ -13,6 +14,9 @@ pub enum Fault {
     Later,
     /// The card does not answer, or refuses the command.
     Failed,
+    /// There is no room for a file.
+    #[cfg(feature = "card-write")]
+    Full,
 }
 
 /// Bytes of a block.
@@ -78,22 +82,51 @@ impl Blocks {
         Ok(&self.bytes)
     }
 
-    /// Takes the block that has been requested, if there is one: the card is not selected any more.
+    /// Takes the block that has been requested, if there is one, and waits until the card has written the last one: the
+    /// card is not selected any more.
     #[inline(never)]
     pub fn settle(&mut self) {
         if let Some((block, _)) = self.device.awaited {
             let _ = self.read(block);
         }
+        let _ = self.device.rest(true);
     }
 
-    /// Changes a byte of a block on the card.
-    #[inline(never)]
-    pub fn change(&mut self, block: u32, at: u16, to: u8) -> Result<(), Fault> {
+    /// Changes a block on the card. Nothing has changed when this returns [`Fault::Later`].
+    #[inline(always)]
+    pub fn change(
+        &mut self,
+        block: u32,
+        change: impl FnOnce(&mut [u8; BLOCK]),
+    ) -> Result<(), Fault> {
+        self.device.rest(self.patient)?;
         self.read(block)?;
-        if let Some(place) = self.bytes.get_mut(usize::from(at)) {
-            *place = to;
+        change(&mut self.bytes);
+        self.device.write(block, &self.bytes, self.patient)
+    }
+
+    /// Waits until the card has written its last block, if reads are [patient](Self::patient).
+    #[cfg(feature = "card-write")]
+    pub fn rest(&mut self) -> Result<(), Fault> {
+        self.device.rest(self.patient)
+    }
+
+    /// Writes a whole block.
+    #[cfg(feature = "card-write")]
+    #[inline(never)]
+    pub fn write(&mut self, block: u32, bytes: &[u8; BLOCK]) -> Result<(), Fault> {
+        if self.number == Some(block) {
+            self.number = None;
         }
-        self.device.write(block, &self.bytes)
+        self.device.write(block, bytes, self.patient)
+    }
+
+    /// Writes the contents of one block to another one as well.
+    #[cfg(feature = "card-write")]
+    #[inline(never)]
+    pub fn copy(&mut self, from: u32, to: u32) -> Result<(), Fault> {
+        self.read(from)?;
+        self.device.write(to, &self.bytes, self.patient)
     }
 }
 
@@ -104,12 +137,14 @@ struct Device {
     is_high: bool,
     /// The block that has been requested, and the time of the request, ms.
     awaited: Option<(u32, u32)>,
+    /// Since when the card has been writing a block, ms.
+    writes: Option<u32>,
 }
 
 #[small]
 impl Device {
     const fn new() -> Self {
-        Self { stage: Stage::Fresh, is_high: false, awaited: None }
+        Self { stage: Stage::Fresh, is_high: false, awaited: None, writes: None }
     }
 
     /// Makes one attempt to initialize the card. Returns whether it is ready.
@@ -128,6 +163,7 @@ impl Device {
     }
 
     fn reset(&mut self) -> Result<bool, Fault> {
+        let _ = self.rest(true);
         self.awaited = None;
         card::release();
         card::set_fast(false);
@@ -165,6 +201,30 @@ impl Device {
         if self.is_high { block } else { block << 9 }
     }
 
+    /// Waits until the card has written its last block, at most 250 ms. Not `patient`: returns [`Fault::Later`] instead.
+    fn rest(&mut self, patient: bool) -> Result<(), Fault> {
+        let Some(since) = self.writes else { return Ok(()) };
+        card::select();
+        // A selected card shows that it is busy from the second byte on.
+        card::exchange(0xFF);
+        let done = loop {
+            if card::exchange(0xFF) == 0xFF {
+                break Ok(());
+            }
+            if millis().wrapping_sub(since) > WRITE_MS {
+                break Err(Fault::Failed);
+            }
+            if !patient {
+                break Err(Fault::Later);
+            }
+        };
+        card::release();
+        if done != Err(Fault::Later) {
+            self.writes = None;
+        }
+        done
+    }
+
     /// Requests a block, unless it has been requested already. Returns the time of the request, ms.
     fn ask(&mut self, block: u32, patient: bool) -> Result<u32, Fault> {
         if let Some((_, since)) = self.awaited {
@@ -174,6 +234,7 @@ impl Device {
             // A sensor on the SPI has priority.
             return Err(Fault::Later);
         }
+        self.rest(patient)?;
         if self.stage != Stage::Ready || command(17, self.address(block)) != 0 {
             return Err(Fault::Failed);
         }
@@ -200,7 +261,7 @@ impl Device {
         Ok(())
     }
 
-    fn put(&self, block: u32, from: &[u8; BLOCK]) -> Result<(), Fault> {
+    fn put(&mut self, block: u32, from: &[u8; BLOCK]) -> Result<(), Fault> {
         if self.stage != Stage::Ready || command(24, self.address(block)) != 0 {
             return Err(Fault::Failed);
         }
@@ -212,12 +273,7 @@ impl Device {
         if card::exchange(0xFF) & 0x1F != 5 {
             return Err(Fault::Failed);
         }
-        let since = millis();
-        while card::exchange(0xFF) != 0xFF {
-            if millis().wrapping_sub(since) > WRITE_MS {
-                return Err(Fault::Failed);
-            }
-        }
+        self.writes = Some(millis());
         Ok(())
     }
 
@@ -242,7 +298,8 @@ impl Device {
     }
 
     #[inline(never)]
-    fn write(&mut self, block: u32, from: &[u8; BLOCK]) -> Result<(), Fault> {
+    fn write(&mut self, block: u32, from: &[u8; BLOCK], patient: bool) -> Result<(), Fault> {
+        self.rest(patient)?;
         let done = self.put(block, from);
         self.end(done)
     }

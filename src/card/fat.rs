@@ -10,16 +10,16 @@ use super::{Entry, NAME_MAX};
 use crate::hal::time::millis;
 
 /// Bytes of a block, as a power of two.
-const BLOCK_SHIFT: u8 = 9;
+pub const BLOCK_SHIFT: u8 = 9;
 /// Bytes of an entry of a directory, and the number of entries in a block.
-const ENTRY: usize = 32;
-const ENTRIES: u8 = 16;
+pub const ENTRY: usize = 32;
+pub const ENTRIES: u8 = 16;
 /// The most blocks of a directory that are read: 2,048 entries, in 0.2 s.
 const DIRECTORY_MOST: u8 = 128;
 /// The longest time for which a directory is read, ms. The watchdog acts after half a second.
 const DIRECTORY_MS: u32 = 250;
 /// The first cluster.
-const FIRST: u32 = 2;
+pub const FIRST: u32 = 2;
 /// The number of clusters from which on a volume is FAT16, and from which on it is FAT32.
 const FAT16: u32 = 4_085;
 const FAT32: u32 = 65_525;
@@ -27,21 +27,27 @@ const FAT32: u32 = 65_525;
 const CLUSTERS_MOST: u32 = 0x0FFF_FFF0;
 const TABLE_MOST: u32 = 1 << 21;
 /// The bits of an entry of the table in FAT32, and the least entry that ends a chain. In FAT16 the lower half of it.
-const LINK: u32 = 0x0FFF_FFFF;
+pub const LINK: u32 = 0x0FFF_FFFF;
 const END: u32 = 0x0FFF_FFF8;
 
 /// Bits of the attributes of an entry. A part of a long name has the bit of a label, too.
 pub const HIDDEN: u8 = 0x02;
-const LABEL: u8 = 0x08;
-const FOLDER: u8 = 0x10;
+pub const LABEL: u8 = 0x08;
+pub const FOLDER: u8 = 0x10;
 /// The first byte of an entry that has been deleted.
-const DELETED: u8 = 0xE5;
+pub const DELETED: u8 = 0xE5;
 
 /// A volume whose sizes have been checked.
 #[derive(Clone, Copy)]
 pub struct Volume {
     /// The first block of the table of clusters.
-    table: u32,
+    pub table: u32,
+    /// Blocks from there to the copy of the table; 0 without a copy.
+    #[cfg(feature = "card-write")]
+    pub copy: u32,
+    /// The block with the count of free clusters in FAT32; 0 without one.
+    #[cfg(feature = "card-write")]
+    pub info: u32,
     /// The first block of the first cluster.
     data: u32,
     /// The first block of the root directory in FAT16, its first cluster in FAT32.
@@ -49,21 +55,21 @@ pub struct Volume {
     /// Blocks of the root directory in FAT16.
     root_blocks: u16,
     /// The number behind the last cluster.
-    end: u32,
+    pub end: u32,
     /// Blocks of a cluster, as a power of two.
-    shift: u8,
-    is_32: bool,
+    pub shift: u8,
+    pub is_32: bool,
 }
 
 /// A place in the root directory.
 pub struct Cursor {
     /// The cluster in FAT32, and the block.
     cluster: u32,
-    block: u32,
+    pub block: u32,
     /// Blocks from here on until the next cluster, or the end of the directory.
-    left: u16,
+    pub left: u16,
     /// The next entry of the block.
-    entry: u8,
+    pub entry: u8,
     /// Blocks that have been read, and the time of the first one, ms.
     read: u8,
     since: u32,
@@ -145,6 +151,13 @@ impl Volume {
         let entries = table_blocks << if is_32 { 7 } else { 8 };
         Some(Self {
             table,
+            #[cfg(feature = "card-write")]
+            copy: if tables == 2 { table_blocks } else { 0 },
+            #[cfg(feature = "card-write")]
+            info: match word(boot, 48) {
+                at if is_32 && (1..reserved).contains(&at) => first + u32::from(at),
+                _ => 0,
+            },
             data,
             root: if is_32 { double(boot, 44) } else { behind },
             root_blocks,
@@ -156,7 +169,7 @@ impl Volume {
 
     /// Returns the first block of a cluster.
     #[inline(never)]
-    fn block_of(&self, cluster: u32) -> Result<u32, Fault> {
+    pub fn block_of(&self, cluster: u32) -> Result<u32, Fault> {
         if !(FIRST..self.end).contains(&cluster) {
             return Err(Fault::Failed);
         }
@@ -222,7 +235,7 @@ impl Volume {
 
     /// Goes to the next block of a directory. Returns whether there is one.
     #[inline(never)]
-    fn advance(&self, at: &mut Cursor, blocks: &mut Blocks) -> Result<bool, Fault> {
+    pub fn advance(&self, at: &mut Cursor, blocks: &mut Blocks) -> Result<bool, Fault> {
         (at.entry, at.read, at.left) = (0, at.read + 1, at.left - 1);
         if at.read >= DIRECTORY_MOST || millis().wrapping_sub(at.since) > DIRECTORY_MS {
             return Err(Fault::Failed);
@@ -240,7 +253,11 @@ impl Volume {
     #[inline(never)]
     pub fn delete(found: &Found, blocks: &mut Blocks) -> Result<(), Fault> {
         let (block, at) = found.place;
-        blocks.change(block, at, DELETED)
+        blocks.change(block, |bytes| {
+            if let Some(first) = bytes.get_mut(usize::from(at)) {
+                *first = DELETED;
+            }
+        })
     }
 }
 
@@ -291,7 +308,7 @@ impl Found {
 fn found(entry: &[u8], is_32: bool, place: (u32, u16)) -> Found {
     let high = if is_32 { word(entry, 20) } else { 0 };
     Found {
-        entry: Entry { name: name(entry), size: double(entry, 28) },
+        entry: Entry { name: shown_name(entry), size: double(entry, 28) },
         attributes: byte(entry, 11),
         first: u32::from(high) << 16 | u32::from(word(entry, 26)),
         place,
@@ -301,7 +318,7 @@ fn found(entry: &[u8], is_32: bool, place: (u32, u16)) -> Found {
 /// Returns a short name with its point. Characters that could be taken for another part of an answer become `_`.
 #[inline(never)]
 #[small]
-fn name(entry: &[u8]) -> [u8; NAME_MAX] {
+pub fn shown_name(entry: &[u8]) -> [u8; NAME_MAX] {
     let mut name = [0; NAME_MAX];
     let mut len = 0;
     for (at, letter) in entry.iter().take(11).enumerate() {
@@ -328,20 +345,20 @@ fn is_signed(sector: &[u8]) -> bool {
 }
 
 #[small]
-fn byte(bytes: &[u8], at: usize) -> u8 {
+pub fn byte(bytes: &[u8], at: usize) -> u8 {
     bytes.get(at).copied().unwrap_or(0)
 }
 
 /// Returns two bytes as a number.
 #[inline(never)]
 #[small]
-fn word(bytes: &[u8], at: usize) -> u16 {
+pub fn word(bytes: &[u8], at: usize) -> u16 {
     u16::from_le_bytes([byte(bytes, at), byte(bytes, at + 1)])
 }
 
 /// Returns four bytes as a number.
 #[inline(never)]
 #[small]
-fn double(bytes: &[u8], at: usize) -> u32 {
+pub fn double(bytes: &[u8], at: usize) -> u32 {
     u32::from(word(bytes, at + 2)) << 16 | u32::from(word(bytes, at))
 }

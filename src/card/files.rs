@@ -4,11 +4,16 @@ use heapless::Vec;
 
 use super::device::{BLOCK, Blocks, Fault};
 use super::fat::{File, Found, HIDDEN, Volume};
-use super::{Entry, NAME_MAX, prints_byte};
+#[cfg(feature = "card-write")]
+use super::write::Writer;
+use super::{Entry, NAME_MAX, PRINTS, REST, use_byte};
+#[cfg(feature = "card-write")]
+use super::{WRITES, writes};
+use crate::capability::Capability;
 use crate::status::Status;
 
-/// The longest line, without its comment.
-pub const LINE_MAX: usize = 80;
+/// The longest line, without what is behind a `;`.
+pub const LINE_MAX: usize = if Capability::CardWrite.is_built_in() { 250 } else { 80 };
 /// The most bytes that are read at once.
 const PIECE: usize = 40;
 /// The most clusters over which the chain of a file is followed at once.
@@ -42,13 +47,24 @@ pub struct Card {
     /// Whether reading continues at another place in the file, so that the part of a line that has been read is
     /// dropped.
     jumps: bool,
+    #[cfg(feature = "card-write")]
+    writer: Writer,
+    /// Why the file that is being written cannot be completed. Its lines are refused until its end, because a sender
+    /// goes on to send them, and they must not run.
+    #[cfg(feature = "card-write")]
+    spoilt: Option<Status>,
+    /// Whether the program that was writing the file has closed its port.
+    #[cfg(feature = "card-write")]
+    forsaken: bool,
+    /// Lines of the selected file that have been read.
+    lines: u32,
 }
 
 #[small]
 impl Card {
     /// Returns a card that has not been initialized.
     pub fn new() -> Self {
-        prints_byte().set(0);
+        use_byte().set(REST);
         Self {
             blocks: Blocks::new(),
             volume: None,
@@ -56,6 +72,13 @@ impl Card {
             skips: false,
             is_long: false,
             jumps: false,
+            #[cfg(feature = "card-write")]
+            writer: Writer::new(),
+            #[cfg(feature = "card-write")]
+            spoilt: None,
+            #[cfg(feature = "card-write")]
+            forsaken: false,
+            lines: 0,
         }
     }
 
@@ -80,9 +103,11 @@ impl Card {
 
     /// Closes the selected file, if there is one: the print has ended.
     pub fn close(&mut self) {
-        prints_byte().set(0);
+        use_byte().set(REST);
         self.jumps = true;
         self.file = None;
+        #[cfg(feature = "card-write")]
+        self.writer.give_up();
         self.blocks.settle();
     }
 
@@ -95,14 +120,60 @@ impl Card {
             Err(status) => return status,
         };
         self.file = Some(File::new(found));
-        (self.skips, self.is_long) = (false, false);
+        (self.skips, self.is_long, self.lines) = (false, false, 0);
         Status::Ok
     }
 
+    /// Returns the number of the line that was read last, unless M26 has moved in the file.
+    pub fn lines(&self) -> u32 {
+        self.lines
+    }
+
+    /// Has the file end behind the line that was read last, as after M2.
+    pub fn end(&mut self) {
+        if let Some((_, size)) = self.progress() {
+            self.seek(size);
+        }
+    }
+
+    /// Spoils the file that is being written, because its program has closed its port. Lines of that program may still
+    /// wait; behind them the file is given up: see [`Card::leave`].
+    #[cfg(feature = "card-write")]
+    pub fn forsake(&mut self) {
+        self.interrupt();
+        self.forsaken = true;
+    }
+
+    /// Gives up a file whose program has closed its port. To be called when no line waits.
+    #[cfg(feature = "card-write")]
+    pub fn leave(&mut self) {
+        if writes() && self.forsaken {
+            self.close();
+        }
+    }
+
+    /// Ends the print, or spoils the file that is being written: an alarm or a flush has dropped lines. The file stays
+    /// selected.
+    pub fn interrupt(&mut self) {
+        #[cfg(feature = "card-write")]
+        if writes() {
+            self.spoilt = self.spoilt.or(Some(Status::KillJob));
+            return;
+        }
+        let _ = self.print(false);
+    }
+
     /// Deletes a file, M30, unless it is selected ([`Status::NotAccepted`]). [`Status::UnrecognizedName`]: there is none
-    /// with this name.
+    /// with this name. [`Status::Again`]: its clusters are being freed.
     #[inline(never)]
     pub fn delete(&mut self, name: &[u8]) -> Status {
+        #[cfg(feature = "card-write")]
+        if self.writer.is_busy() {
+            return self.go_on(|card, volume| {
+                card.writer.step(volume, &mut card.blocks)?;
+                Ok(!card.writer.is_busy())
+            });
+        }
         let found = match self.find(name) {
             Ok(found) => found,
             Err(status) => return status,
@@ -110,7 +181,77 @@ impl Card {
         if self.file.is_some_and(|file| file.found.place == found.place) {
             return Status::NotAccepted;
         }
-        status(Volume::delete(&found, &mut self.blocks))
+        let deleted = Volume::delete(&found, &mut self.blocks);
+        #[cfg(feature = "card-write")]
+        if deleted.is_ok() {
+            self.writer.free(found.first);
+            return Status::Again;
+        }
+        status(deleted)
+    }
+
+    /// Begins to write a file, M28. [`Status::UnrecognizedName`]: no file can have this name.
+    #[cfg(feature = "card-write")]
+    pub fn create(&mut self, name: &[u8]) -> Status {
+        self.close();
+        if self.volume.is_none() {
+            return Status::CardError;
+        }
+        if !self.writer.begin(name) {
+            return Status::UnrecognizedName;
+        }
+        (self.spoilt, self.forsaken) = (None, false);
+        use_byte().set(WRITES);
+        Status::Ok
+    }
+
+    /// Appends a line to the file that is being written. [`Status::Again`]: not all of it has been taken yet. Cost: that
+    /// of a step of the [writer](super::write) at most.
+    #[cfg(feature = "card-write")]
+    pub fn append(&mut self, line: &[u8]) -> Status {
+        if let Some(status) = self.spoilt {
+            return status;
+        }
+        self.go_on(|card, volume| card.writer.append(line, volume, &mut card.blocks))
+    }
+
+    /// Completes the file that is being written, M29: from now on it is there. [`Status::Again`]: not yet.
+    #[cfg(feature = "card-write")]
+    pub fn finish(&mut self) -> Status {
+        if !writes() {
+            return Status::NotAccepted;
+        }
+        if let Some(status) = self.spoilt {
+            self.close();
+            return status;
+        }
+        let done = self.go_on(|card, volume| card.writer.finish(volume, &mut card.blocks));
+        if done == Status::Ok {
+            self.close();
+        }
+        done
+    }
+
+    /// Does a part of the writer's work, which returns whether it is done. A failure gives the file up.
+    #[cfg(feature = "card-write")]
+    fn go_on(&mut self, work: impl FnOnce(&mut Self, &Volume) -> Result<bool, Fault>) -> Status {
+        self.blocks.patient = false;
+        let done = match self.volume {
+            Some(volume) => work(self, &volume),
+            None => Err(Fault::Failed),
+        };
+        self.blocks.patient = true;
+        match done {
+            Ok(true) => Status::Ok,
+            Ok(false) | Err(Fault::Later) => Status::Again,
+            Err(fault) => {
+                let status =
+                    if fault == Fault::Full { Status::CardFull } else { Status::CardError };
+                self.spoilt = Some(status);
+                self.writer.give_up();
+                status
+            }
+        }
     }
 
     /// Sets whether lines are taken from the file: M24, M25. Without a file none are: [`Status::NotAccepted`].
@@ -118,7 +259,7 @@ impl Card {
         if prints && self.file.is_none() {
             return Status::NotAccepted;
         }
-        prints_byte().set(prints.into());
+        use_byte().set(if prints { PRINTS } else { REST });
         if !prints {
             // While the card is selected the sensor on the same lines cannot be read.
             self.blocks.settle();
@@ -136,9 +277,23 @@ impl Card {
         Status::Ok
     }
 
-    /// Returns the position of the next byte of the file, and the length of the file. `None` without a file.
+    /// Returns the position of the next byte of the file, and the length of the file. `None` without a file. For a
+    /// file that is being written, both are its length so far.
     pub fn progress(&self) -> Option<(u32, u32)> {
+        #[cfg(feature = "card-write")]
+        if writes() {
+            return Some((self.writer.size(), self.writer.size()));
+        }
         self.file.map(|file| (file.at, file.found.entry.size))
+    }
+
+    /// Returns the name of the selected file, or of the one that is being written; zeros without one.
+    pub fn name(&self) -> [u8; NAME_MAX] {
+        #[cfg(feature = "card-write")]
+        if writes() {
+            return self.writer.name();
+        }
+        self.file.map_or([0; NAME_MAX], |file| file.found.entry.name)
     }
 
     /// Returns the file with this number in the root directory. `Err`: the card cannot be read.
@@ -195,7 +350,7 @@ impl Card {
             Ok(0) => return Line::More,
             Ok(read) => read,
             Err(Fault::Later) => return Line::Later,
-            Err(Fault::Failed) => return Line::Failed,
+            Err(_) => return Line::Failed,
         };
         let piece = piece.get(..read).unwrap_or(&[]);
         let end = piece.iter().position(|byte| *byte == b'\n');
@@ -209,6 +364,7 @@ impl Card {
         match end {
             None => Line::More,
             Some(_) => {
+                self.lines += 1;
                 self.skips = false;
                 while line.last() == Some(&b' ') {
                     line.pop();

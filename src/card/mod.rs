@@ -4,6 +4,8 @@
 //! keeps one of 512 bytes. Only files in the root directory are visible, by their short names. A card may hold
 //! anything: a volume with impossible sizes, and chains of clusters without an end, are refused within bounded work.
 //!
+//! `write` writes files, in an image with that capability.
+//!
 //! A line of the printed file is read in place, up to its end or to the end of a block. If another block is needed
 //! first, it is requested from the card, and `Line::Later` says so. So no task waits for the card, except for the 1.5
 //! ms in which the block is transferred. All other operations, which run while the machine is idle, wait for their
@@ -17,18 +19,32 @@ mod device;
 mod fat;
 #[cfg(feature = "sd")]
 mod files;
+#[cfg(feature = "card-write")]
+mod write;
 
 #[cfg(feature = "sd")]
 pub use files::{Card, LINE_MAX, Line};
 
 machine_static! {
-    // Whether lines are taken from the file. Only thread mode uses it.
-    fn prints_byte() -> SharedByte = SharedByte::new(0);
+    // What is done with the selected file. Only thread mode uses it.
+    fn use_byte() -> SharedByte = SharedByte::new(REST);
 }
+
+/// Nothing is done with a file.
+const REST: u8 = 0;
+/// Lines are taken from the selected file.
+const PRINTS: u8 = 1;
+/// Lines are written to a file.
+const WRITES: u8 = 2;
 
 /// Whether lines of the selected file are being taken. Thread mode, 10 cycles.
 pub fn prints() -> bool {
-    cfg!(feature = "sd") && prints_byte().get() != 0
+    cfg!(feature = "sd") && use_byte().get() == PRINTS
+}
+
+/// Whether lines are written to a file, and not run. Thread mode, 10 cycles.
+pub fn writes() -> bool {
+    cfg!(feature = "card-write") && use_byte().get() == WRITES
 }
 
 /// The length of a short name in bytes, with its point.
@@ -56,6 +72,14 @@ pub enum Op<'a> {
     Print(bool),
     /// Moves to a byte of the file, M26.
     Seek(u32),
-    /// Deletes a file, M30.
+    /// Deletes a file, M30. [`Again`](crate::status::Status::Again): its clusters are being freed.
     Delete(&'a [u8]),
+    /// Begins to write a file, M28: lines are written from now on, and not run.
+    Create(&'a [u8]),
+    /// Appends a line. [`Again`](crate::status::Status::Again): not all of it has been taken yet.
+    Append(&'a [u8]),
+    /// Completes the file, M29. [`Again`](crate::status::Status::Again): it is not complete yet.
+    Finish,
+    /// Gives up the file that is being written, or ends the print.
+    Drop,
 }

@@ -271,11 +271,11 @@ contract! {
         fn release();
         /// Whether a sensor waits until the card is released. The sensor then gets its turn within 40 ms. Thread mode.
         fn is_wanted() -> bool;
-        /// Sets the clock: 4 MHz if `fast`, else 250 kHz, for a card that has not been initialized. Thread mode.
+        /// Sets the clock: 4 MHz or more if `fast`, else 250 kHz, for a card that has not been initialized. Thread mode.
         fn set_fast(fast: bool);
         /// Sends a byte and returns the byte received meanwhile. Thread mode. Cost: 60 at 4 MHz, 550 at 250 kHz.
         fn exchange(byte: u8) -> u8;
-        /// Reads a block. Thread mode. Cost: 25,000.
+        /// Reads a block. Thread mode. Cost: 25,000 (0.4 ms on the RP2040).
         fn read(block: &mut [u8; 512]);
     }
 

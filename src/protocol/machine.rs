@@ -2,7 +2,7 @@
 
 use super::dialect::Memory;
 use super::value::Value;
-use crate::card::{Entry, Op};
+use crate::card::{Entry, NAME_MAX, Op};
 use crate::config::bed::{Bed, Point};
 use crate::config::{Setting, Settings};
 use crate::gcode::overrides::Change;
@@ -233,6 +233,11 @@ pub trait Machine {
     /// a file.
     fn card_progress(&mut self) -> Option<(u32, u32)> {
         None
+    }
+
+    /// Writes the name of the selected file, or of the one that is being written; zeros without one.
+    fn card_name(&mut self, name: &mut [u8; NAME_MAX]) {
+        *name = [0; NAME_MAX];
     }
 
     /// Whether lines of the selected file are being run.

@@ -15,6 +15,9 @@ pub enum Notice {
     Probing,
     /// The result of a line that runs at each start: its number, and its status.
     Startup(u8, Status),
+    /// A line of a file of the SD card has been refused: its number, and why.
+    #[cfg(feature = "sd")]
+    FileLine(u32, Status),
     /// A status report.
     Status,
     /// A jog has ended, the queue has been flushed, or both.

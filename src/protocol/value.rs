@@ -150,6 +150,16 @@ pub enum Value {
     /// The register DRV_STATUS of a motor's driver.
     #[cfg(feature = "drivers")]
     DriverStatus(u8),
+    /// What is done with the file of the SD card: 0 nothing, 1 it is selected, 2 its lines run, 3 lines are written to
+    /// it.
+    #[cfg(feature = "sd")]
+    FileUse,
+    /// Bytes of the file that have been read, and its length. If lines are written to it, both are its length so far.
+    #[cfg(feature = "sd")]
+    FileAt,
+    /// See [`Value::FileAt`].
+    #[cfg(feature = "sd")]
+    FileLength,
     /// The axis end whose limit switch was hit, for exceptions; -1 for none.
     LimitHit,
     /// The axis that could not be homed, for exceptions.

@@ -32,6 +32,7 @@ use super::ports::{Chosen, Port, REPORT};
 use super::reporter::tell_at_once;
 use super::row::{self, Row};
 use super::tx::Tx;
+use crate::card;
 use crate::hal::event::{Event, is_wanted, set_asked, wake_after, wake_after_transmitted};
 use crate::hal::serial::{PORTS, USB};
 use crate::machine::{self, Alarm, Cycle};
@@ -149,7 +150,8 @@ impl Parser {
         let runs_job = !links.job.get().is_none();
         let waits = self.deferred != Deferred::No && is_working(links);
         let data = free && !runs_job && !self.is_feeding() && !waits;
-        let straight = !alarmed && !matches!(machine::cycle(), Cycle::Check | Cycle::Jog);
+        let cycles = matches!(machine::cycle(), Cycle::Check | Cycle::Jog);
+        let straight = !alarmed && !cycles && !card::writes();
         // Immediate messages of a port go first, because an acknowledgement must not wait for a move.
         let declined = if data && straight && self.is_idle() && !self.has_more() {
             match row::run(links, self.planner) {

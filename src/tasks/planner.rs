@@ -722,7 +722,7 @@ impl Planner {
         }
         links.job.set(Job::default());
         #[cfg(feature = "sd")]
-        let _ = links.card.borrow_mut().print(false);
+        links.card.borrow_mut().interrupt();
         let (cycle, killed) = machine::dropped();
         match cycle {
             Cycle::Jog => links.notices.jogged.set(true),

@@ -17,6 +17,8 @@ use super::lines::{Class, LineId, LinePool};
 use super::links::Links;
 use super::tx::Tx;
 use super::view::{Seen, View};
+#[cfg(feature = "card-write")]
+use crate::card;
 use crate::config::Settings;
 use crate::hal::event::{is_unheard, set_eager};
 use crate::hal::serial::{Flow, USB, is_shared};
@@ -330,8 +332,13 @@ impl Links {
         let others = Speech::IS_CHOSEN
             && port.choice.get() == Choice::Said
             && (port.is_eager() || port.is_plain());
-        let rests = || machine::cycle() == Cycle::Lines && !View::of(self, port).is_busy();
+        let rests = || machine::cycle() == Cycle::Lines && !self.is_busy(port);
         others && line.first() == Some(&b'{') && rests()
+    }
+
+    /// Whether anything is under way, or a file of the SD card is in use.
+    fn is_busy(&self, port: &Port) -> bool {
+        crate::card::prints() || crate::card::writes() || View::of(self, port).is_busy()
     }
 
     /// Sets the dialect of a port. The port does not wait for a decision any more.
@@ -350,7 +357,8 @@ impl Links {
     #[small]
     pub fn open_anew(&self) {
         let port = self.port(USB);
-        if View::of(self, port).is_busy() || self.has_data() || port.is_resetting() {
+        self.forsake_file(USB);
+        if self.is_busy(port) || self.has_data() || port.is_resetting() {
             return;
         }
         if matches!(port.choice.get(), Choice::Said | Choice::Begun) {
@@ -439,6 +447,23 @@ impl Links {
     pub fn has_data(&self) -> bool {
         self.ports.iter().any(|port| port.lines.borrow().has_data())
     }
+
+    /// Gives up the file that the last program on a port was writing to the SD card: at once, or behind its lines that
+    /// still wait, which must not run.
+    #[cfg(feature = "card-write")]
+    fn forsake_file(&self, port: u8) {
+        if !card::writes() || port != self.feeder.get() {
+            return;
+        }
+        self.card.borrow_mut().forsake();
+        if !self.has_data() {
+            self.card.borrow_mut().leave();
+        }
+    }
+
+    /// Does nothing in an image that writes no files.
+    #[cfg(not(feature = "card-write"))]
+    fn forsake_file(&self, _: u8) {}
 
     /// Whether G-code of this port is taken. If the machine is at rest, the port becomes the feeder.
     pub fn may_feed(&self, port: &Port) -> bool {

@@ -411,6 +411,8 @@ pub fn tell_at_once(links: &Links, port: &Port, notice: Notice) -> bool {
     let Ok(mut tx) = port.tx.try_lock() else { return false };
     let is_long = match notice {
         Notice::Exception(status) => status != Status::BufferFull,
+        #[cfg(feature = "sd")]
+        Notice::FileLine(..) => true,
         _ => matches!(notice, Notice::Greeting(_)),
     };
     let fits = if is_long { tx.is_empty() } else { tx.has_room() };

@@ -35,7 +35,7 @@ use super::switches;
 use crate::boards::{MOTORS, inputs, outputs};
 use crate::capability::Capability;
 #[cfg(feature = "sd")]
-use crate::card::{Entry, Op};
+use crate::card::{Entry, NAME_MAX, Op};
 #[cfg(feature = "bed-plane")]
 use crate::config::bed::Bed;
 use crate::config::{Setting, Settings};
@@ -245,7 +245,8 @@ impl<'a> View<'a> {
             return true;
         }
         let waits = links.feeder().lines.borrow().has_data();
-        let free = !waits && !self.is_busy();
+        let uses_file = crate::card::prints() || crate::card::writes();
+        let free = !waits && !uses_file && !self.is_busy();
         if free {
             links.feeder.set(self.port.number);
             // Nothing has been reported to the new feeder yet.
@@ -516,6 +517,11 @@ impl Machine for View<'_> {
     }
 
     #[cfg(feature = "sd")]
+    fn card_name(&mut self, name: &mut [u8; NAME_MAX]) {
+        *name = self.links.card.borrow().name();
+    }
+
+    #[cfg(feature = "sd")]
     fn card_prints(&mut self) -> bool {
         crate::card::prints()
     }
@@ -523,7 +529,11 @@ impl Machine for View<'_> {
     #[cfg(feature = "sd")]
     fn card_entry(&mut self, number: u8) -> Result<Option<Entry>, Status> {
         let mut card = self.links.card.borrow_mut();
-        if crate::card::prints() { Err(Status::NotAccepted) } else { card.entry(number) }
+        if crate::card::prints() || crate::card::writes() {
+            Err(Status::NotAccepted)
+        } else {
+            card.entry(number)
+        }
     }
 
     #[cfg(feature = "bed-plane")]

@@ -3,7 +3,7 @@
 //! While the card is selected nobody else uses SPI ([`is_free`]).
 
 use super::{gpio, spi};
-use crate::boards::ACTIVE;
+use crate::boards::{ACTIVE, SdCard};
 use crate::hal::byte::SharedByte;
 
 static TAKEN: SharedByte = SharedByte::new(0);
@@ -15,16 +15,16 @@ static FAST: SharedByte = SharedByte::new(0);
 pub fn select() {
     TAKEN.set(1);
     spi::set_clock(if FAST.get() != 0 { spi::Clock::Mhz4 } else { spi::Clock::Khz250 });
-    if let Some(pin) = ACTIVE.card {
-        gpio::set(pin, false);
+    if let Some(SdCard { select, .. }) = ACTIVE.card {
+        gpio::set(select, false);
     }
 }
 
 /// Deselects the card, then sends one more byte, during which the card releases its data line.
 #[small]
 pub fn release() {
-    if let Some(pin) = ACTIVE.card {
-        gpio::set(pin, true);
+    if let Some(SdCard { select, .. }) = ACTIVE.card {
+        gpio::set(select, true);
     }
     spi::exchange(0xFF);
     TAKEN.set(0);

@@ -5,7 +5,7 @@
 //! level writes meanwhile. The functions for enables ensure that themselves.
 
 use crate::boards::outputs::{COUNTERCLOCKWISE, SPINDLE};
-use crate::boards::{ACTIVE, Handshake, Pin, each_motor};
+use crate::boards::{ACTIVE, Handshake, Pin, SdCard, each_motor};
 use crate::hal::byte::SharedByte;
 
 /// Drives a pin high.
@@ -96,7 +96,7 @@ pub fn start() {
     });
     super::heaters::start();
     super::spi::start();
-    if let Some(select) = ACTIVE.card {
+    if let Some(SdCard { select, .. }) = ACTIVE.card {
         high(select);
         output(select);
     }

@@ -1,4 +1,5 @@
-//! An SD card of a machine: a card of high capacity that is always ready. Blocks that nobody has written are 0.
+//! An SD card of a machine: a card of high capacity. It is busy for some time after each block that is written. Blocks
+//! that nobody has written are 0.
 
 use core::cell::{Cell, RefCell};
 use std::collections::{HashMap, VecDeque};
@@ -10,6 +11,8 @@ pub type Blocks = HashMap<u32, [u8; 512]>;
 /// The byte that begins a block, and the answer to a block that was written.
 const START: u8 = 0xFE;
 const TAKEN: u8 = 0xE5;
+/// For how many bytes a card is busy with a block.
+const BUSY: u32 = 40;
 /// Bytes before a block: a reader without patience does not find it at once.
 const WAIT: [u8; 12] = [0xFF; 12];
 
@@ -21,6 +24,8 @@ struct Card {
     writes: Cell<Option<u32>>,
     answer: RefCell<VecDeque<u8>>,
     reads: Cell<u32>,
+    /// For how many bytes the card is busy.
+    busy: Cell<u32>,
 }
 
 machine_static! {
@@ -30,12 +35,18 @@ machine_static! {
         writes: Cell::new(None),
         answer: RefCell::new(VecDeque::new()),
         reads: Cell::new(0),
+        busy: Cell::new(0),
     };
 }
 
 /// Puts a card into the slot of this thread's machine, or takes it out.
 pub fn insert(blocks: Option<Blocks>) {
     *card().blocks.borrow_mut() = blocks;
+}
+
+/// Returns the blocks of the card; `None` without a card.
+pub fn blocks() -> Option<Blocks> {
+    card().blocks.borrow().clone()
 }
 
 /// Returns how many blocks have been read so far.
@@ -60,7 +71,10 @@ pub fn set_fast(_: bool) {}
 pub fn exchange(byte: u8) -> u8 {
     let mut blocks = card().blocks.borrow_mut();
     let Some(blocks) = blocks.as_mut() else { return 0xFF };
-    let answer = card().answer.borrow_mut().pop_front().unwrap_or(0xFF);
+    let busy = card().busy.get();
+    let none = if busy > 0 { 0 } else { 0xFF };
+    card().busy.set(busy.saturating_sub(1));
+    let answer = card().answer.borrow_mut().pop_front().unwrap_or(none);
     let mut taken = card().taken.borrow_mut();
     let is_idle = taken.is_empty();
     match card().writes.get() {
@@ -73,6 +87,7 @@ pub fn exchange(byte: u8) -> u8 {
         contents.copy_from_slice(&taken[1..513]);
         blocks.insert(block, contents);
         card().answer.borrow_mut().push_back(TAKEN);
+        card().busy.set(BUSY);
         card().writes.set(None);
         taken.clear();
     } else if card().writes.get().is_none() && taken.len() == 6 {

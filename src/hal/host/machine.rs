@@ -120,6 +120,11 @@ impl Machine {
         card::insert(blocks);
     }
 
+    /// Returns the blocks of the card in the slot; `None` without a card.
+    pub fn card(&self) -> Option<card::Blocks> {
+        card::blocks()
+    }
+
     /// Returns how many blocks of cards have been read so far.
     pub fn card_reads(&self) -> u32 {
         card::reads()

@@ -14,6 +14,7 @@ use crate::hal::byte::SharedByte;
 #[derive(Clone, Copy)]
 #[repr(u8)]
 pub(super) enum Unit {
+    Spi = 1,
     Uart = 2,
     Pwm = 4,
     Cpu = 5,

@@ -89,6 +89,7 @@ pub fn begin() {
     SWI_IRQ_1.set_priority(Priority::P3);
     TIMER_IRQ_0.set_priority(Priority::P2);
     gpio::start();
+    card::start();
     inputs::start();
     heaters::start();
     drivers::start();

@@ -1,5 +1,7 @@
 //! Recognizes which command a line is.
 
+#[cfg(feature = "sd")]
+use super::card::{self, Files};
 use crate::gcode::comment;
 use crate::units::AXES;
 
@@ -36,6 +38,9 @@ pub enum Command {
     Check,
     /// `$SLP`.
     Sleep,
+    /// `$F` and the commands that begin with it.
+    #[cfg(feature = "sd")]
+    Files(Files),
     /// `$RST=`, with its letter: `$`, `#` or `*`.
     Restore(u8),
     /// `$x=v`: the number of the setting, and the offset of the value behind the `$`.
@@ -85,6 +90,10 @@ fn system(rest: &[u8]) -> Command {
             *letter = byte.to_ascii_uppercase();
         }
         count += 1;
+    }
+    #[cfg(feature = "sd")]
+    if let Some(files) = card::of(letters.get(..count.min(letters.len())).unwrap_or(&[])) {
+        return Command::Files(files);
     }
     match (count, letters) {
         (0, _) => Command::Help,

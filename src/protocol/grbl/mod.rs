@@ -18,6 +18,8 @@
 //! characters rely on it. Output lines end in CR LF. A step costs at most 15,000 cycles, or 3 ms with a setting that
 //! is in EEPROM. Malformed lines are answered with an error. No buffer here can overflow.
 
+#[cfg(feature = "sd")]
+mod card;
 mod command;
 mod lists;
 mod report;

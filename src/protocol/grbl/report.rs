@@ -87,6 +87,7 @@ enum Field {
     Accessories,
     Pins,
     Sync,
+    File,
     Done,
 }
 
@@ -188,6 +189,11 @@ impl Report {
                     text(out, text!("|Se:"));
                     reported_error(machine, out);
                 }
+                self.field = Field::File;
+            }
+            Field::File => {
+                #[cfg(feature = "sd")]
+                super::card::field(machine, out);
                 out.put(b'>');
                 super::write::line_end(out);
                 self.field = Field::Done;

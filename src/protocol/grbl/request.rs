@@ -4,6 +4,8 @@
 //! machine is homed, a probing when it is over. Until then the step returns [`Next::Wait`]; this polling costs 2,000
 //! cycles each millisecond.
 
+#[cfg(feature = "sd")]
+use super::card;
 use super::command::{self, ALL, Command};
 use super::report::{LOWERED, Report, SLEEPS};
 use super::status::{BAD_JOG, BUSY, LOCKED, TOO_LONG, UNSUPPORTED, error_number};
@@ -43,7 +45,7 @@ const REFUSED: u8 = 1;
 const STORES: u8 = 1;
 
 /// The progress of a command.
-enum Step {
+pub(super) enum Step {
     /// Continue with this part at once.
     At(u8),
     /// Continue with this part later.
@@ -153,6 +155,8 @@ impl Answers for Request {
     fn interject(&mut self) -> bool {
         let ended = match self.command {
             Command::Settings | Command::Startup => true,
+            #[cfg(feature = "sd")]
+            Command::Files(_) => true,
             // The axes of a row are parts of one output line.
             Command::Offsets => self.at & 7 == 0,
             _ => !self.begun,
@@ -179,6 +183,11 @@ impl Request {
             Command::Unknown => Step::Error(UNSUPPORTED),
             Command::BadJog => Step::Error(BAD_JOG),
             Command::Gcode => self.gcode_done(line, machine, out),
+            #[cfg(feature = "sd")]
+            Command::Files(what) => {
+                let name = command::trim(command::behind_equals(line));
+                card::part(what, at, name, machine, out)
+            }
             Command::Modes => match at {
                 END => Step::Done,
                 _ => Step::At(lists::modes(at, machine, out).unwrap_or(END)),
@@ -279,6 +288,10 @@ impl Request {
         let number = error_number(self.status);
         if number != 0 {
             return Step::Error(number);
+        }
+        if crate::card::writes() {
+            // The line has been written to a file.
+            return Step::Done;
         }
         if self.at == DROPPED && command::jog(line).is_none() {
             // What the line waits for does not come any more.

@@ -120,6 +120,8 @@ rows! {
     #[cfg(feature = "drivers")]
     DriverOpen = 9;
     CardError = 9;
+    #[cfg(feature = "card-write")]
+    CardFull = 9;
     UnrecognizedName = 3;
     MalformedCommand = 1;
     BadNumber = 2;

@@ -27,6 +27,9 @@ pub enum Telling {
     Probing(u8),
     /// The result of a start-up line.
     Startup(u8, Status),
+    /// A line of a file that was refused: its number, and the status.
+    #[cfg(feature = "sd")]
+    FileLine(u32, Status),
     /// `[Se:]`.
     SyncError,
 }
@@ -43,6 +46,8 @@ impl Telling {
             }
             Notice::Exception(status) => Self::Exception(status),
             Notice::Startup(line, status) => Self::Startup(line, status),
+            #[cfg(feature = "sd")]
+            Notice::FileLine(line, status) => Self::FileLine(line, status),
             Notice::Probing => Self::Probing(lists::PROBING),
             Notice::SyncError if Capability::Lathe.is_built_in() => Self::SyncError,
             _ => Self::Nothing,
@@ -72,6 +77,16 @@ impl Tells for Telling {
             }
             Self::Startup(line, status) => {
                 started(*line, *status, machine, out);
+                false
+            }
+            #[cfg(feature = "sd")]
+            Self::FileLine(line, status) => {
+                text(out, text!("[MSG:error:"));
+                int(out, error_number(*status).into());
+                text(out, text!(" in line "));
+                int(out, line.cast_signed());
+                text(out, text!(" of the file"));
+                close(out);
                 false
             }
             Self::Probing(at) => match lists::offsets(*at, machine, out) {

@@ -1,4 +1,5 @@
-//! Files on an SD card: M20 to M27, M30 with a name, M32. While a file is printed only M24 to M27 are carried out.
+//! Files on an SD card: M20 to M29, M30 with a name, M32. While a file is printed only M24 to M27 are carried out.
+//! Between M28 and M29 lines are written to a file, and only lines that overtake are carried out.
 
 use super::command::{value, words};
 use super::host::{self, Step};
@@ -39,6 +40,7 @@ pub fn part(
             status => return Step::Refused(status),
         },
         22 => return done(machine.card(Op::Release)),
+        28 | 29 => return write(number, at, block, machine, out),
         23 | 32 => return open(number, at, block, machine, out),
         24 | 26 if !has_file => text(out, text!("echo:no file selected; M23\n")),
         25 if machine.card_prints() => {
@@ -54,6 +56,7 @@ pub fn part(
         }
         27 => progress(machine, out),
         _ => match machine.card(Op::Delete(name(block))) {
+            Status::Again => return Step::Later(0),
             Status::Ok => {
                 text(out, text!("File deleted:"));
                 named(block, out);
@@ -153,6 +156,45 @@ fn open(number: u16, at: u8, block: &[u8], machine: &mut impl Machine, out: &mut
     }
     text(out, text!("File selected\n"));
     if number == 32 { done(machine.card(Op::Print(true))) } else { Step::Done }
+}
+
+/// M28, M29: begins to write a file, and completes it.
+#[small]
+fn write(
+    number: u16,
+    at: u8,
+    block: &[u8],
+    machine: &mut impl Machine,
+    out: &mut impl Out,
+) -> Step {
+    if let Err(status) = Capability::CardWrite.check() {
+        return Step::Refused(status);
+    }
+    let done = match (number, at) {
+        (28, 0) => machine.card(Op::Create(name(block))),
+        (29, 0) => machine.card(Op::Finish),
+        _ => {
+            named(block, out);
+            line_end(out);
+            return Step::Done;
+        }
+    };
+    match done {
+        Status::Ok if number == 28 => {
+            text(out, text!("Writing to file: "));
+            Step::At(1)
+        }
+        Status::Ok => {
+            text(out, text!("Done saving file.\n"));
+            Step::Done
+        }
+        Status::Again => Step::Later(0),
+        Status::UnrecognizedName => {
+            missing(text!("open"), block, out);
+            Step::Done
+        }
+        status => Step::Refused(status),
+    }
 }
 
 /// Reports the progress. Only while a file prints: if a paused print told its bytes, OctoPrint would take it for a

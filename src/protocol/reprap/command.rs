@@ -80,7 +80,7 @@ pub fn is_text(block: &[u8]) -> bool {
 pub fn says_more((letter, number): (u8, u16), block: &[u8]) -> bool {
     let (is_text, takes_axes) = match (letter, number) {
         // Names, texts, and a stop.
-        (b'$', _) | (b'M', 23 | 30 | 32 | 112 | 117 | 118) => return false,
+        (b'$', _) | (b'M', 23 | 28 | 29 | 30 | 32 | 112 | 117 | 118) => return false,
         (b'M', 0 | 1 | 25 | 226 | 600 | 601) => (true, true),
         (b'G', 10) => (false, has(block, b'P') || has(block, b'L')),
         (b'G', number) => (false, !matches!(number, 4 | 11)),

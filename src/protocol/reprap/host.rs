@@ -47,7 +47,7 @@ const EXTRUDER: u8 = 3;
 #[small]
 pub fn of(code: Option<Code>, block: &[u8]) -> Option<Code> {
     let is_own = match code? {
-        (b'M', 20..=27 | 32) => true,
+        (b'M', 20..=29 | 32) => true,
         // M30 without a file name ends the program, so the interpreter runs it.
         (b'M', 30) => !words(block).is_empty(),
         // With P it is the temperature of an extruder, and with L an offset: those of Duet's firmware.
@@ -88,7 +88,7 @@ pub fn part(
         (_, number) => number,
     };
     match number {
-        20..=27 | 30 | 32 => card::part(number, at, block, machine, out),
+        20..=30 | 32 => card::part(number, at, block, machine, out),
         18 | 84 => motors_off(block, machine),
         17 => done(machine.energize(None, true)),
         82 | 83 => done(machine.extruder(Extruder::Relative(number == 83))),

@@ -14,7 +14,7 @@
 //! | [`settings`] | M92, M201 to M206, M503 |
 //! | [`names`] | `$name=value`, `$$`: settings by Kerf's own names |
 //! | [`bed`] | G29, M420: the plane of the bed |
-//! | [`card`] | M20 to M27, M30, M32: the SD card |
+//! | [`card`] | M20 to M30, M32: the SD card |
 //! | `drivers` | M122, M569, M906: the motors' drivers, in an image with them |
 //! | [`report`] | M105, M114, M115, M119 |
 //! | [`tuning`] | M301, M303, M304 |

@@ -10,6 +10,7 @@ use super::host::{self, Code, Step};
 use super::status::{is_passed_over, is_unknown, reason};
 use super::translate;
 use super::write::{cold, int, line_end, text};
+use crate::card;
 use crate::progmem::Text;
 use crate::protocol::{Answers, Extruder, Machine, Next, Out, Span};
 use crate::status::Status;
@@ -66,11 +67,13 @@ impl Request {
         let what = match take(&frame, code, line, session) {
             Err(fault) => What::Resend(fault, session.last),
             Ok(()) if block.is_empty() => What::Nothing,
+            // The line is run as G-code is, and is written to the file for that.
+            Ok(()) if card::writes() && !passes(code, &frame, line) => What::Gcode,
             Ok(()) => of(code, block),
         };
         let silent = session.in_file;
         let at = match what {
-            What::Gcode => command::waits(code).into(),
+            What::Gcode => (command::waits(code) && !card::writes()).into(),
             // Behind the `ok`.
             What::Host(TEMPERATURES) => silent.into(),
             _ => 0,
@@ -104,6 +107,12 @@ impl Request {
         };
         Self { what, at: 0, block: frame.block, begun: false, silent: false }
     }
+}
+
+/// Whether a line is carried out even while lines are written to a file.
+#[small]
+fn passes(code: Option<Code>, frame: &Frame, line: &[u8]) -> bool {
+    matches!(code, Some((b'M', 28 | 29 | 110))) || command::overtakes(frame, line)
 }
 
 /// Returns how a line is carried out.

@@ -86,6 +86,8 @@ pub fn reason(status: Status) -> Text {
         Status::TooCold => text!("too cold to extrude"),
         Status::HeatersLocked => text!("heaters are locked; M999 unlocks them"),
         Status::CardError => text!("SD card cannot be read"),
+        #[cfg(feature = "card-write")]
+        Status::CardFull => text!("SD card is full"),
         #[cfg(feature = "drivers")]
         Status::DriverSilent => text!("motor driver does not answer; no motor power?"),
         #[cfg(feature = "drivers")]

@@ -64,6 +64,10 @@ impl Request {
             }
             (Target::Operation(Operation::Defaults), _) => self.restore(pair, c),
             (Target::Operation(Operation::Boot), _) => self.boot(pair, c),
+            #[cfg(feature = "sd")]
+            (Target::Operation(Operation::Files(what)), _) => {
+                self.files(what, pair, c).map(|()| None)
+            }
             (Target::Operation(action), _) => {
                 let done = act(action, pair, c);
                 if action == Operation::Test && done == Err(Status::Error) {
@@ -269,6 +273,8 @@ fn act<M: Machine, O>(
         }
         // The report would interrupt the response.
         Operation::Exception => return Err(Status::NotAccepted),
+        #[cfg(feature = "sd")]
+        Operation::Files(_) => return Ok(()),
         Operation::Energize => true,
         Operation::Release => false,
         Operation::Defaults | Operation::Help | Operation::Boot => return Ok(()),

@@ -1,5 +1,7 @@
 //! Text mode: lines that begin with `$`.
 
+#[cfg(feature = "sd")]
+use super::card::Files;
 use super::help::Hint;
 use super::json::{Kind, Pair};
 use super::listing::Series;
@@ -55,6 +57,16 @@ impl Request {
                 self.item = 0;
                 self.phase = Phase::Program;
             }
+            #[cfg(feature = "sd")]
+            Target::Operation(Operation::Files(Files::List)) if null => match self.mount(c.machine)
+            {
+                Ok(()) => {
+                    self.item = 0;
+                    self.phase = Phase::Files;
+                }
+                Err(Status::Again) => self.waits = true,
+                Err(status) => self.fail(status, Mode::Text),
+            },
             Target::Operation(Operation::Defaults) if null => self.help(help::DEFAULTS),
             Target::Operation(Operation::Boot) if null => self.help(help::BOOT),
             _ => self.execute(&pair, target, c),

@@ -9,6 +9,8 @@
 mod amend;
 mod apply;
 mod block;
+#[cfg(feature = "sd")]
+mod card;
 mod command;
 mod control;
 mod defaults;

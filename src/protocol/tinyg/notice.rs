@@ -87,24 +87,46 @@ progmem! {
 }
 
 /// An exception report, `{"er":{"fb":440.20,"st":13,"msg":"Buffer full"}}`. Sent at every verbosity, and always as
-/// JSON. A limit adds the switch, `"sw":"xmin"`, and homing the axis, `"ax":"x"`.
+/// JSON. A limit adds the switch, `"sw":"xmin"`, homing the axis, `"ax":"x"`, and a line of a file its number,
+/// `"line":12`.
 pub struct Exception {
     stage: u8,
     status: Status,
     format: Format,
+    #[cfg(feature = "sd")]
+    line: Option<u32>,
 }
 
 #[small]
 impl Exception {
     /// Starts an exception report.
     pub fn begin(status: Status, settings: &Settings) -> Exception {
-        Exception { stage: 0, status, format: Format::json(settings) }
+        Exception {
+            stage: 0,
+            status,
+            format: Format::json(settings),
+            #[cfg(feature = "sd")]
+            line: None,
+        }
+    }
+
+    /// Starts a report on a line of a file that has been refused.
+    #[cfg(feature = "sd")]
+    pub fn of_line(line: u32, status: Status, settings: &Settings) -> Exception {
+        Exception { line: Some(line), ..Exception::begin(status, settings) }
     }
 
     /// Writes the next part. Returns whether there is more to do.
     #[inline(never)]
     pub fn step(&mut self, machine: &mut impl Machine, out: &mut impl Out) -> bool {
         let mut writer = Writer::body(out, &mut self.format);
+        #[cfg(feature = "sd")]
+        if self.stage == 2
+            && let Some(line) = self.line
+        {
+            writer.key_text(text!("line"));
+            writer.fixed(Fixed::int(line.cast_signed()));
+        }
         let more = put_exception(self.stage, self.status, machine, &mut writer);
         self.stage += 1;
         more

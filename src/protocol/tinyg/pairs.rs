@@ -2,6 +2,8 @@
 
 use super::Format;
 use super::amend::{is_amended, reported};
+#[cfg(feature = "sd")]
+use super::card::Files;
 use super::json::{self, Kind, Pair};
 use super::notice::put_exception;
 use super::request::{Context, Phase, Request};
@@ -40,6 +42,21 @@ impl Request {
                 self.phase = Phase::Gcode;
             }
             (Target::Operation(Operation::Program), Kind::Null) => self.show_program(&pair, c),
+            #[cfg(feature = "sd")]
+            (Target::Operation(Operation::Files(Files::List)), Kind::Null) => {
+                match self.show_files(&pair, c) {
+                    Ok(()) => {}
+                    Err(Status::Again) => {
+                        self.waits = true;
+                        return;
+                    }
+                    Err(status) => {
+                        self.at = pair.next;
+                        self.open(c);
+                        return self.refuse_pair(&pair, target, status, c);
+                    }
+                }
+            }
             (Target::Operation(Operation::Text), Kind::Text) => {
                 self.at = pair.next;
                 let Err(status) = self.wrap(&pair, c) else { return };

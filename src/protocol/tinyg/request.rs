@@ -16,6 +16,7 @@
 //!   ? -> Listing ---+-> Prompt -> (Failure -> Complaint) -> Message
 //!   $ -> Command -> Listing, One or Help -> Prompt
 //!   defa: Pair -> Greeting -> Pair      er: Pair -> Raise -> Warning      msg: Pair -> Quote -> Pair
+//!   sdl: Pair -> Files -> Pair, Command -> Files -> Prompt
 //!   prog: Pair -> Program -> Pair, Command -> Program -> Prompt
 //!   txt: Pair -> as ? and $ -> Prompt -> Pair, or Pair -> Gcode
 //! ```
@@ -68,6 +69,9 @@ pub(super) enum Phase {
     Help,
     /// Shows the stored program.
     Program,
+    /// Lists the files of the SD card.
+    #[cfg(feature = "sd")]
+    Files,
     /// The defaults have been restored: reports what the firmware is.
     Greeting,
     /// Sends an exception report that was asked for.
@@ -317,6 +321,8 @@ impl Answers for Request {
             Phase::Command => self.command(context),
             Phase::Listing => self.listing(context),
             Phase::Program => self.program(context),
+            #[cfg(feature = "sd")]
+            Phase::Files => self.next_file(context),
             Phase::Help => self.help_line(context),
             Phase::Greeting => self.greeting(context),
             Phase::Raise => self.raise(context),

@@ -83,6 +83,8 @@ rows! {
     #[cfg(feature = "drivers")]
     DriverOpen = 62, "Motor wire seems open";
     CardError = 56, "SD card cannot be read";
+    #[cfg(feature = "card-write")]
+    CardFull = 63, "SD card is full";
     UnrecognizedName = 100, "Unrecognized command or config name";
     MalformedCommand = 101, "Invalid or malformed command";
     BadNumber = 102, "Bad number format";

@@ -41,6 +41,10 @@ impl Telling {
             }
             Notice::Enquiry => Part::Enquiry,
             Notice::Exception(status) => Part::Exception(Exception::begin(status, settings)),
+            #[cfg(feature = "sd")]
+            Notice::FileLine(line, status) => {
+                Part::Exception(Exception::of_line(line, status, settings))
+            }
             Notice::Probing => Part::Probing(Probing::begin(settings)),
             // This dialect has neither start-up lines nor these reports.
             Notice::Startup(..) | Notice::Busy | Notice::Temperatures | Notice::Tuning => {

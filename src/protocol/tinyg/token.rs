@@ -1,11 +1,14 @@
 //! Names in requests and responses: settings, values, groups and actions.
 
+#[cfg(feature = "sd")]
+use super::card::Files;
 #[cfg(feature = "drivers")]
 use super::value::FIRST_DRIVER;
 use super::value::{
     Form, PROBE_STATE, PROBED, SHIFT, SINGLE_COUNT, SINGLES, Single, Source, VECTOR_COUNT, VECTORS,
     Vector, place_form, vector_value,
 };
+use crate::capability::Capability;
 #[cfg(feature = "drivers")]
 use crate::config::drive::DRIVERS;
 use crate::config::name::{LONGEST, Name, axis_letter, axis_of, padded};
@@ -224,7 +227,7 @@ progmem! {
         Token::single(14), Token::single(15), Token::single(4),
     ];
 
-    static ACTIONS: [Verb; 24] = [
+    static ACTIONS: [Verb; ACTION_COUNT] = [
         verb("gc", Operation::Block),
         verb("clear", Operation::Clear),
         verb("clr", Operation::Clear),
@@ -249,8 +252,21 @@ progmem! {
         verb("joga", Operation::Jog),
         verb("boot", Operation::Boot),
         verb("reset", Operation::Reset),
+        #[cfg(feature = "sd")]
+        verb("sdl", Operation::Files(Files::List)),
+        #[cfg(feature = "sd")]
+        verb("sdr", Operation::Files(Files::Run)),
+        #[cfg(feature = "sd")]
+        verb("sdd", Operation::Files(Files::Delete)),
+        #[cfg(feature = "sd")]
+        verb("sdw", Operation::Files(Files::Write)),
+        #[cfg(feature = "sd")]
+        verb("sdx", Operation::Files(Files::Drop)),
     ];
 }
+
+/// The number of actions.
+const ACTION_COUNT: usize = 24 + if Capability::Sd.is_built_in() { 5 } else { 0 };
 
 /// The name of an action, padded with zeros, and its operation.
 #[derive(Clone, Copy)]
@@ -302,6 +318,9 @@ pub enum Operation {
     Boot,
     /// `reset`: restarts the machine.
     Reset,
+    /// `sdl` and so on: files of the SD card.
+    #[cfg(feature = "sd")]
+    Files(Files),
 }
 
 /// A name that stands for several settings or values.

@@ -172,8 +172,10 @@ impl Vector {
 }
 
 /// The number of rows of [`SINGLES`].
-pub const SINGLE_COUNT: usize =
-    49 + if Capability::Printer.is_built_in() { 6 } else { 0 } + DRIVERS;
+pub const SINGLE_COUNT: usize = 49
+    + if Capability::Printer.is_built_in() { 6 } else { 0 }
+    + if Capability::Sd.is_built_in() { 3 } else { 0 }
+    + DRIVERS;
 /// The index of the state of the first driver in [`SINGLES`].
 #[cfg(feature = "drivers")]
 pub const FIRST_DRIVER: u8 = (SINGLE_COUNT - 1 - DRIVERS) as u8;
@@ -302,6 +304,12 @@ progmem! {
         count("inp", of(PROBE), text!("Probe:"), NONE),
         count("ind", of(DOOR), text!("Door:"), NONE),
         count("ine", of(STOP), text!("Emergency stop:"), NONE),
+        #[cfg(feature = "sd")]
+        count("sdu", of(Value::FileUse), text!("File:"), text!("None|Selected|Runs|Is written")),
+        #[cfg(feature = "sd")]
+        count("sdat", of(Value::FileAt), NONE, NONE),
+        #[cfg(feature = "sd")]
+        count("sdof", of(Value::FileLength), NONE, NONE),
         #[cfg(feature = "printer")]
         single("he1t", of(Value::Temperature(0)), Form::Degrees),
         #[cfg(feature = "printer")]

@@ -3,6 +3,8 @@
 use heapless::Vec;
 
 use super::answer::has_room;
+#[cfg(feature = "card-write")]
+use crate::card;
 use crate::gcode::command::Stop;
 use crate::hal::eeprom::Eeprom;
 use crate::jobs::Job;
@@ -87,6 +89,8 @@ pub fn run_block(
         false => late && !is_program_end(block),
     };
     match links.may_feed(port) {
+        #[cfg(feature = "card-write")]
+        true if card::writes() => (links.card.borrow_mut().append(block), true),
         // An empty line asks for nothing.
         true if locked && block.trim_ascii().is_empty() => (Status::Ok, true),
         true if locked => {
@@ -141,6 +145,8 @@ pub fn end_program(links: &Links, resets: bool) {
     // M2 is never refused, not even in an alarm, and changes no table.
     let _ = carry_out(links, b"M2", false);
     if resets {
+        #[cfg(feature = "sd")]
+        links.card.borrow_mut().close();
         links.model.borrow_mut().reset();
         links.changes.note(Changes::ORIGIN);
     }

@@ -97,6 +97,12 @@ pub(super) fn value(view: &mut View<'_>, value: Value) -> i32 {
         Value::Driver(motor) => drivers::watch(motor).state() as i32,
         #[cfg(feature = "drivers")]
         Value::DriverStatus(motor) => drivers::watch(motor).status() as i32,
+        #[cfg(feature = "sd")]
+        Value::FileUse => super::card::file_use(view),
+        #[cfg(feature = "sd")]
+        Value::FileAt => super::card::progress(view).0,
+        #[cfg(feature = "sd")]
+        Value::FileLength => super::card::progress(view).1,
         Value::Kept => view.links.storage.is_done().into(),
         Value::Home => view.home_state(),
         Value::Door if !view.links.signs.door.get() => 0,

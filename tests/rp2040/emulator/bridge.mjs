@@ -1,19 +1,21 @@
 // node bridge.mjs: an emulated board for a program that talks to it over standard input and output. Each line of the input is a request in JSON, each line of
 // the output its answer:
 //
-//   {"board": {"elf": "file", "motors": [[step, dir], ...], "drivers": [address, ...]}, "cut": true, "stick": true, "panic": "file", "crash": "stack", "reset": true, "sense": [[channel, value]], "send": [[port, "hex"]], "now": [[port, byte]], "usb": {"open": bool, "reads": bool}, "faults": [["sleep", ms], ...], "ask": [[byte, ...]], "unmasked": true, "loaded": true, "baud": [[port, rate]], "drive": [[gpio, high]], "wire": [...], "spindle": {"index": gpio, "sync": gpio, "pulses": n}, "noise": {"gpio": gpio, "period": cycles}, "marks": n, "turn": rpm, "drivers": [...], "ails": [{"address": n, "powered": bool, "deaf": bool, "reset": true, "status": bits, "global": bits}], "record": bool, "until": cycle, "line": true}
+//   {"board": {"elf": "file", "motors": [[step, dir], ...], "drivers": [address, ...]}, "cut": true, "stick": true, "panic": "file", "crash": "stack", "reset": true, "sense": [[channel, value]], "send": [[port, "hex"]], "now": [[port, byte]], "usb": {"open": bool, "reads": bool}, "faults": [["sleep", ms], ...], "ask": [[byte, ...]], "unmasked": true, "loaded": true, "baud": [[port, rate]], "drive": [[gpio, high]], "wire": [...], "spindle": {"index": gpio, "sync": gpio, "pulses": n}, "noise": {"gpio": gpio, "period": cycles}, "marks": n, "turn": rpm, "drivers": [...], "ails": [{"address": n, "powered": bool, "deaf": bool, "reset": true, "status": bits, "global": bits}], "card": {"file": "image", "select": gpio, "clock": gpio}, "slot": {"there": bool, "access": us, "keep": "file"}, "record": bool, "until": cycle, "line": true}
 //
 // `board` comes first, and again where another board is to take the place of the one before. Ports are 0 and 1 for the UARTs, and 2 for USB; `usb` says what the program at its other end does, `faults` what goes wrong there (`trouble`), `ask` which requests the computer makes.
 // With `record` edges of steps are recorded from there on, or what has been recorded is told and no more is. With `cut` the supply fails, and comes again; with `stick` the CPU gets stuck. What is sent and driven comes next; then the board runs to the cycle, or, with `line`, to the end of the next line that it says.
+import { readFileSync, writeFileSync } from 'node:fs';
 import { createInterface } from 'node:readline';
 import { Machine } from './machine.mjs';
 import { Motors, Noise, Spindle } from './pins.mjs';
+import { SdCard } from './sdcard.mjs';
 import { Drivers } from './tmc2209.mjs';
 
 const PWM = 0x40050000;
 const FUNCTION_PWM = 4;
 
-let elf, machine, motors, drivers;
+let elf, machine, motors, drivers, card;
 // What the answer tells of edges.
 let recorded;
 
@@ -22,6 +24,13 @@ function powerUp(board) {
   machine = new Machine(elf);
   motors = new Motors(machine, board.motors.map(([step, dir]) => ({ step, dir })));
   drivers = new Drivers(machine, motors, board.drivers);
+}
+
+// Pulls the card or puts it back, and keeps what is on it.
+function handle({ there, access, keep }) {
+  if (there !== undefined) card.isThere = there;
+  if (access !== undefined) card.access = access;
+  if (keep) writeFileSync(keep, card.image);
 }
 
 function act(request) {
@@ -44,6 +53,8 @@ function act(request) {
   if (request.wire) motors.wire(request.wire);
   if (request.drivers) drivers.wire(request.drivers);
   drivers.ail(request.ails ?? []);
+  if (request.card) card = new SdCard(machine, { ...request.card, image: readFileSync(request.card.file) });
+  if (request.slot) handle(request.slot);
   if (request.spindle) machine.spindle = new Spindle(machine, request.spindle);
   if (request.noise) machine.noise = new Noise(machine, request.noise);
   if (request.marks !== undefined) machine.spindle.setMarks(request.marks);

@@ -668,7 +668,7 @@ impl Machine {
 
     /// Puts an SD card with these contents on SPI, if the board has a pin to select it.
     pub fn insert_card(&mut self, image: Vec<u8>, is_high: bool) {
-        let Some(select) = self.board().card else { return };
+        let Some(select) = self.board().card.map(|card| card.select) else { return };
         let card = SdCard::new(image, is_high, self.clock_hz);
         self.bus_mut().spi.add_card(select, card);
         self.probes.push(recorder::attach_select(self.bus, self.cpu, select));

@@ -1,74 +1,12 @@
 //! Prints from an SD card on the chip: files on a card that another program has formatted, steps at the pins, faults
 //! of the card.
 
-use std::io::{Cursor, Read, Seek, SeekFrom, Write};
-
-use fatfs::{FatType, FileSystem, FormatVolumeOptions, FsOptions, format_volume};
+use fatfs::FatType;
 use kerf::boards::RAMPS14;
 use kerf_sim::Machine;
 
 use crate::common::{firmware, printing};
-
-/// Where the partition begins, blocks.
-const FIRST: usize = 63;
-const BLOCK: usize = 512;
-
-/// A part of a file that holds a volume.
-struct Volume<'a>(Cursor<&'a mut [u8]>);
-
-impl Read for Volume<'_> {
-    fn read(&mut self, to: &mut [u8]) -> std::io::Result<usize> {
-        self.0.read(to)
-    }
-}
-
-impl Write for Volume<'_> {
-    fn write(&mut self, from: &[u8]) -> std::io::Result<usize> {
-        self.0.write(from)
-    }
-
-    fn flush(&mut self) -> std::io::Result<()> {
-        Ok(())
-    }
-}
-
-impl Seek for Volume<'_> {
-    fn seek(&mut self, to: SeekFrom) -> std::io::Result<u64> {
-        self.0.seek(to)
-    }
-}
-
-/// A card with a partition and these files.
-fn image(fat: FatType, files: &[(&str, String)]) -> Vec<u8> {
-    // Clusters are small, so that the chain of a file is long.
-    let (kind, blocks, cluster) = match fat {
-        FatType::Fat32 => (0x0C, 80_000, 512),
-        _ => (0x06, 20_000, 1_024),
-    };
-    let mut image = vec![0; (FIRST + blocks) * BLOCK];
-    image[446 + 4] = kind;
-    image[446 + 8..446 + 12].copy_from_slice(&(FIRST as u32).to_le_bytes());
-    image[446 + 12..446 + 16].copy_from_slice(&(blocks as u32).to_le_bytes());
-    image[510..512].copy_from_slice(&[0x55, 0xAA]);
-    let options = FormatVolumeOptions::new().fat_type(fat).bytes_per_cluster(cluster);
-    let mut volume = Volume(Cursor::new(&mut image[FIRST * BLOCK..]));
-    format_volume(&mut volume, options).unwrap();
-    let system = FileSystem::new(volume, FsOptions::new()).unwrap();
-    system.root_dir().create_dir("folder").unwrap();
-    for (name, text) in files {
-        system.root_dir().create_file(name).unwrap().write_all(text.as_bytes()).unwrap();
-    }
-    system.unmount().unwrap();
-    image
-}
-
-/// The names on a card.
-fn names(image: &[u8]) -> Vec<String> {
-    let mut image = image.to_vec();
-    let volume = Volume(Cursor::new(&mut image[FIRST * BLOCK..]));
-    let system = FileSystem::new(volume, FsOptions::new()).unwrap();
-    system.root_dir().iter().map(|entry| entry.unwrap().file_name()).collect()
-}
+use crate::sd_image::{BLOCK, FIRST, image, names};
 
 struct Printer {
     machine: Machine,

@@ -24,6 +24,8 @@ mod pages;
 mod plant;
 #[path = "../../support/position_model.rs"]
 mod position_model;
+#[path = "../../support/sd_image.rs"]
+mod sd_image;
 #[path = "../../support/seeds.rs"]
 mod seeds;
 #[path = "../../support/sender.rs"]

@@ -25,11 +25,12 @@ const DRILLING: [&str; 10] = [
     "steps",
     "words",
 ];
-/// Transcripts that only emulated boards can play. No image for this chip has drivers with UART, built-in jobs, help
+/// Transcripts that only emulated boards can play. No image for this chip has a card in TinyG's dialect, drivers with UART, built-in jobs, help
 /// screens, canned cycles and a second port, cycles that act on the spindle in TinyG's dialect, or both printing hosts and
 /// a second port or TinyG's dialect.
-pub const ELSEWHERE: [&str; 19] = [
+pub const ELSEWHERE: [&str; 20] = [
     "actions",
+    "card",
     "corexy",
     "cycles-back-bore",
     "cycles-bore",

@@ -4,6 +4,7 @@
 //! The program answers each request, a line of JSON, with a line of JSON: see its `bridge.mjs`. Bytes sent and pins
 //! driven here are collected, and passed with the next request to run.
 
+mod card;
 pub mod even;
 pub mod heat;
 pub mod job;
@@ -56,6 +57,10 @@ struct Request {
     turn: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     noise: Option<Noise>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    card: Option<card::Card>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    slot: Option<card::Slot>,
     #[serde(skip_serializing_if = "Option::is_none")]
     record: Option<bool>,
     until: u64,

@@ -1,0 +1,153 @@
+//! The SD card, in the words that grblHAL has for it.
+//!
+//! ```text
+//! $FM        mounts the card
+//! $F         lists its files: [FILE:/PART.NC|SIZE:1234]
+//! $F=NAME    runs a file
+//! $FD=NAME   deletes a file
+//! $FW=NAME   writes a file: the lines of G-code that follow, up to
+//! $FW        which completes it
+//! $FX        gives up what is being written, or ends the file that runs
+//! ```
+//!
+//! The last three are Kerf's own. `$F`, `$F=`, `$FD=` and `$FW=` mount the card first, because it may have been changed.
+
+use super::request::Step;
+use super::status::{BUSY, LOCKED, UNSUPPORTED, error_number};
+use super::write::{close, int, message, text};
+use crate::card::{NAME_MAX, Op};
+use crate::machine::Doing;
+use crate::protocol::{Machine, Out, Value};
+use crate::status::Status;
+use crate::text;
+
+/// The errors of a card that cannot be mounted, and of a file that cannot be read or written.
+const MOUNT: u8 = 60;
+const READ: u8 = 61;
+
+/// The first part behind the mounting.
+const MOUNTED: u8 = 1;
+
+/// What a command does.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Files {
+    /// `$FM`.
+    Mount,
+    /// `$F`.
+    List,
+    /// `$F=`.
+    Run,
+    /// `$FD=`.
+    Delete,
+    /// `$FW=`.
+    Write,
+    /// `$FW`.
+    Finish,
+    /// `$FX`.
+    Drop,
+}
+
+/// Returns what the letters behind a `$` do with files. `None`: something else.
+pub fn of(letters: &[u8]) -> Option<Files> {
+    Some(match letters {
+        [b'F'] => Files::List,
+        [b'F', b'M'] => Files::Mount,
+        [b'F', b'W'] => Files::Finish,
+        [b'F', b'X'] => Files::Drop,
+        [b'F', b'=', ..] => Files::Run,
+        [b'F', b'D', b'=', ..] => Files::Delete,
+        [b'F', b'W', b'=', ..] => Files::Write,
+        _ => return None,
+    })
+}
+
+/// Performs part `at` of a command. `name` is the text behind its `=`.
+#[inline(never)]
+pub fn part(
+    what: Files,
+    at: u8,
+    name: &[u8],
+    machine: &mut impl Machine,
+    out: &mut impl Out,
+) -> Step {
+    let name = name.strip_prefix(b"/").unwrap_or(name);
+    match what {
+        Files::Finish => return done(machine.card(Op::Finish), at, out),
+        Files::Drop => return done(machine.card(Op::Drop), at, out),
+        _ if at == 0 => return mount(machine, what == Files::Mount),
+        _ => {}
+    }
+    match what {
+        Files::List => list(at, machine, out),
+        Files::Run => match machine.card(Op::Open(name)) {
+            Status::Ok => done(machine.card(Op::Print(true)), at, out),
+            status => done(status, at, out),
+        },
+        Files::Delete => done(machine.card(Op::Delete(name)), at, out),
+        Files::Write => done(machine.card(Op::Create(name)), at, out),
+        Files::Mount | Files::Finish | Files::Drop => Step::Error(UNSUPPORTED),
+    }
+}
+
+/// Mounts the card, at rest only. `is_all`: nothing more is to be done.
+fn mount(machine: &mut impl Machine, is_all: bool) -> Step {
+    if matches!(machine.doing(), Doing::Alarm(_)) {
+        return Step::Error(LOCKED);
+    }
+    if machine.doing() != Doing::Rests || machine.value(Value::FileUse) > 1 {
+        return Step::Error(BUSY);
+    }
+    match machine.card(Op::Begin) {
+        Status::Ok if is_all => Step::Done,
+        Status::Ok => Step::Later(MOUNTED),
+        Status::Again => Step::Later(0),
+        _ => Step::Error(MOUNT),
+    }
+}
+
+/// Lists the files, one a part.
+fn list(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Step {
+    match machine.card_entry(at - MOUNTED) {
+        Ok(Some(entry)) if at < u8::MAX => {
+            text(out, text!("[FILE:/"));
+            out.put_all(entry.name.iter().copied().take_while(|letter| *letter != 0));
+            text(out, text!("|SIZE:"));
+            int(out, i32::try_from(entry.size).unwrap_or(i32::MAX));
+            close(out);
+            Step::At(at + 1)
+        }
+        Ok(_) => Step::Done,
+        Err(status) => done(status, at, out),
+    }
+}
+
+fn done(status: Status, at: u8, out: &mut impl Out) -> Step {
+    match status {
+        Status::Ok => Step::Done,
+        Status::Again => Step::Later(at),
+        Status::CardError | Status::UnrecognizedName => Step::Error(READ),
+        #[cfg(feature = "card-write")]
+        Status::CardFull => {
+            message(out, text!("SD card is full"));
+            Step::Error(READ)
+        }
+        status => Step::Error(error_number(status)),
+    }
+}
+
+/// Writes the field of a status report for a file that runs: `|SD:12.5,PART.NC`.
+pub fn field(machine: &mut impl Machine, out: &mut impl Out) {
+    if machine.value(Value::FileUse) < 2 {
+        return;
+    }
+    let (at, of) = (machine.value(Value::FileAt), machine.value(Value::FileLength));
+    let tenths = (i64::from(at) * 1_000 / i64::from(of.max(1))) as i32;
+    text(out, text!("|SD:"));
+    int(out, tenths / 10);
+    out.put(b'.');
+    int(out, tenths % 10);
+    let mut name = [0; NAME_MAX];
+    machine.card_name(&mut name);
+    out.put(b',');
+    out.put_all(name.iter().copied().take_while(|letter| *letter != 0));
+}
