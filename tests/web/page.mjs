@@ -300,6 +300,22 @@ await step('a job is sent to the machine', async () => {
   await shows('#dro-steps', `^${planned.slice(0, 3).join(' ')}$`);
 });
 
+await step('a job is written to the card, listed, run and deleted', async () => {
+  await tab('machine');
+  const before = await steps();
+  await page.click('#card-write');
+  await shows('#card-text', 'SQUARE.GCO has been written');
+  assert.deepEqual(await steps(), before, 'nothing moves while it is written');
+  assert.match(await text('#card-files'), /SQUARE\.GCO, [\d,.\s]+ bytes/);
+  await page.click('[aria-label="Run SQUARE.GCO"]');
+  await shows('#card-text', 'SQUARE.GCO runs');
+  await shows('#log', 'End of file');
+  assert.deepEqual(await steps(), before, 'it ends where it ended before');
+  await page.click('#card-list');
+  await page.click('[aria-label="Delete SQUARE.GCO"]');
+  await shows('#card-text', '^0 files');
+});
+
 await step('a refused line ends a job that is sent, and what is typed meanwhile does not disturb it', async () => {
   await tab('job');
   await job('refused.gcode', `G91\n${'G1 X.1 F600\n'.repeat(40)}G6\n${'G1 X9\n'.repeat(40)}`);

@@ -17,7 +17,8 @@ const SHOWN = 200;
 const LIMITS = { short: (least) => `A move takes at least 0.75 ms: the shortest goes at ${least}` };
 
 export class JobPanel {
-  #job;
+  /// The job: `{ name, text }`; `undefined` if there is none yet.
+  job;
   #worker;
   #began = 0;
   #run = 0;
@@ -33,7 +34,7 @@ export class JobPanel {
     this.zero = ['X', 'Y', 'Z'].map((axis) => h('input', { type: 'number', step: 'any', placeholder: 'auto', 'aria-label': `Work zero ${axis} in machine coordinates, mm` }));
     this.run = h('button', { class: 'primary', id: 'run', type: 'button', disabled: true, onclick: () => this.start() }, 'Run again');
     this.cancel = h('button', { id: 'cancel', type: 'button', hidden: true, onclick: () => this.stop() }, 'Cancel');
-    this.send = h('button', { id: 'send-job', type: 'button', disabled: true, onclick: () => context.sendJob(this.#job) }, 'Send to the machine');
+    this.send = h('button', { id: 'send-job', type: 'button', disabled: true, onclick: () => context.sendJob(this.job) }, 'Send to the machine');
     this.progress = h('progress', { id: 'progress', max: 1, value: 0, 'aria-label': 'Progress of the run' });
     this.progressText = h('span', { class: 'filename' });
     this.busy = h('div', { hidden: true }, this.progress, this.progressText);
@@ -64,7 +65,7 @@ export class JobPanel {
 
   /// Takes a new job, and runs it at once.
   take(name, text) {
-    this.#job = { name, text };
+    this.job = { name, text };
     this.name.textContent = `${name}, ${grouped(text.split('\n').length)} lines`;
     this.run.disabled = false;
     this.send.disabled = false;
@@ -77,7 +78,7 @@ export class JobPanel {
   }
 
   async start() {
-    if (!this.#job) return;
+    if (!this.job) return;
     this.#worker?.terminate();
     this.#worker = undefined;
     const run = (this.#run += 1);
@@ -96,7 +97,7 @@ export class JobPanel {
       else this.#ended(data);
     };
     worker.onerror = (event) => this.#ended({ error: event.message || 'the run has failed' });
-    const { text } = this.#job;
+    const { text } = this.job;
     worker.postMessage({ module: this.context.module, job: { text, eeprom, settings, zero: this.#zero() } });
   }
 
@@ -130,7 +131,7 @@ export class JobPanel {
       return;
     }
     this.#show(result);
-    this.context.onResult(result, this.#job.name);
+    this.context.onResult(result, this.job.name);
   }
 
   #show(result) {

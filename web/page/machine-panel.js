@@ -5,6 +5,7 @@
 // press. Positions and the state are those that the machine reports (`sr`). Steps are those at a simulated machine's
 // pins. Keys jog only while the jog buttons have the focus.
 
+import { CardPanel } from './card-panel.js';
 import { INPUTS } from './firmware.js';
 import { STATES, parse } from './protocol.js';
 import { byId, grouped, h, say } from './dom.js';
@@ -36,9 +37,10 @@ export class MachinePanel {
   #history = [];
   #back = 0;
 
-  /// `context` has `codes`, `machines`, `onState(state)`.
+  /// `context` has `codes`, `machines`, `job()`, `onState(state)`.
   constructor(pane, context) {
     this.context = context;
+    this.card = new CardPanel(context);
     const field = (id, name, control) => h('div', { class: 'field' }, h('label', { for: id }, name), control);
     this.dro = Object.fromEntries(['x', 'y', 'z'].map((axis) => [axis, h('dd', { id: `dro-${axis}` }, '0.000')]));
     this.velocity = h('dd', { id: 'dro-vel' }, '0');
@@ -61,6 +63,7 @@ export class MachinePanel {
         act('Reset', RESET, 'Starts the board anew (^x): the position is lost', 'danger')),
       h('div', {}, h('h2', {}, 'Overrides'), h('div', { class: 'over' }, ...this.#override('Feed', 'mfo', 10, 200), ...this.#override('Rapid', 'mto', 10, 100), ...this.#override('Spindle', 'sso', 10, 200))),
       this.#jogging(),
+      this.card.view,
       this.#simulation(field));
     byId('talk').append(this.#terminal());
   }
@@ -204,6 +207,7 @@ export class MachinePanel {
   /// Connects the panel to this board.
   use(board) {
     this.#board = board;
+    this.card.use(board);
     this.simulated.hidden = !board.simulated;
     board.on('line', ({ line, asked }) => this.#heard(line, asked));
     board.on('sent', (line) => this.#write('out', line));

@@ -4,7 +4,7 @@
 // |---|---|
 // | `boards.js` | the connected machine, simulated or real |
 // | `job-panel.js` | a job and its dry run in `job-worker.js` |
-// | `machine-panel.js` | controls and terminal |
+// | `machine-panel.js`, `card-panel.js` | controls and terminal; the files of its SD card |
 // | `verify-panel.js`, `verify.js` | the checks of a real board |
 // | `settings-panel.js`, `settings-file.js` | settings as a form and as a file |
 // | `view.js`, `charts.js` | path and curves |
@@ -231,6 +231,7 @@ async function start() {
   const machinePanel = new MachinePanel(byId('pane-machine'), {
     codes,
     machines: tables.machines,
+    job: () => jobPanel.job,
     onState: (stat) => showLink(`${page.board.name}: ${STATES[stat] ?? stat}`, { 2: 'bad', 11: 'bad', 13: 'bad', 6: 'warn' }[stat]),
     onBoot: () => booted(page.board, machinePanel),
   });

@@ -37,12 +37,9 @@ impl Bench {
     pub fn boot(contents: &[u8], asked: bool) -> Option<Self> {
         eeprom::put(contents);
         watchdog::set_cause(if asked { Cause::Asked } else { Cause::PowerOn });
-        Some(Self {
-            machine: Machine::boot(BAUD)?,
-            heard: Default::default(),
-            samples: None,
-            ranges: Default::default(),
-        })
+        let machine = Machine::boot(BAUD)?;
+        machine.insert_card(Some(crate::card::empty()));
+        Some(Self { machine, heard: Default::default(), samples: None, ranges: Default::default() })
     }
 
     /// Puts bytes on the line of a port. Bytes for any other port than 0 and 1 are dropped.

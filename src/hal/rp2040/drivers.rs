@@ -6,6 +6,9 @@
 //! takes a step each millisecond in which the line is free. Nothing waits: all bytes of a step find room in the UART's
 //! FIFOs. After the start the first [`FIRST_STEPS`] follow each other as closely. A late call delays the next step. An
 //! answer that is damaged, or does not come, counts as missed. Cost: 2,000 cycles a step.
+//!
+//! `embassy-rp`'s `BufferedUart` is not used: it takes an interrupt each 32 bytes and two rings for what fits the UART's
+//! FIFOs, and its pins are types.
 
 use core::cell::Cell;
 use core::sync::atomic::{AtomicU32, Ordering};

@@ -3,6 +3,9 @@
 //! A reading is [`SAMPLES`] conversions of 12 bits one after the other, 2 us each. Their sum is scaled as if each had
 //! 10 bits. [`begin`] waits for them, 64 us of thread mode each 20 ms: no interrupt, and nobody else uses the
 //! converter. If the converter does not answer, there is no reading.
+//!
+//! `embassy-rp`'s `Adc` is not used: its `blocking_read` waits without end for a converter that does not answer, and its
+//! pins are types.
 
 use core::sync::atomic::{AtomicU16, Ordering};
 

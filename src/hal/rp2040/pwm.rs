@@ -2,6 +2,9 @@
 //!
 //! The pin is high while the count is below the compare value; a new value takes effect with the next period. Exec,
 //! or thread mode while exec cannot run. On a board without a PWM output nothing happens.
+//!
+//! `embassy-rp`'s `Pwm` is not used: its pin and its slice are types, and here they are data of the board. Its
+//! `set_config` writes both channels and the top anew with each share, and panics at a divider that is too large.
 
 use embassy_rp::pac::PWM;
 

@@ -2,6 +2,9 @@
 //!
 //! After [`start`] the firmware has [`TIME_US`] between two calls of [`feed`]; if it is late, the chip resets. A
 //! scratch register, which this reset does not clear, keeps a [`Mark`]. After a reset all pins are inputs.
+//!
+//! `embassy-rp`'s `Watchdog` is not used: its `feed` wants the only reference to it, and two levels feed here, with one
+//! store.
 
 use embassy_rp::pac::watchdog::regs::Load;
 use embassy_rp::pac::{PSM, VREG_AND_CHIP_RESET, WATCHDOG};

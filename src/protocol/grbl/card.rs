@@ -74,6 +74,7 @@ pub fn part(
     match what {
         Files::Finish => return done(machine.card(Op::Finish), at, out),
         Files::Drop => return done(machine.card(Op::Drop), at, out),
+        Files::Run if matches!(machine.doing(), Doing::Alarm(_)) => return Step::Error(LOCKED),
         _ if at == 0 => return mount(machine, what == Files::Mount),
         _ => {}
     }
@@ -89,12 +90,10 @@ pub fn part(
     }
 }
 
-/// Mounts the card, at rest only. `is_all`: nothing more is to be done.
+/// Mounts the card, at rest or in an alarm. `is_all`: nothing more is to be done.
 fn mount(machine: &mut impl Machine, is_all: bool) -> Step {
-    if matches!(machine.doing(), Doing::Alarm(_)) {
-        return Step::Error(LOCKED);
-    }
-    if machine.doing() != Doing::Rests || machine.value(Value::FileUse) > 1 {
+    let rests = matches!(machine.doing(), Doing::Rests | Doing::Alarm(_));
+    if !rests || machine.value(Value::FileUse) > 1 {
         return Step::Error(BUSY);
     }
     match machine.card(Op::Begin) {

@@ -74,12 +74,13 @@ impl Request {
         of(status)
     }
 
-    /// Mounts the card, at rest only.
+    /// Mounts the card, at rest or in an alarm.
     pub(super) fn mount(&mut self, machine: &mut impl Machine) -> Result<(), Status> {
         if self.item == MOUNTED {
             return Ok(());
         }
-        if machine.doing() != Doing::Rests || machine.value(Value::FileUse) > 1 {
+        let rests = matches!(machine.doing(), Doing::Rests | Doing::Alarm(_));
+        if !rests || machine.value(Value::FileUse) > 1 {
             return Err(Status::NotAccepted);
         }
         of(machine.card(Op::Begin))?;

@@ -35,6 +35,8 @@ mod pulses;
 mod recorder;
 pub mod report;
 mod runs;
+#[path = "../../support/sd_image.rs"]
+pub mod sd_image;
 pub mod second;
 mod speech;
 pub mod spi;

@@ -6,7 +6,7 @@ use kerf::boards::RAMPS14;
 use kerf_sim::Machine;
 
 use crate::common::{firmware, printing};
-use crate::sd_image::{BLOCK, FIRST, image, names};
+use kerf_sim::sd_image::{BLOCK, FIRST, image, names};
 
 struct Printer {
     machine: Machine,

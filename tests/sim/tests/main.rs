@@ -24,8 +24,6 @@ mod pages;
 mod plant;
 #[path = "../../support/position_model.rs"]
 mod position_model;
-#[path = "../../support/sd_image.rs"]
-mod sd_image;
 #[path = "../../support/seeds.rs"]
 mod seeds;
 #[path = "../../support/sender.rs"]
@@ -69,6 +67,7 @@ mod openings;
 mod overrides;
 mod pico;
 mod pico_bench;
+mod pico_card;
 mod pico_drivers;
 mod pico_usb;
 mod pico_usb_faults;

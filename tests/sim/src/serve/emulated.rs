@@ -8,11 +8,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use anyhow::Result;
+use fatfs::FatType;
 use kerf::boards::Board;
 use kerf::boards::inputs::{ENDS, PROBE};
 use kerf_sim::emulated::heat::Heat;
 use kerf_sim::emulated::{Emulated, Near, Talks, job};
 use kerf_sim::mechanics::{Axis, Build};
+use kerf_sim::sd_image::image;
 use kerf_sim::{Runs, USB};
 
 use super::{MAX_LAG, SLICE_MS, TICK, wait, with_plate};
@@ -81,6 +83,9 @@ impl Server {
     fn new(args: &ServeArgs, board: &'static Board) -> Result<Self> {
         let mut emulated = Emulated::load(&args.target.elf, board)?;
         emulated.wire(&switches(&with_plate(Build::of(board)), board));
+        if board.card.is_some() {
+            emulated.insert_card(&image(FatType::Fat16, &[]))?;
+        }
         emulated.session(Talks { open: false, reads: true });
         let mut pty = Pty::new()?;
         if let Some(link) = &args.link {
