@@ -355,6 +355,43 @@ fn fill(mut session: Session, card: &[u8]) {
     assert!(lost(&now) > 0);
 }
 
+/// A percent sign is a character that acts at once in two dialects, and the first line of many files.
+#[test]
+fn a_percent_sign_spoils_no_upload() {
+    for_all(&[], |mut session, card| {
+        let dialect = session.dialect;
+        session.say(&dialect.write("B.NC"));
+        session.machine.send(b"%\n");
+        session.run(200);
+        session.heard.clear();
+        session.say("G1 X1 F600");
+        session.machine.send(b"%\n");
+        session.run(200);
+        session.heard.clear();
+        session.say(dialect.finish());
+        let found = text(&session.card(&card), "B.NC").unwrap();
+        assert!(found.contains("G1 X1 F600\n"), "{dialect:?}: {found}");
+    });
+}
+
+/// While one port uploads, G-code of the other is refused.
+#[test]
+fn another_port_does_not_write_into_the_file() {
+    for_all(&[], |mut session, card| {
+        let dialect = session.dialect;
+        session.say(&dialect.write("B.NC"));
+        session.say("G1 X1 F600");
+        session.machine.send_aux(b"G1 X9 F600\n");
+        session.run(300);
+        let told = String::from_utf8_lossy(&session.machine.received_aux()).into_owned();
+        session.say("G1 X2 F600");
+        session.say(dialect.finish());
+        let found = text(&session.card(&card), "B.NC");
+        assert_eq!(found.as_deref(), Some("G1 X1 F600\nG1 X2 F600\n"), "{dialect:?}: {told}");
+        assert_eq!(session.steps(), [0, 0], "{dialect:?}: {told}");
+    });
+}
+
 /// A refused line ends a file of a machine tool, and is named.
 #[test]
 fn a_refused_line_ends_the_file() {

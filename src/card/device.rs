@@ -30,6 +30,8 @@ const WRITE_MS: u32 = 250;
 /// The number of bytes within which an answer comes, and the number of bytes that are checked for a block at once.
 const ANSWER: u8 = 10;
 const LOOKS: u8 = 8;
+/// How many times it is looked for after the longest time.
+const LAST_LOOKS: u8 = 8;
 /// The byte that begins a block.
 const START: u8 = 0xFE;
 /// Bits of an answer.
@@ -245,11 +247,15 @@ impl Device {
 
     fn fetch(&mut self, block: u32, place: &mut [u8; BLOCK], patient: bool) -> Result<(), Fault> {
         let since = self.ask(block, patient)?;
+        // Nobody may have looked for a long time, so the last looks come after it.
+        let mut looks = LAST_LOOKS;
         loop {
             match (0..LOOKS).map(|_| card::exchange(0xFF)).find(|byte| *byte != 0xFF) {
                 Some(START) => break,
                 Some(_) => return Err(Fault::Failed),
-                None if millis().wrapping_sub(since) > BLOCK_MS => return Err(Fault::Failed),
+                None if millis().wrapping_sub(since) > BLOCK_MS => {
+                    looks = looks.checked_sub(1).ok_or(Fault::Failed)?;
+                }
                 None if !patient => return Err(Fault::Later),
                 None => {}
             }
@@ -270,7 +276,8 @@ impl Device {
         from.iter().for_each(|byte| _ = card::exchange(*byte));
         card::exchange(0xFF);
         card::exchange(0xFF);
-        if card::exchange(0xFF) & 0x1F != 5 {
+        let taken = (0..ANSWER).map(|_| card::exchange(0xFF)).find(|byte| *byte != 0xFF);
+        if taken.is_none_or(|byte| byte & 0x1F != 5) {
             return Err(Fault::Failed);
         }
         self.writes = Some(millis());

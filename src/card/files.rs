@@ -13,7 +13,7 @@ use crate::capability::Capability;
 use crate::status::Status;
 
 /// The longest line, without what is behind a `;`.
-pub const LINE_MAX: usize = if Capability::CardWrite.is_built_in() { 250 } else { 80 };
+pub const LINE_MAX: usize = if Capability::CardWrite.is_built_in() { 254 } else { 80 };
 /// The most bytes that are read at once.
 const PIECE: usize = 40;
 /// The most clusters over which the chain of a file is followed at once.

@@ -5,14 +5,18 @@ use core::cell::{Cell, RefCell};
 use std::collections::{HashMap, VecDeque};
 use std::vec::Vec;
 
+use super::time::millis;
+
 /// The blocks of a card that are not all 0.
 pub type Blocks = HashMap<u32, [u8; 512]>;
 
 /// The byte that begins a block, and the answer to a block that was written.
 const START: u8 = 0xFE;
 const TAKEN: u8 = 0xE5;
-/// For how many bytes a card is busy with a block.
+/// For how many bytes a card is busy with a block, and for how many milliseconds at most. Time stands still for a reader
+/// that does nothing else.
 const BUSY: u32 = 40;
+const BUSY_MS: u32 = 20;
 /// Bytes before a block: a reader without patience does not find it at once.
 const WAIT: [u8; 12] = [0xFF; 12];
 
@@ -24,8 +28,8 @@ struct Card {
     writes: Cell<Option<u32>>,
     answer: RefCell<VecDeque<u8>>,
     reads: Cell<u32>,
-    /// For how many bytes the card is busy.
-    busy: Cell<u32>,
+    /// For how many bytes the card is busy, and since when, ms.
+    busy: Cell<(u32, u32)>,
 }
 
 machine_static! {
@@ -35,7 +39,7 @@ machine_static! {
         writes: Cell::new(None),
         answer: RefCell::new(VecDeque::new()),
         reads: Cell::new(0),
-        busy: Cell::new(0),
+        busy: Cell::new((0, 0)),
     };
 }
 
@@ -71,9 +75,10 @@ pub fn set_fast(_: bool) {}
 pub fn exchange(byte: u8) -> u8 {
     let mut blocks = card().blocks.borrow_mut();
     let Some(blocks) = blocks.as_mut() else { return 0xFF };
-    let busy = card().busy.get();
-    let none = if busy > 0 { 0 } else { 0xFF };
-    card().busy.set(busy.saturating_sub(1));
+    let (busy, since) = card().busy.get();
+    let is_busy = busy > 0 && millis().wrapping_sub(since) < BUSY_MS;
+    let none = if is_busy { 0 } else { 0xFF };
+    card().busy.set((busy.saturating_sub(1), since));
     let answer = card().answer.borrow_mut().pop_front().unwrap_or(none);
     let mut taken = card().taken.borrow_mut();
     let is_idle = taken.is_empty();
@@ -87,7 +92,7 @@ pub fn exchange(byte: u8) -> u8 {
         contents.copy_from_slice(&taken[1..513]);
         blocks.insert(block, contents);
         card().answer.borrow_mut().push_back(TAKEN);
-        card().busy.set(BUSY);
+        card().busy.set((BUSY, millis()));
         card().writes.set(None);
         taken.clear();
     } else if card().writes.get().is_none() && taken.len() == 6 {

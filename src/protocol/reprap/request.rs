@@ -112,7 +112,7 @@ impl Request {
 /// Whether a line is carried out even while lines are written to a file.
 #[small]
 fn passes(code: Option<Code>, frame: &Frame, line: &[u8]) -> bool {
-    matches!(code, Some((b'M', 28 | 29 | 110))) || command::overtakes(frame, line)
+    matches!(code, Some((b'M', 28 | 29 | 110 | 999))) || command::overtakes(frame, line)
 }
 
 /// Returns how a line is carried out.

@@ -11,6 +11,11 @@ use crate::status::Status;
 #[small]
 #[inline(always)]
 pub(super) fn card(view: &mut View<'_>, what: Op<'_>) -> Status {
+    // Its lines come from this port's sender from now on.
+    let feeds = matches!(what, Op::Print(true) | Op::Create(_));
+    if feeds && !view.may_feed() {
+        return Status::Muted;
+    }
     let mut card = view.links.card.borrow_mut();
     let disturbs =
         !matches!(what, Op::Print(_) | Op::Seek(_) | Op::Append(_) | Op::Finish | Op::Drop);
