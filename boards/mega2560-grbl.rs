@@ -25,9 +25,8 @@ pub const MEGA2560_GRBL: Board = Board {
         USB,
         Serial {
             usart: Usart::U1,
-            rate: 115_200,
             handshake: Some(Handshake { rts: pin(A, 0), cts: pin(A, 1) }),
-            driver_enable: None,
+            ..USB
         },
     ],
     inputs: [

@@ -35,10 +35,7 @@ pub const PICO: Board = Board {
     outputs: [Some(gp(26)), Some(gp(27)), Some(gp(17)), Some(gp(16))],
     pwm: Some(Pwm { timer: Timer::Slices, channel: 15 }),
     // USB; then transmit GP0, receive GP1
-    serial: &[
-        NATIVE_USB,
-        Serial { usart: Usart::Uart0, rate: 115_200, handshake: None, driver_enable: None },
-    ],
+    serial: &[NATIVE_USB, Serial { usart: Usart::Uart0, ..NATIVE_USB }],
     inputs: [
         // One switch input for both ends of an axis
         Some(gp(11)),

@@ -38,10 +38,7 @@ pub const SKR_PICO: Board = Board {
     outputs: [Some(gp(20)), None, None, None],
     pwm: Some(Pwm { timer: Timer::Slices, channel: 29 }),
     // USB; then transmit GP0, receive GP1
-    serial: &[
-        NATIVE_USB,
-        Serial { usart: Usart::Uart0, rate: 115_200, handshake: None, driver_enable: None },
-    ],
+    serial: &[NATIVE_USB, Serial { usart: Usart::Uart0, ..NATIVE_USB }],
     inputs: [
         // X-STOP, Y-STOP, Z-STOP: one switch input for both ends of an axis
         Some(gp(4)),

@@ -18,6 +18,10 @@ mod mega2560_lathe;
 mod pico;
 #[path = "../boards/pico6.rs"]
 mod pico6;
+#[path = "../boards/picobob.rs"]
+mod picobob;
+#[path = "../boards/picohal.rs"]
+mod picohal;
 #[path = "../boards/ramps14.rs"]
 mod ramps14;
 #[path = "../boards/ramps14-cnc.rs"]
@@ -36,6 +40,8 @@ pub use mega2560_grbl_lathe::MEGA2560_GRBL_LATHE;
 pub use mega2560_lathe::MEGA2560_LATHE;
 pub use pico::PICO;
 pub use pico6::PICO6;
+pub use picobob::PICOBOB;
+pub use picohal::PICOHAL;
 pub use ramps14::RAMPS14;
 pub use ramps14_cnc::RAMPS14_CNC;
 pub use skr_pico::SKR_PICO;
@@ -81,10 +87,16 @@ macro_rules! each_motor {
 pub(crate) use each_motor;
 
 /// Calls the macro `$call` with the tokens that follow and the numbers of all motors.
-#[cfg(not(feature = "board-pico6"))]
+#[cfg(not(any(feature = "board-pico6", feature = "board-picobob")))]
 macro_rules! motor_numbers {
     ($call:ident, $($given:tt)*) => {
         $call!($($given)*; 0 1 2 3)
+    };
+}
+#[cfg(feature = "board-picobob")]
+macro_rules! motor_numbers {
+    ($call:ident, $($given:tt)*) => {
+        $call!($($given)*; 0 1 2 3 4)
     };
 }
 #[cfg(feature = "board-pico6")]
@@ -128,8 +140,8 @@ pub struct Board {
     pub pwm: Option<Pwm>,
     /// The serial ports: [`USB`], and a second one if there is room for it.
     pub serial: &'static [Serial],
-    /// Switches between a pin and ground, indexed as in [`inputs`]. One pin may serve both ends of an axis. Each pin
-    /// must be able to interrupt: see [`Pin::interrupt`].
+    /// Switches between a pin and ground, indexed as in [`inputs`]. One pin may serve both ends of an axis, and on an
+    /// RP2040 those of several axes. Each pin must be able to interrupt: see [`Pin::interrupt`].
     pub inputs: [Option<Pin>; inputs::COUNT],
     /// The sensors of the spindle. Timer 5 takes the time of their pulses.
     pub encoder: Option<Encoder>,
@@ -177,6 +189,15 @@ impl Board {
         bits
     }
 
+    /// Returns the ends of axes, as bits, that are at the pins of the ends `of`. Cost: 64 comparisons.
+    pub fn ends_beside(&self, of: u8) -> u8 {
+        let ends = || self.inputs.iter().take(inputs::ENDS).enumerate();
+        let asked = |(end, _): &(usize, &Option<Pin>)| of & 1 << *end != 0;
+        let is_there =
+            |pin: &Option<Pin>| pin.is_some() && ends().filter(asked).any(|(_, p)| p == pin);
+        ends().fold(of, |bits, (end, pin)| bits | u8::from(is_there(pin)) << end)
+    }
+
     /// Whether the board has a device on the SPI of the ATmega2560.
     pub const fn has_spi(&self) -> bool {
         let has_card = match self.card {
@@ -207,12 +228,14 @@ impl Board {
 }
 
 /// Every board that Kerf supports.
-pub const ALL: [&Board; 8] = [
+pub const ALL: [&Board; 10] = [
     &MEGA2560_GRBL,
     &MEGA2560_GRBL_LATHE,
     &MEGA2560_LATHE,
     &PICO,
     &PICO6,
+    &PICOBOB,
+    &PICOHAL,
     &RAMPS14,
     &RAMPS14_CNC,
     &SKR_PICO,
@@ -250,6 +273,12 @@ pub const ACTIVE: &Board = &PICO;
 #[cfg(feature = "board-pico6")]
 pub const ACTIVE: &Board = &PICO6;
 /// The board that this image is built for.
+#[cfg(feature = "board-picobob")]
+pub const ACTIVE: &Board = &PICOBOB;
+/// The board that this image is built for.
+#[cfg(feature = "board-picohal")]
+pub const ACTIVE: &Board = &PICOHAL;
+/// The board that this image is built for.
 #[cfg(feature = "board-skr-pico")]
 pub const ACTIVE: &Board = &SKR_PICO;
 /// The board that this image is built for.
@@ -260,6 +289,8 @@ pub const ACTIVE: &Board = &SKR_PICO;
     feature = "board-mega2560-lathe",
     feature = "board-pico",
     feature = "board-pico6",
+    feature = "board-picobob",
+    feature = "board-picohal",
     feature = "board-skr-pico"
 )))]
 pub const ACTIVE: &Board = &MEGA2560_GRBL;

@@ -142,13 +142,15 @@ const OTHER: [&str; 35] = [
 const MADE: [&str; 2] = ["docs/gcode.md", "docs/settings.md"];
 
 /// Pages name settings and values by names that the machine knows: whole names, or names without axis, motor or
-/// group.
+/// group. Motors 5 and 6, which only some boards have, have the settings of motor 1.
 #[test]
 fn names_in_pages_are_known() {
     let known: HashSet<String> = names().into_iter().collect();
     let prefixes = ["", "x", "a", "1", "p1", "sp", "co", "sq", "pos", "in", "g54"];
     let is_known = |span: &str| {
-        prefixes.iter().any(|prefix| known.contains(&format!("{prefix}{span}")))
+        let of_motor_1 = span.strip_prefix(['5', '6']).map(|name| format!("1{name}"));
+        of_motor_1.is_some_and(|name| known.contains(&name))
+            || prefixes.iter().any(|prefix| known.contains(&format!("{prefix}{span}")))
             || known.iter().any(|name| name[..name.len() - 1] == *span)
             || kerf::boards::by_name(span).is_some()
             || OTHER.contains(&span)

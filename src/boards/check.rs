@@ -21,8 +21,8 @@ const OTHER_PINS: usize = 1 + 8 + 1 + inputs::COUNT + 2 + SPI.len() + 3 + 1;
 const MAX_PINS: usize = 3 * MOST_MOTORS + MAX_PORTS * SERIAL_PINS + OTHER_PINS;
 
 impl Serial {
-    const fn pins(&self) -> [Option<Pin>; SERIAL_PINS] {
-        let (rx, tx) = match self.usart.pins() {
+    const fn all_pins(&self) -> [Option<Pin>; SERIAL_PINS] {
+        let (rx, tx) = match self.line() {
             Some([rx, tx]) => (Some(rx), Some(tx)),
             None => (None, None),
         };
@@ -33,9 +33,20 @@ impl Serial {
         [rx, tx, self.driver_enable, rts, cts]
     }
 
-    /// Panics if the driver-enable, RTS or CTS pin is on a port that single-bit instructions cannot reach.
+    /// Panics if the driver-enable, RTS or CTS pin is on a port that single-bit instructions cannot reach, or if the UART
+    /// is not on its pins (RP2040 data sheet, 2.19.2): it receives on each fourth pin from GP1, and sends on the pin
+    /// before that one.
     const fn check(&self) {
-        let pins = self.pins();
+        if let Some([rx, tx]) = self.pins {
+            let number = match self.usart {
+                Usart::Uart0 => 0,
+                Usart::Uart1 => 1,
+                _ => panic!("the pins of this serial port are fixed"),
+            };
+            let is_its = (tx.bit + 4) / 8 % 2 == number && tx.bit.is_multiple_of(4);
+            assert!(is_its && rx.bit == tx.bit + 1, "a serial port is not on pins of its UART");
+        }
+        let pins = self.all_pins();
         let mut i = 2;
         while i < SERIAL_PINS {
             if let Some(pin) = pins[i] {
@@ -100,7 +111,7 @@ impl Board {
         let mut s = 0;
         while s < self.serial.len() {
             self.serial[s].check();
-            let own = self.serial[s].pins();
+            let own = self.serial[s].all_pins();
             let mut o = 0;
             while o < SERIAL_PINS {
                 pins[n] = own[o];
@@ -111,7 +122,7 @@ impl Board {
         }
         let mut s = 0;
         while s < inputs::COUNT {
-            pins[n] = if self.is_shared_end(s) { None } else { self.inputs[s] };
+            pins[n] = if self.shares_earlier_end(s) { None } else { self.inputs[s] };
             n += 1;
             s += 1;
         }
@@ -146,15 +157,24 @@ impl Board {
         }
     }
 
-    /// Whether this input is the upper end of an axis and shares the pin of the lower end.
-    const fn is_shared_end(&self, input: usize) -> bool {
-        if input >= inputs::ENDS || input.is_multiple_of(2) {
+    /// Whether this input is an end of an axis and shares the pin of an end before it: of the lower end of its axis, or,
+    /// on an RP2040, of another axis.
+    const fn shares_earlier_end(&self, input: usize) -> bool {
+        if input >= inputs::ENDS {
             return false;
         }
-        match (self.inputs[input - 1], self.inputs[input]) {
-            (Some(min), Some(max)) => min.is(max),
-            _ => false,
+        let Some(pin) = self.inputs[input] else { return false };
+        let is_rp2040 = matches!(pin.port, Port::Gpio);
+        let mut end = if is_rp2040 { 0 } else { input - input % 2 };
+        while end < input {
+            if let Some(other) = self.inputs[end]
+                && other.is(pin)
+            {
+                return true;
+            }
+            end += 1;
         }
+        false
     }
 
     /// Panics if the timer of the spindle's PWM has another user, or has no such output.

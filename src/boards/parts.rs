@@ -121,7 +121,7 @@ impl Usart {
         }
     }
 
-    /// Returns the pins of receiver and transmitter. `None` for USB, which has dedicated pins.
+    /// Returns the usual pins of receiver and transmitter. `None` for USB, which has dedicated pins.
     pub const fn pins(self) -> Option<[Pin; 2]> {
         Some(match self {
             Usart::U0 => [pin(Port::E, 0), pin(Port::E, 1)],
@@ -148,6 +148,8 @@ pub struct Handshake {
 pub struct Serial {
     /// The USART behind it.
     pub usart: Usart,
+    /// Its receiver and its transmitter, where they are not on the usual pins ([`Usart::pins`]): on the RP2040.
+    pub pins: Option<[Pin; 2]>,
     /// The rate at power-up, in bits a second. On the port to USB it can be changed (`{baud:n}`).
     pub rate: u32,
     /// The pins for flow control.
@@ -157,9 +159,19 @@ pub struct Serial {
     pub driver_enable: Option<Pin>,
 }
 
+impl Serial {
+    /// Returns the pins of receiver and transmitter. `None` for USB.
+    pub const fn line(&self) -> Option<[Pin; 2]> {
+        match self.pins {
+            None => self.usart.pins(),
+            own => own,
+        }
+    }
+}
+
 /// The first port of every board with an ATmega2560: USART0, which is USB on most.
 pub const USB: Serial =
-    Serial { usart: Usart::U0, rate: 115_200, handshake: None, driver_enable: None };
+    Serial { usart: Usart::U0, pins: None, rate: 115_200, handshake: None, driver_enable: None };
 
 /// The first port of every board with an RP2040: its USB, which has no bit rate.
 pub const NATIVE_USB: Serial = Serial { usart: Usart::Usb, ..USB };

@@ -75,6 +75,28 @@ fn ends_of_two_axes_may_not() {
 }
 
 #[test]
+fn ends_of_axes_share_a_pin_on_an_rp2040() {
+    let beside = |ends| PICOBOB.ends_beside(ends);
+    assert_eq!([0b11, 0b1100, 0b1_0000, 0].map(beside), [0b11_0011, 0b1100, 0b11_0011, 0]);
+    // Ends without a pin are beside nobody.
+    assert_eq!(SKR_PICO.ends_beside(0b100_0000), 0b100_0000);
+}
+
+#[test]
+#[should_panic(expected = "not on pins of its UART")]
+fn a_uart_has_its_pins() {
+    const OFF: Serial = Serial { usart: Usart::Uart0, pins: Some([gp(9), gp(8)]), ..NATIVE_USB };
+    Board { serial: &[NATIVE_USB, OFF], ..PICOHAL }.check();
+}
+
+#[test]
+#[should_panic(expected = "the pins of this serial port are fixed")]
+fn the_pins_of_a_usart_are_fixed() {
+    const MOVED: Serial = Serial { pins: Some([pin(Port::A, 0), pin(Port::A, 1)]), ..USB };
+    Board { serial: &[MOVED], ..MEGA2560_GRBL }.check();
+}
+
+#[test]
 #[should_panic(expected = "switch of this board cannot interrupt")]
 fn a_switch_must_interrupt() {
     let mut board = RAMPS14;

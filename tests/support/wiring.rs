@@ -1,6 +1,6 @@
 //! `docs/wiring.md` and its drawings, from the boards' files.
 
-use kerf::boards::{ALL, Board, MOTORS, Pin, Port, gp, inputs};
+use kerf::boards::{ALL, Board, Pin, Port, gp, inputs};
 
 const PREFACE: &str = "\
 # Wiring
@@ -88,24 +88,17 @@ fn wires(board: &Board) -> Vec<Wire> {
     let mut add = |what: String, pin: Option<Pin>, level, setting: String| {
         wires.extend(pin.map(|pin| Wire { what, pin, level, setting }));
     };
-    for m in 0..MOTORS {
-        let (n, pins) = (m + 1, board.motors[m]);
-        let axis = ["X", "Y", "Z", "A"][m];
-        add(
-            format!("motor {n} ({axis}), step"),
-            Some(pins.step),
-            "rising edge",
-            format!("`{n}sp`"),
-        );
-        add(
-            format!("motor {n} ({axis}), direction"),
-            Some(pins.dir),
-            "low is +",
-            format!("`{n}po`"),
-        );
-        add(format!("motor {n} ({axis}), enable"), pins.enable, "low is on", format!("`{n}pm`"));
+    for (n, pins) in (1..).zip(board.motors) {
+        let motor = match ["X", "Y", "Z", "A"].get(n - 1) {
+            Some(axis) => format!("motor {n} ({axis})"),
+            None => format!("motor {n}"),
+        };
+        add(format!("{motor}, step"), Some(pins.step), "rising edge", format!("`{n}sp`"));
+        add(format!("{motor}, direction"), Some(pins.dir), "low is +", format!("`{n}po`"));
+        add(format!("{motor}, enable"), pins.enable, "low is on", format!("`{n}pm`"));
     }
-    add("all motors, enable".into(), board.enable_all, "low is on", "`1pm` to `4pm`".into());
+    let powers = format!("`1pm` to `{}pm`", board.motors.len());
+    add("all motors, enable".into(), board.enable_all, "low is on", powers);
     let outputs = [
         ("spindle, on", "high is on", "`spep`"),
         ("spindle, direction", "high is counter-clockwise", "`spdp`"),
@@ -133,6 +126,10 @@ fn wires(board: &Board) -> Vec<Wire> {
     add("probe".into(), board.inputs[inputs::PROBE], "to ground", "G38.2".into());
     add("door".into(), board.inputs[inputs::DOOR], "to ground", "`saf`".into());
     add("emergency stop".into(), board.inputs[inputs::STOP], "to ground", "`est`".into());
+    if let Some(encoder) = board.encoder.filter(|_| is_numbered(board)) {
+        add("spindle sensor, index".into(), Some(encoder.index), "to ground", "`spn`".into());
+        add("spindle sensor, sync".into(), Some(encoder.sync), "to ground", "`spn`".into());
+    }
     if let Some(heaters) = board.heaters.filter(|_| is_numbered(board)) {
         let named = ["hot end", "bed"].into_iter().zip(["`he1`", "`he3`"]).zip(heaters.heaters);
         for ((name, setting), heater) in named {
@@ -146,7 +143,7 @@ fn wires(board: &Board) -> Vec<Wire> {
     // The first port of an Arduino is its USB. The first port of a chip with USB of its own has no pins.
     let wired = usize::from(!is_numbered(board));
     for (port, name) in board.serial.iter().zip(["first port", "second port"]).skip(wired) {
-        let Some([rx, tx]) = port.usart.pins() else { continue };
+        let Some([rx, tx]) = port.line() else { continue };
         add(format!("{name}, receives"), Some(rx), "serial", "115,200 baud".into());
         add(format!("{name}, sends"), Some(tx), "serial", "115,200 baud".into());
         if let Some(handshake) = port.handshake {
@@ -171,6 +168,13 @@ fn about(board: &Board) -> &'static str {
         }
         "pico6" => {
             "A Raspberry Pi Pico with six drivers: the two additional motors may share an axis with another motor, or move B and C. **3.3 V**, as `pico`."
+        }
+        "picobob" => {
+            "An Expatria PicoBOB on a Mach3 breakout board with five drivers. X and Z share a switch input, so each must leave its switch behind homing (`xzb`, `zzb`). \
+             The relay of the spindle is the output of the fifth motor's direction: the spindle has only its speed, 0 to 10 V. The pins are those of the chip, which are **3.3 V**; the PicoBOB shifts levels."
+        }
+        "picohal" => {
+            "An Expatria PicoHAL under a CNC shield with four drivers. Z and A share a switch input. The probe is the shield's A5, the emergency stop its Hold, the spindle's sensors are A4 and Run. **3.3 V**, as `pico`."
         }
         "skr-pico" => {
             "A BTT SKR Pico v1.0: motor 4 is its driver E. FAN1 cools the print, FAN2 the heatbreak of the hot end; FAN3 is the spindle's enable, the servo pin is the spindle's PWM. **3.3 V**, as `pico`. \

@@ -27,6 +27,12 @@ pub enum Board {
     /// Raspberry Pi Pico on a breakout board with six drivers
     #[value(name = "pico6")]
     Pico6,
+    /// Expatria PicoBOB, with five drivers
+    #[value(name = "picobob")]
+    PicoBob,
+    /// Expatria PicoHAL
+    #[value(name = "picohal")]
+    PicoHal,
     /// Arduino Mega 2560 with RAMPS 1.4, as a printer
     #[value(name = "ramps14")]
     Ramps14,
@@ -67,7 +73,8 @@ impl Board {
 
     /// Whether its chip is the RP2040; otherwise it is the ATmega2560.
     pub fn is_rp2040(self) -> bool {
-        matches!(self, Board::Pico | Board::Pico6 | Board::SkrPico)
+        use Board::{Pico, Pico6, PicoBob, PicoHal, SkrPico};
+        matches!(self, Pico | Pico6 | PicoBob | PicoHal | SkrPico)
     }
 
     /// The name in `boards/`, on the command line and after `board-` in the package's features.
@@ -78,6 +85,8 @@ impl Board {
             Board::Mega2560Lathe => "mega2560-lathe",
             Board::Pico => "pico",
             Board::Pico6 => "pico6",
+            Board::PicoBob => "picobob",
+            Board::PicoHal => "picohal",
             Board::Ramps14 => "ramps14",
             Board::Ramps14Cnc => "ramps14-cnc",
             Board::SkrPico => "skr-pico",

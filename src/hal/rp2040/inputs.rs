@@ -260,8 +260,9 @@ pub fn left_out() -> u16 {
     with(|state| !state.used)
 }
 
-/// Sets the ends of axes that are ignored as limits for now. Thread mode.
+/// Sets the ends of axes that are ignored as limits for now, and with them the ends at the same pins. Thread mode.
 pub fn spare(ends: u8) {
+    let ends = ACTIVE.ends_beside(ends);
     with(|state| state.spared = ends);
 }
 

@@ -304,7 +304,7 @@ fn split<const N: usize>(
 
 fn begin(port: u8, rate: u32) {
     let Some(uart) = registers(port) else { return usb::start() };
-    if let Some([rx, tx]) = hardware(port).and_then(|serial| serial.usart.pins()) {
+    if let Some([rx, tx]) = hardware(port).and_then(|serial| serial.line()) {
         gpio::connect_pulled(rx, Unit::Uart);
         gpio::connect(tx, Unit::Uart);
     }

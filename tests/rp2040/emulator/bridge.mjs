@@ -98,6 +98,7 @@ function answer() {
     rotors: drivers.rotors,
     levels: machine.levels.reduce((bits, level, gpio) => bits + (level === 1 ? 2 ** gpio : 0), 0),
     shares: shares(),
+    units: machine.mcu.gpio.map(({ functionSelect }) => functionSelect),
     floated: machine.floated >>> 0,
     strong: machine.mcu.gpio.reduce((bits, { padValue }, gpio) => bits + ((padValue >> 4 & 3) === 3 ? 2 ** gpio : 0), 0),
     asleep: machine.asleep,

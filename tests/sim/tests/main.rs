@@ -67,6 +67,7 @@ mod openings;
 mod overrides;
 mod pico;
 mod pico_bench;
+mod pico_boards;
 mod pico_card;
 mod pico_drivers;
 mod pico_usb;

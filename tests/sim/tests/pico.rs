@@ -105,10 +105,14 @@ impl Side for Emulated {
 
 /// Runs a job, which must end on its exact steps.
 fn run(name: &str, text: &str, settings: &[&str]) -> String {
+    run_on(&mut board(), name, text, settings)
+}
+
+/// As [`run`], on a board that has just been powered up.
+pub fn run_on(board: &mut Emulated, name: &str, text: &str, settings: &[&str]) -> String {
     let settings: Vec<_> = settings.iter().map(ToString::to_string).collect();
     let options = Options { settings, ..Options::default() };
-    let mut board = board();
-    let report = job::run(&mut board, &lines_of(text), &options, |_| ());
+    let report = job::run(board, &lines_of(text), &options, |_| ());
     let report = report.unwrap();
     assert!(report.problems.is_empty(), "{name}: {report}");
     report.to_string()
@@ -137,21 +141,26 @@ fn a_whole_job_ends_in_its_summary() {
     }
 }
 
-/// A board that has been powered up, and a sender.
 fn booted() -> (Emulated, Host) {
-    let (mut board, mut host) = (board(), Host::new(LINES_IN_FLIGHT));
+    started(&PICO)
+}
+
+/// A board that has been powered up, and a sender.
+pub fn started(board: &'static Board) -> (Emulated, Host) {
+    let mut board = Emulated::load(&image(board), board).unwrap();
+    let mut host = Host::new(LINES_IN_FLIGHT);
     host.boot(&mut board, 1_000).unwrap();
     (board, host)
 }
 
 /// Sends a line that must be accepted.
-fn set(board: &mut Emulated, host: &mut Host, line: &str) {
+pub fn set(board: &mut Emulated, host: &mut Host, line: &str) {
     let response = host.ask(board, line, 5_000).unwrap();
     assert_eq!(response.status, 0, "{line} is answered by {}", response.raw);
 }
 
 /// The value of a token.
-fn value(board: &mut Emulated, host: &mut Host, token: &str) -> f64 {
+pub fn value(board: &mut Emulated, host: &mut Host, token: &str) -> f64 {
     let response = host.ask(board, &format!("{{{token}:n}}"), 5_000).unwrap();
     response.body[token].as_f64().unwrap_or_else(|| panic!("{}", response.raw))
 }
@@ -223,9 +232,7 @@ fn a_million_steps_a_second_of_each_motor() {
 #[test]
 #[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn half_a_million_steps_a_second_of_six_motors() {
-    let mut board = Emulated::load(&image(&PICO6), &PICO6).unwrap();
-    let mut host = Host::new(LINES_IN_FLIGHT);
-    host.boot(&mut board, 1_000).unwrap();
+    let (mut board, mut host) = started(&PICO6);
     FAST.iter().for_each(|line| set(&mut board, &mut host, line));
     for line in ["{5ma:1,5tr:1.25,6ma:2,6tr:1.25}", "g1 f46400 x60 y60 z60 a52"] {
         set(&mut board, &mut host, line);
@@ -248,9 +255,7 @@ fn half_a_million_steps_a_second_of_six_motors() {
 #[test]
 #[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn six_unlike_motors_leave_time() {
-    let mut board = Emulated::load(&image(&PICO6), &PICO6).unwrap();
-    let mut host = Host::new(LINES_IN_FLIGHT);
-    host.boot(&mut board, 1_000).unwrap();
+    let (mut board, mut host) = started(&PICO6);
     FAST.iter().for_each(|line| set(&mut board, &mut host, line));
     for line in ["{5ma:1,5tr:1.47,6ma:2,6tr:1.93}", "g0 x100 y87.3 z61.8 a79"] {
         set(&mut board, &mut host, line);

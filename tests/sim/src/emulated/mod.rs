@@ -154,6 +154,8 @@ pub struct Bus {
     pub descriptors: String,
 }
 
+/// The number by which a pin selects its UART (RP2040 data sheet, 2.19.2).
+const UART: u8 = 2;
 /// Number of lines that the emulator has: two UARTs, and USB.
 const LINES: usize = 3;
 /// The line at which the drivers of a board listen: UART1.
@@ -256,6 +258,8 @@ struct Answer {
     levels: u32,
     #[serde(default)]
     shares: Vec<(u8, f64)>,
+    #[serde(default)]
+    units: Vec<u8>,
     #[serde(default)]
     floated: u32,
     #[serde(default)]
@@ -535,6 +539,11 @@ impl Emulated {
     /// Whether an output is high.
     pub fn is_high(&self, pin: Pin) -> bool {
         self.answer.levels >> pin.bit & 1 != 0
+    }
+
+    /// Whether the line of a UART is at a pin.
+    pub fn is_serial(&self, pin: Pin) -> bool {
+        self.answer.units.get(usize::from(pin.bit)) == Some(&UART)
     }
 
     /// Whether a pin has been neither driven nor pulled since the chip started.
