@@ -166,9 +166,11 @@ impl Watch {
         self.status
     }
 
-    /// Takes the news since the last call.
+    /// Takes the worst of the news since the last call, one bit of [`news`]; 0 without any. The others stay.
     pub fn take_news(&mut self) -> u8 {
-        core::mem::take(&mut self.news)
+        let worst = self.news & self.news.wrapping_neg();
+        self.news &= !worst;
+        worst
     }
 
     /// Notes that a datagram has been sent which the driver has to count.

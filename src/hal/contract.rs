@@ -258,7 +258,7 @@ contract! {
         fn tell(motor: u8, values: &[u32; REGISTERS]);
         /// Returns what is known of a motor's driver. Thread mode.
         fn watch(motor: u8) -> Watch;
-        /// Takes the [news](crate::drivers::watch::news) of a motor's driver since the last call. Thread mode.
+        /// Takes the worst of the [news](crate::drivers::watch::news) of a motor's driver since the last call. Thread mode.
         fn take_news(motor: u8) -> u8;
     }
 

@@ -2,7 +2,7 @@
 //!
 //! The power task [looks](look) at them every 20 ms. While a driver of an axis in use has not taken its settings, or
 //! has switched its motor off, lines that move are refused; if that begins in motion it is an alarm, and so is a reset
-//! of a driver in motion. In the first half second after the start such lines wait. Homes are forgotten then. A reset
+//! of a driver in motion. In the first half second after the start such lines wait. Homes are forgotten then, and at rest, too. A reset
 //! at rest is told, and so are warnings: one of them each turn. Thread mode. Cost: 600 cycles a turn.
 
 use super::links::Links;
@@ -42,14 +42,14 @@ fn refusal(motor: usize, settings: &Settings) -> Status {
     }
 }
 
-/// Returns what a driver's news are told as, the worst first.
+/// Returns what a driver's news are told as.
 #[cfg(feature = "drivers")]
 fn told(news: u8) -> Option<Status> {
     match news {
         0 => None,
-        _ if news & news::RESET != 0 => Some(Status::DriverReset),
-        _ if news & news::OFF != 0 => Some(Status::DriverOff),
-        _ if news & news::WARM != 0 => Some(Status::DriverHot),
+        news::RESET => Some(Status::DriverReset),
+        news::OFF => Some(Status::DriverOff),
+        news::WARM => Some(Status::DriverHot),
         _ => Some(Status::DriverOpen),
     }
 }
@@ -65,11 +65,10 @@ pub fn look(links: &Links) {
     let refused = take_refusal(links);
     let news = (0..DRIVERS).find_map(|motor| told(drivers::take_news(motor as u8)));
     match (news, refused) {
-        (Some(fault @ (Status::DriverReset | Status::DriverOff)), _) => {
+        (Some(fault @ (Status::DriverReset | Status::DriverOff)), _) | (_, Some(fault)) => {
             links.model.borrow_mut().forget_homes();
             tell_fault(links, runs, fault);
         }
-        (_, Some(refused)) => tell_fault(links, runs, refused),
         (Some(warning), None) => links.except(warning),
         (None, None) => {}
     }
@@ -98,7 +97,6 @@ fn take_refusal(links: &Links) -> Option<Status> {
 #[inline(never)]
 fn tell_fault(links: &Links, runs: bool, fault: Status) {
     if runs && !machine::is_alarmed() {
-        links.model.borrow_mut().forget_homes();
         alarm::raise_for(links, Alarm::Alarm, fault);
     } else if fault == Status::DriverReset {
         links.except(fault);

@@ -107,7 +107,7 @@ pub fn watch(motor: u8) -> Watch {
     KNOWN.watches.get(usize::from(motor)).map_or(Watch::NEW, Cell::get)
 }
 
-/// Takes the news of a motor's driver since the last call. Thread mode.
+/// Takes the worst of the news of a motor's driver since the last call. Thread mode.
 pub fn take_news(motor: u8) -> u8 {
     change(motor.into(), Watch::take_news).unwrap_or(0)
 }
