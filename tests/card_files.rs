@@ -90,6 +90,7 @@ struct Session {
     machine: Machine,
     dialect: Dialect,
     heard: String,
+    said: Vec<String>,
 }
 
 fn blocks(image: &[u8]) -> Blocks {
@@ -105,7 +106,7 @@ impl Session {
         machine.insert_card(Some(blocks(card)));
         machine.run_ms(100);
         machine.received();
-        let mut session = Self { machine, dialect, heard: String::new() };
+        let mut session = Self { machine, dialect, heard: String::new(), said: Vec::new() };
         match dialect {
             Dialect::Tinyg => _ = session.ask("{jv:5}"),
             Dialect::Grbl => _ = session.ask("$I"),
@@ -132,10 +133,11 @@ impl Session {
                 return std::mem::take(&mut self.heard);
             }
         }
-        panic!("no answer to {line}, but {:?}", self.heard);
+        panic!("no answer to {line}, but {:?} behind {:?}", self.heard, self.said);
     }
 
     fn ask(&mut self, line: &str) -> String {
+        self.said.push(line.into());
         self.heard.clear();
         self.machine.send(format!("{line}\n").as_bytes());
         self.answer(line)
@@ -353,6 +355,156 @@ fn fill(mut session: Session, card: &[u8]) {
     assert_eq!(names(&now), names(card));
     // What the file had taken belongs to nobody, as after a power cut.
     assert!(lost(&now) > 0);
+}
+
+/// What a sender may do with files, in any order.
+#[derive(Clone, Copy, Debug)]
+enum Op {
+    Write,
+    Line,
+    Finish,
+    Drop,
+    Run,
+    Hold,
+    GoOn,
+    Delete,
+    List,
+    Alarm,
+    Clear,
+    Reset,
+    Pull,
+    Insert,
+    OtherPort,
+    Wait,
+}
+
+const OPS: [Op; 16] = [
+    Op::Write,
+    Op::Line,
+    Op::Finish,
+    Op::Drop,
+    Op::Run,
+    Op::Hold,
+    Op::GoOn,
+    Op::Delete,
+    Op::List,
+    Op::Alarm,
+    Op::Clear,
+    Op::Reset,
+    Op::Pull,
+    Op::Insert,
+    Op::OtherPort,
+    Op::Wait,
+];
+
+impl Session {
+    /// Does what `op` says, and waits for the answer if there is one.
+    fn act(&mut self, op: Op, name: &str, card: &mut Option<Blocks>) {
+        let dialect = self.dialect;
+        let clear = match dialect {
+            Dialect::Tinyg => "{clear:n}",
+            Dialect::Grbl => "$X",
+            Dialect::RepRap => "M999",
+        };
+        match op {
+            Op::Write => _ = self.ask(&dialect.write(name)),
+            Op::Line => _ = self.ask("G91 G1 X0.5 F3000"),
+            Op::Finish => _ = self.ask(dialect.finish()),
+            Op::Drop => {
+                _ = self.ask(match dialect {
+                    Dialect::Tinyg => "{sdx:t}",
+                    Dialect::Grbl => "$FX",
+                    Dialect::RepRap => "M27",
+                })
+            }
+            Op::Run => _ = self.ask(&dialect.run(name)),
+            Op::Hold if dialect != Dialect::RepRap => self.machine.send(b"!"),
+            Op::GoOn if dialect != Dialect::RepRap => self.machine.send(b"~"),
+            // Without a file that prints, M25 pauses the program, and whatever comes behind it.
+            Op::Hold => {
+                self.machine.send(b"M25\n");
+                self.run(8_000);
+                self.machine.send(b"M108\n");
+                self.run(200);
+            }
+            Op::GoOn => _ = self.ask("M108"),
+            Op::Delete => _ = self.ask(&dialect.delete(name)),
+            Op::List => _ = self.ask(dialect.list()),
+            Op::Alarm => match dialect {
+                Dialect::Tinyg => _ = self.ask("{alarm:n}"),
+                Dialect::Grbl => self.machine.send(b"\x85"),
+                Dialect::RepRap => _ = self.ask("M112"),
+            },
+            Op::Clear => _ = self.ask(clear),
+            Op::Reset if dialect == Dialect::Grbl => {
+                self.machine.send(b"\x18");
+                self.run(300);
+            }
+            Op::Pull => {
+                *card = self.machine.card().or(card.take());
+                self.machine.insert_card(None);
+            }
+            Op::Insert => {
+                if let Some(blocks) = card.take() {
+                    self.machine.insert_card(Some(blocks));
+                }
+                if dialect == Dialect::RepRap {
+                    self.ask("M21");
+                }
+            }
+            Op::OtherPort => self.machine.send_aux(b"G91 G1 X9 F6000\n"),
+            Op::Reset | Op::Wait => self.run(300),
+        }
+    }
+}
+
+/// Whatever is done in whatever order: each line is answered, files that are not touched stay whole, another program can
+/// read the card, and in the end everything works.
+#[test]
+fn files_in_any_order() {
+    for seed in seeds(12) {
+        let mut random = seed ^ 0x5A5A;
+        let mut below = move |below: u64| {
+            random = random
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (random >> 33) % below
+        };
+        let dialect = ALL[seed as usize % 3];
+        let fat = if below(2) == 0 { FatType::Fat16 } else { FatType::Fat32 };
+        let keep = program(40);
+        let image = image(fat, &[("KEEP.NC", keep.clone()), ("A.NC", program(3))]);
+        let work = move || {
+            let mut session = Session::start(dialect, &image);
+            let mut pulled = None;
+            let mut done = Vec::new();
+            for _ in 0..60 {
+                let lines = below(3) > 0;
+                let op = if lines { Op::Line } else { OPS[below(OPS.len() as u64) as usize] };
+                let name = ["A.NC", "B.NC", "KEEPS.NC"][below(3) as usize];
+                done.push(op);
+
+                session.act(op, name, &mut pulled);
+            }
+            session.machine.send(b"~");
+            for op in [Op::Insert, Op::GoOn, Op::Clear, Op::Finish, Op::Drop, Op::Wait, Op::Clear] {
+                session.act(op, "A.NC", &mut pulled);
+            }
+            session.run(8_000);
+            session.act(Op::Clear, "", &mut pulled);
+            let before = session.steps()[0];
+            session.say("G91");
+            session.say("G1 X1 F3000");
+            session.run(3_000);
+            assert_eq!(session.steps()[0] - before, 1_280, "seed {seed}: {done:?}");
+            let now = session.card(&image);
+            assert_eq!(text(&now, "KEEP.NC"), Some(keep), "seed {seed}: {done:?}");
+            let files = names(&now).into_iter().filter(|name| name.ends_with(".NC"));
+            files.for_each(|name| _ = text(&now, &name));
+            lost(&now);
+        };
+        thread::spawn(work).join().unwrap();
+    }
 }
 
 /// A percent sign is a character that acts at once in two dialects, and the first line of many files.

@@ -22,6 +22,7 @@
 
 pub mod asked;
 pub mod bench;
+pub mod card;
 pub mod curves;
 pub mod samples;
 pub mod tables;
