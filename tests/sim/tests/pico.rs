@@ -437,7 +437,7 @@ fn the_heatbreak_is_cooled_while_the_hot_end_is_hot_or_may_be() {
 
 /// Longest time from the edge of a limit switch to the last step, us: two samples, the entry of the interrupt, which
 /// may find others, and the step under way.
-const STOP_US: f64 = 12.0;
+pub const STOP_US: f64 = 12.0;
 
 /// Moments of the edge in a millisecond, us. `KERF_LONG=1` tries 300.
 fn moments() -> Vec<u64> {
