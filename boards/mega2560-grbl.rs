@@ -19,7 +19,7 @@ pub const MEGA2560_GRBL: Board = Board {
     // D5 to D9: spindle direction, spindle enable, spindle PWM, flood, mist
     hazards: &[pin(E, 3), pin(H, 3), pin(H, 4), pin(H, 5), pin(H, 6)],
     outputs: [Some(pin(H, 3)), Some(pin(E, 3)), Some(pin(H, 6)), Some(pin(H, 5))],
-    pwm: Some(Pwm { timer: Timer::T4, channel: 1 }), // D7
+    pwm: Some(Pwm { timer: Timer::T4, channel: 1, inverted: false }), // D7
     // USB; then receive D19, transmit D18, RTS D22, CTS D23
     serial: &[
         USB,
@@ -47,6 +47,7 @@ pub const MEGA2560_GRBL: Board = Board {
     // Index D11, sync A15, second sync sensor A14
     encoder: Some(Encoder { index: pin(B, 5), sync: pin(K, 7), second: Some(pin(K, 6)) }),
     drivers: None,
+    registers: None,
     heaters: None,
     card: None,
     step_timer: Timer::T1,

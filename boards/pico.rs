@@ -33,7 +33,7 @@ pub const PICO: Board = Board {
     // Spindle enable, spindle direction, spindle PWM, mist, flood
     hazards: &[gp(26), gp(27), gp(15), gp(17), gp(16)],
     outputs: [Some(gp(26)), Some(gp(27)), Some(gp(17)), Some(gp(16))],
-    pwm: Some(Pwm { timer: Timer::Slices, channel: 15 }),
+    pwm: Some(Pwm { timer: Timer::Slices, channel: 15, inverted: false }),
     // USB; then transmit GP0, receive GP1
     serial: &[NATIVE_USB, Serial { usart: Usart::Uart0, ..NATIVE_USB }],
     inputs: [
@@ -54,6 +54,7 @@ pub const PICO: Board = Board {
     // Inputs there, too: feed hold and an auxiliary one. GP20, cycle start, is left alone.
     encoder: Some(Encoder { index: gp(28), sync: gp(19), second: None }),
     drivers: None,
+    registers: None,
     heaters: None,
     card: None,
     step_timer: Timer::Pio,

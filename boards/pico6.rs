@@ -31,7 +31,7 @@ pub const PICO6: Board = Board {
     // Spindle enable, spindle PWM, flood
     hazards: &[gp(15), gp(16), gp(17)],
     outputs: [Some(gp(15)), None, None, Some(gp(17))],
-    pwm: Some(Pwm { timer: Timer::Slices, channel: 16 }),
+    pwm: Some(Pwm { timer: Timer::Slices, channel: 16, inverted: false }),
     // USB; then transmit GP0, receive GP1
     serial: PICO.serial,
     inputs: [

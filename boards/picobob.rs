@@ -37,7 +37,7 @@ pub const PICOBOB: Board = Board {
     // Spindle PWM, flood
     hazards: &[gp(14), gp(16)],
     outputs: [None, None, None, Some(gp(16))],
-    pwm: Some(Pwm { timer: Timer::Slices, channel: 14 }),
+    pwm: Some(Pwm { timer: Timer::Slices, channel: 14, inverted: false }),
     serial: &[NATIVE_USB],
     inputs: [
         // One switch input for both ends of X and of Z

@@ -31,7 +31,7 @@ pub const PICOHAL: Board = Board {
     // Spindle enable, spindle direction, spindle PWM
     hazards: &[gp(7), gp(26), gp(25)],
     outputs: [Some(gp(7)), Some(gp(26)), None, None],
-    pwm: Some(Pwm { timer: Timer::Slices, channel: 25 }),
+    pwm: Some(Pwm { timer: Timer::Slices, channel: 25, inverted: false }),
     // USB; then transmit GP12, receive GP13
     serial: &[
         NATIVE_USB,

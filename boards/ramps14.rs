@@ -29,7 +29,7 @@ pub const RAMPS14: Board = Board {
     ],
     // D4, D5, A3 of AUX-1, D11: servo headers except A3, so that codes such as M8 never switch a heater output
     outputs: [Some(pin(G, 5)), Some(pin(E, 3)), Some(pin(F, 3)), Some(pin(B, 5))],
-    pwm: Some(Pwm { timer: Timer::T4, channel: 0 }), // D6, a servo header
+    pwm: Some(Pwm { timer: Timer::T4, channel: 0, inverted: false }), // D6, a servo header
     // The pins of USART1 and USART3 are used by the limit switches.
     serial: &[USB],
     inputs: [
@@ -50,6 +50,7 @@ pub const RAMPS14: Board = Board {
     // Index D2, sync D3
     encoder: Some(Encoder { index: pin(E, 4), sync: pin(E, 5), second: None }),
     drivers: None,
+    registers: None,
     // Hot end: D10, sensor A13 or a MAX6675 at D50, D52 and D40 (AUX-2). Bed: D8, sensor A14. Fan: D9
     heaters: Some(Heaters {
         heaters: [

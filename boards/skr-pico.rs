@@ -36,7 +36,7 @@ pub const SKR_PICO: Board = Board {
     hazards: &[gp(17), gp(20), gp(29), gp(21), gp(23)],
     // Spindle FAN3
     outputs: [Some(gp(20)), None, None, None],
-    pwm: Some(Pwm { timer: Timer::Slices, channel: 29 }),
+    pwm: Some(Pwm { timer: Timer::Slices, channel: 29, inverted: false }),
     // USB; then transmit GP0, receive GP1
     serial: &[NATIVE_USB, Serial { usart: Usart::Uart0, ..NATIVE_USB }],
     inputs: [
@@ -65,6 +65,7 @@ pub const SKR_PICO: Board = Board {
         cooler: Some(gp(18)),
     }),
     drivers: Some(Tmc2209 { tx: gp(8), rx: gp(9), addresses: &[0, 2, 1, 3] }),
+    registers: None,
     card: None,
     step_timer: Timer::Pio,
     tick_timer: Timer::SysTick,

@@ -20,6 +20,8 @@ mod pico;
 mod pico6;
 #[path = "../boards/picobob.rs"]
 mod picobob;
+#[path = "../boards/picocnc.rs"]
+mod picocnc;
 #[path = "../boards/picohal.rs"]
 mod picohal;
 #[path = "../boards/ramps14.rs"]
@@ -30,8 +32,8 @@ mod ramps14_cnc;
 mod skr_pico;
 
 pub use parts::{
-    Encoder, Handshake, Heater, Heaters, MotorPins, NATIVE_USB, Pwm, SdCard, Serial, Timer,
-    Tmc2209, USB, Usart, inputs, outputs,
+    Encoder, Handshake, Heater, Heaters, MotorPins, NATIVE_USB, Pwm, Registers, SdCard, Serial,
+    ShiftRegister, Timer, Tmc2209, USB, Usart, inputs, outputs,
 };
 pub use pins::{Interrupt, Pin, Port, gp, pin};
 
@@ -41,6 +43,7 @@ pub use mega2560_lathe::MEGA2560_LATHE;
 pub use pico::PICO;
 pub use pico6::PICO6;
 pub use picobob::PICOBOB;
+pub use picocnc::PICOCNC;
 pub use picohal::PICOHAL;
 pub use ramps14::RAMPS14;
 pub use ramps14_cnc::RAMPS14_CNC;
@@ -147,6 +150,8 @@ pub struct Board {
     pub encoder: Option<Encoder>,
     /// Drivers that receive their current and microsteps over UART1 of the RP2040.
     pub drivers: Option<Tmc2209>,
+    /// The shift registers behind which pins are, on an RP2040.
+    pub registers: Option<Registers>,
     /// The heaters, for an image that can print.
     pub heaters: Option<Heaters>,
     /// The pins of an SD card.
@@ -228,13 +233,14 @@ impl Board {
 }
 
 /// Every board that Kerf supports.
-pub const ALL: [&Board; 10] = [
+pub const ALL: [&Board; 11] = [
     &MEGA2560_GRBL,
     &MEGA2560_GRBL_LATHE,
     &MEGA2560_LATHE,
     &PICO,
     &PICO6,
     &PICOBOB,
+    &PICOCNC,
     &PICOHAL,
     &RAMPS14,
     &RAMPS14_CNC,
@@ -276,6 +282,9 @@ pub const ACTIVE: &Board = &PICO6;
 #[cfg(feature = "board-picobob")]
 pub const ACTIVE: &Board = &PICOBOB;
 /// The board that this image is built for.
+#[cfg(feature = "board-picocnc")]
+pub const ACTIVE: &Board = &PICOCNC;
+/// The board that this image is built for.
 #[cfg(feature = "board-picohal")]
 pub const ACTIVE: &Board = &PICOHAL;
 /// The board that this image is built for.
@@ -290,6 +299,7 @@ pub const ACTIVE: &Board = &SKR_PICO;
     feature = "board-pico",
     feature = "board-pico6",
     feature = "board-picobob",
+    feature = "board-picocnc",
     feature = "board-picohal",
     feature = "board-skr-pico"
 )))]

@@ -1,6 +1,8 @@
 //! Build-time check of a board: the build fails if a pin or a timer has two users, or cannot do what it is used for.
 
-use super::parts::{Handshake, Heaters, Pwm, Serial, Timer, Usart, inputs, outputs};
+use super::parts::{
+    Handshake, Heaters, Pwm, Registers, Serial, ShiftRegister, Timer, Usart, inputs, outputs,
+};
 use super::pins::{Pin, Port, gp, pin};
 use super::{Board, SPI};
 
@@ -16,8 +18,8 @@ const MAX_PORTS: usize = 2;
 const SERIAL_PINS: usize = 5;
 
 /// Pins beside those of motors and serial ports: `enable_all`, hazards, the firmware's own, inputs, drivers, and SPI
-/// with its select pins, and the fan of the heatbreak.
-const OTHER_PINS: usize = 1 + 8 + 1 + inputs::COUNT + 2 + SPI.len() + 3 + 1;
+/// with its select pins, the fan of the heatbreak, and two shift registers.
+const OTHER_PINS: usize = 1 + 8 + 1 + inputs::COUNT + 2 + SPI.len() + 3 + 1 + 6;
 const MAX_PINS: usize = 3 * MOST_MOTORS + MAX_PORTS * SERIAL_PINS + OTHER_PINS;
 
 impl Serial {
@@ -57,6 +59,19 @@ impl Serial {
     }
 }
 
+impl ShiftRegister {
+    /// Returns the number of outputs. Panics unless the latch is behind the clock, on pins of an RP2040, and the outputs
+    /// are those of one, two or three registers.
+    const fn check(&self) -> u8 {
+        let is_rp2040 =
+            matches!(self.data.port, Port::Gpio) && matches!(self.clock.port, Port::Gpio);
+        let follows = self.latch.is(gp(self.clock.bit + 1));
+        assert!(is_rp2040 && follows, "a register of this board has its pins elsewhere");
+        assert!(matches!(self.outputs, 8 | 16 | 24), "a register of this board has other outputs");
+        self.outputs
+    }
+}
+
 impl Board {
     /// Panics if a pin or a timer has two users. In a constant, the panic fails the build.
     pub const fn check(&self) {
@@ -89,6 +104,16 @@ impl Board {
         if let Some(Heaters { heaters: [hot_end, bed], cooler, .. }) = self.heaters {
             (pins[n], pins[n + 1], pins[n + 2]) = (hot_end.select, bed.select, cooler);
             n += 3;
+        }
+        if let Some(Registers { steps, outputs }) = self.registers {
+            let own =
+                [steps.data, steps.clock, steps.latch, outputs.data, outputs.clock, outputs.latch];
+            let mut r = 0;
+            while r < own.len() {
+                pins[n] = Some(own[r]);
+                n += 1;
+                r += 1;
+            }
         }
         if let Some(card) = self.card {
             card.check();
@@ -128,6 +153,9 @@ impl Board {
         }
         let mut i = 0;
         while i < n {
+            if let Some(pin) = pins[i] {
+                self.check_register(pin);
+            }
             let mut j = i + 1;
             while j < n {
                 if let (Some(a), Some(b)) = (pins[i], pins[j]) {
@@ -177,12 +205,27 @@ impl Board {
         false
     }
 
+    /// Panics if a pin is behind a shift register that the board does not have, or is none of its outputs.
+    const fn check_register(&self, pin: Pin) {
+        let outputs = match (pin.port, self.registers) {
+            (Port::Steps, Some(Registers { steps, .. })) => {
+                assert!(steps.outputs == 8, "the register of steps has not eight outputs");
+                steps.check()
+            }
+            (Port::Outputs, Some(Registers { outputs, .. })) => outputs.check(),
+            (Port::Steps | Port::Outputs, None) => 0,
+            _ => return,
+        };
+        assert!(pin.bit < outputs, "a pin of this board is no output of its register");
+    }
+
     /// Panics if the timer of the spindle's PWM has another user, or has no such output.
     const fn check_pwm(&self) {
         let Some(pwm) = self.pwm else { return };
         let wide = matches!(pwm.timer, Timer::T3 | Timer::T4 | Timer::T5);
         let has_output = (wide && pwm.channel < 3) || matches!(pwm.timer, Timer::Slices);
         assert!(has_output, "a timer of this board has no such output");
+        assert!(!wide || !pwm.inverted, "a timer of this board does not invert its output");
         assert!(
             pwm.timer as u8 != self.step_timer as u8 && pwm.timer as u8 != self.tick_timer as u8,
             "a timer of this board is used twice"
@@ -249,7 +292,7 @@ impl Board {
 
     /// Panics if the pin of a converter channel is an input.
     const fn check_channel(&self, channel: u8) {
-        let is_rp2040 = matches!(self.motors[0].step.port, Port::Gpio);
+        let is_rp2040 = self.motors[0].step.port.is_of_rp2040();
         let pin = match channel {
             0..3 if is_rp2040 => gp(26 + channel),
             _ if is_rp2040 => panic!("a sensor is on no channel"),

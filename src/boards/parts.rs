@@ -47,6 +47,28 @@ impl SdCard {
     }
 }
 
+/// A chain of 74HC595 shift registers.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct ShiftRegister {
+    /// The data of the first register of the chain.
+    pub data: Pin,
+    /// The shift clock of all.
+    pub clock: Pin,
+    /// The latch of all. It is the pin behind that of the clock.
+    pub latch: Pin,
+    /// The number of outputs: 8 for each register. Output 0 is QA of the first one.
+    pub outputs: u8,
+}
+
+/// The shift registers of a board with an RP2040.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Registers {
+    /// Steps and directions: the pins of [`Port::Steps`].
+    pub steps: ShiftRegister,
+    /// Enables and other outputs: the pins of [`Port::Outputs`].
+    pub outputs: ShiftRegister,
+}
+
 /// A 16-bit or 8-bit timer of the ATmega2560, or its counterpart on the RP2040.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[allow(missing_docs)]
@@ -72,6 +94,8 @@ pub struct Pwm {
     pub timer: Timer,
     /// The channel of the timer, 0 to 2 for A to C; on the RP2040 the number of the pin.
     pub channel: u8,
+    /// Whether a transistor of the board inverts the pulses. The pin then drives the opposite, on the RP2040.
+    pub inverted: bool,
 }
 
 impl Pwm {

@@ -17,9 +17,18 @@ pub enum Port {
     L,
     /// The pins GP0 to GP29 of the RP2040. The bit of a pin is its number.
     Gpio,
+    /// The outputs of the shift register of steps: see [`Registers`](super::Registers).
+    Steps,
+    /// The outputs of the shift register of other outputs.
+    Outputs,
 }
 
 impl Port {
+    /// Whether boards with an RP2040 have it.
+    pub const fn is_of_rp2040(self) -> bool {
+        matches!(self, Port::Gpio | Port::Steps | Port::Outputs)
+    }
+
     /// The letter the data sheet uses.
     pub const fn letter(self) -> char {
         match self {
@@ -35,14 +44,16 @@ impl Port {
             Port::K => 'K',
             Port::L => 'L',
             Port::Gpio => 'P',
+            Port::Steps => 'S',
+            Port::Outputs => 'O',
         }
     }
 
     /// Data-space address of the PORT register. PIN is two below it and DDR one below (ATmega2560 data sheet,
-    /// register summary). 0 for the RP2040's port, which has none.
+    /// register summary). 0 for the ports of an RP2040's board, which have none.
     pub const fn address(self) -> usize {
         match self {
-            Port::Gpio => 0,
+            Port::Gpio | Port::Steps | Port::Outputs => 0,
             Port::A => 0x22,
             Port::B => 0x25,
             Port::C => 0x28,
@@ -58,12 +69,12 @@ impl Port {
     }
 }
 
-/// A pin of the chip.
+/// A pin of the chip, or of a shift register.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Pin {
     /// The port of the pin.
     pub port: Port,
-    /// The bit of the pin in its port, 0 to 7; on the RP2040 0 to 29.
+    /// The bit of the pin in its port, 0 to 7; on the RP2040 0 to 29. The number of the output of a shift register.
     pub bit: u8,
 }
 

@@ -96,6 +96,66 @@ fn the_pins_of_a_usart_are_fixed() {
     Board { serial: &[MOVED], ..MEGA2560_GRBL }.check();
 }
 
+/// A PicoCNC whose register of outputs is another one.
+fn registers(outputs: ShiftRegister) -> Board {
+    let registers = PICOCNC.registers.map(|both| Registers { outputs, ..both });
+    Board { registers, ..PICOCNC }
+}
+
+const OUTPUTS: ShiftRegister =
+    ShiftRegister { data: gp(17), clock: gp(18), latch: gp(19), outputs: 8 };
+
+#[test]
+fn a_register_has_as_many_outputs_as_are_used() {
+    registers(OUTPUTS).check();
+}
+
+#[test]
+#[should_panic(expected = "the register of steps has not eight outputs")]
+fn the_register_of_steps_has_eight_outputs() {
+    let wide = ShiftRegister { outputs: 16, ..OUTPUTS };
+    Board { registers: Some(Registers { steps: wide, outputs: wide }), ..PICOCNC }.check();
+}
+
+#[test]
+#[should_panic(expected = "has its pins elsewhere")]
+fn the_latch_of_a_register_is_behind_its_clock() {
+    registers(ShiftRegister { clock: gp(19), latch: gp(18), ..OUTPUTS }).check();
+}
+
+#[test]
+#[should_panic(expected = "pin of this board is used twice")]
+fn the_pins_of_a_register_are_taken() {
+    registers(ShiftRegister { data: gp(22), ..OUTPUTS }).check();
+}
+
+#[test]
+#[should_panic(expected = "is no output of its register")]
+fn pins_behind_a_register_are_its_outputs() {
+    Board { enable_all: Some(pin(Port::Outputs, 16)), ..PICOCNC }.check();
+}
+
+#[test]
+#[should_panic(expected = "is no output of its register")]
+fn a_board_without_registers_has_no_pins_behind_them() {
+    Board { enable_all: Some(pin(Port::Outputs, 0)), ..PICO }.check();
+}
+
+#[test]
+#[should_panic(expected = "switch of this board cannot interrupt")]
+fn a_switch_is_not_behind_a_register() {
+    let mut board = PICOCNC;
+    board.inputs[inputs::DOOR] = Some(pin(Port::Outputs, 15));
+    board.check();
+}
+
+#[test]
+#[should_panic(expected = "does not invert its output")]
+fn a_timer_of_the_mega_does_not_invert() {
+    let pwm = MEGA2560_GRBL.pwm.map(|pwm| Pwm { inverted: true, ..pwm });
+    Board { pwm, ..MEGA2560_GRBL }.check();
+}
+
 #[test]
 #[should_panic(expected = "switch of this board cannot interrupt")]
 fn a_switch_must_interrupt() {
@@ -121,14 +181,15 @@ fn sensors_interrupt() {
 #[test]
 #[should_panic(expected = "timer of this board is used twice")]
 fn the_spindle_has_a_timer_to_itself() {
-    let pwm = Some(Pwm { timer: Timer::T4, channel: 1 });
+    let pwm = Some(Pwm { timer: Timer::T4, channel: 1, inverted: false });
     Board { step_timer: Timer::T4, pwm, ..MEGA2560_GRBL }.check();
 }
 
 #[test]
 #[should_panic(expected = "output of this board is used twice")]
 fn the_pin_of_the_pulses_is_nobody_elses() {
-    Board { pwm: Some(Pwm { timer: Timer::T4, channel: 2 }), ..MEGA2560_GRBL }.check();
+    Board { pwm: Some(Pwm { timer: Timer::T4, channel: 2, inverted: false }), ..MEGA2560_GRBL }
+        .check();
 }
 
 #[test]

@@ -173,6 +173,10 @@ fn about(board: &Board) -> &'static str {
             "An Expatria PicoBOB on a Mach3 breakout board with five drivers. X and Z share a switch input, so each must leave its switch behind homing (`xzb`, `zzb`). \
              The relay of the spindle is the output of the fifth motor's direction: the spindle has only its speed, 0 to 10 V. The pins are those of the chip, which are **3.3 V**; the PicoBOB shifts levels."
         }
+        "picocnc" => {
+            "A PicoCNC of Phil Barrett. Its terminals have the names of what they do. Steps, directions, enables and outputs are behind shift registers at 5 V; inputs have opto-couplers. \
+             **Until Kerf has started, and while RESET or BOOTSEL is pressed, the registers hold what they held before**, and anything at power-up: see [what to watch](rp2040.md#watch-at-the-first-power-up)."
+        }
         "picohal" => {
             "An Expatria PicoHAL under a CNC shield with four drivers. Z and A share a switch input. The probe is the shield's A5, the emergency stop its Hold, the spindle's sensors are A4 and Run. **3.3 V**, as `pico`."
         }
@@ -192,7 +196,7 @@ fn header(board: &Board, pin: &str) -> &'static str {
 
 /// Whether a board has the RP2040, whose pins are numbered.
 fn is_numbered(board: &Board) -> bool {
-    board.motors[0].step.port == Port::Gpio
+    board.motors[0].step.port.is_of_rp2040()
 }
 
 /// Returns the Arduino boards with different pins: the ones that are drawn.
@@ -241,9 +245,18 @@ fn numbered(board: &Board) -> String {
     let mut text = format!("## {}\n\n{}\n\n", board.name, about(board));
     text += "| what | pin | level | setting |\n|---|---|---|---|\n";
     for Wire { what, pin, level, setting } in wires(board) {
-        text += &format!("| {what} | GP{} | {level} | {setting} |\n", pin.bit);
+        text += &format!("| {what} | {} | {level} | {setting} |\n", named(pin));
     }
     text + "\n"
+}
+
+/// Returns the name of a pin of the chip, or of an output of a shift register.
+fn named(pin: Pin) -> String {
+    match pin.port {
+        Port::Steps => format!("step register, output {}", pin.bit),
+        Port::Outputs => format!("output register, output {}", pin.bit),
+        _ => format!("GP{}", pin.bit),
+    }
 }
 
 /// Returns the headers of a Mega, as they lie with USB to the left: the place of the first pin, and the pins from

@@ -30,6 +30,9 @@ pub enum Board {
     /// Expatria PicoBOB, with five drivers
     #[value(name = "picobob")]
     PicoBob,
+    /// PicoCNC
+    #[value(name = "picocnc")]
+    PicoCnc,
     /// Expatria PicoHAL
     #[value(name = "picohal")]
     PicoHal,
@@ -73,8 +76,8 @@ impl Board {
 
     /// Whether its chip is the RP2040; otherwise it is the ATmega2560.
     pub fn is_rp2040(self) -> bool {
-        use Board::{Pico, Pico6, PicoBob, PicoHal, SkrPico};
-        matches!(self, Pico | Pico6 | PicoBob | PicoHal | SkrPico)
+        use Board::{Pico, Pico6, PicoBob, PicoCnc, PicoHal, SkrPico};
+        matches!(self, Pico | Pico6 | PicoBob | PicoCnc | PicoHal | SkrPico)
     }
 
     /// The name in `boards/`, on the command line and after `board-` in the package's features.
@@ -86,6 +89,7 @@ impl Board {
             Board::Pico => "pico",
             Board::Pico6 => "pico6",
             Board::PicoBob => "picobob",
+            Board::PicoCnc => "picocnc",
             Board::PicoHal => "picohal",
             Board::Ramps14 => "ramps14",
             Board::Ramps14Cnc => "ramps14-cnc",

@@ -1,13 +1,14 @@
 //! Pins of the board: outputs that are not steps, and the connection of pins to units of the chip.
 //!
-//! Setting a pin is one store that disturbs no other pin.
+//! Setting a pin is one store that disturbs no other pin. Pins behind a shift register are set by [`register`].
 
 use embassy_rp::pac::io::vals::{Inover, Outover};
 use embassy_rp::pac::pads::vals::Drive;
 use embassy_rp::pac::{IO_BANK0, PADS_BANK0, SIO};
 
+use super::register;
 use crate::boards::outputs::{COUNTERCLOCKWISE, SPINDLE};
-use crate::boards::{ACTIVE, Pin};
+use crate::boards::{ACTIVE, Pin, Port};
 use crate::hal::byte::SharedByte;
 
 /// The unit that a pin is connected to (RP2040 data sheet, 2.19.2).
@@ -19,6 +20,7 @@ pub(super) enum Unit {
     Pwm = 4,
     Cpu = 5,
     Pio0 = 6,
+    Pio1 = 7,
 }
 
 /// The pin of the first channel of the analog-to-digital converter.
@@ -37,7 +39,18 @@ pub(super) fn connect(pin: Pin, unit: Unit) {
     IO_BANK0.gpio(pin.bit.into()).ctrl().write(|w| {
         w.set_funcsel(unit as u8);
         w.set_inover(Inover::NORMAL);
+        w.set_outover(if is_inverted(pin) { Outover::INVERT } else { Outover::NORMAL });
     });
+}
+
+/// Whether the board inverts what a pin drives.
+fn is_inverted(pin: Pin) -> bool {
+    ACTIVE.pwm.is_some_and(|pwm| pwm.inverted && pwm.pin().is(pin))
+}
+
+/// Whether a pin is an output of a shift register.
+fn is_behind(pin: Pin) -> bool {
+    matches!(pin.port, Port::Outputs)
 }
 
 /// Connects an output to a unit. It may drive 12 mA, because the LED of an opto-coupler takes 8 to 12; after a reset a
@@ -79,6 +92,9 @@ pub(super) fn levels() -> u32 {
 
 /// Drives a pin high or low.
 pub(super) fn set(pin: Pin, high: bool) {
+    if is_behind(pin) {
+        return register::set(pin.bit, high);
+    }
     let out = SIO.gpio_out(0);
     let one = if high { out.value_set() } else { out.value_clr() };
     one.write_value(1 << pin.bit);
@@ -86,18 +102,24 @@ pub(super) fn set(pin: Pin, high: bool) {
 
 /// Makes a pin an output.
 pub(super) fn output(pin: Pin) {
-    connect_output(pin, Unit::Cpu);
-    drive(pin);
+    if !is_behind(pin) {
+        connect_output(pin, Unit::Cpu);
+        drive(pin);
+    }
 }
 
 fn drive(pin: Pin) {
+    if is_behind(pin) {
+        return;
+    }
     SIO.gpio_oe(0).value_set().write_value(1 << pin.bit);
 }
 
 /// Makes the board's output pins outputs: drivers off, hazards off. The level that switches the spindle off is not
 /// known yet, so its enable pin is not driven before [`set_low`]; its pull-down stays on, as it is from the reset on, so
-/// that the pin does not float.
+/// that the pin does not float. An enable behind a register is low until then.
 pub(super) fn start() {
+    register::start();
     let enables = ACTIVE.motors.iter().filter_map(|motor| motor.enable);
     enables.chain(ACTIVE.enable_all).for_each(|enable| {
         set(enable, true);
@@ -105,7 +127,7 @@ pub(super) fn start() {
     });
     for hazard in ACTIVE.hazards {
         set(*hazard, false);
-        if ACTIVE.outputs[0] == Some(*hazard) {
+        if ACTIVE.outputs[0] == Some(*hazard) && !is_behind(*hazard) {
             connect_output(*hazard, Unit::Cpu);
             PADS_BANK0.gpio(hazard.bit.into()).modify(|w| w.set_pde(true));
         } else {

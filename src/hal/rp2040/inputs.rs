@@ -19,7 +19,7 @@ use embassy_rp::pac::{IO_BANK0, TIMER};
 
 use super::stepper::{self, Place};
 use super::{encoder, flags, gpio, mask};
-use crate::boards::ACTIVE;
+use crate::boards::{ACTIVE, inputs};
 use crate::hal::event::Event;
 use crate::switches::{FIRST_US, LATER_US, Next, Switches};
 
@@ -34,8 +34,22 @@ const GROUPS: usize = 4;
 /// Bits of a pin's four events that are edges: falling and rising.
 const EDGES: u32 = 0b1100;
 
+/// The pin of each input as a bit; 0 for none.
+const PINS: [u32; inputs::COUNT] = {
+    let (mut pins, mut i) = ([0; inputs::COUNT], 0);
+    while i < inputs::COUNT {
+        if let Some(pin) = ACTIVE.inputs[i] {
+            pins[i] = 1 << pin.bit;
+        }
+        i += 1;
+    }
+    pins
+};
+
 /// The state of sampling, and its parameters from thread mode.
 struct State {
+    /// [`PINS`], which are here to be in RAM: a limit would have to wait for flash.
+    pins: [u32; inputs::COUNT],
     switches: Switches,
     /// Inputs that are read, as bits. The pins of the others belong to an encoder.
     used: u16,
@@ -69,6 +83,7 @@ struct Shared(UnsafeCell<State>);
 unsafe impl Sync for Shared {}
 
 static STATE: Shared = Shared(UnsafeCell::new(State {
+    pins: PINS,
     switches: Switches::new(),
     used: u16::MAX,
     low: 0,
@@ -92,7 +107,10 @@ fn with<R>(act: impl FnOnce(&mut State) -> R) -> R {
 impl State {
     /// Returns the inputs that look active now.
     fn found(&self) -> u16 {
-        (levels() ^ self.low) & self.used
+        let all = gpio::levels();
+        let high = |(i, pin): (usize, &u32)| u16::from(all & pin != 0) << i;
+        let levels = self.pins.iter().enumerate().map(high).fold(0, |bits, bit| bits | bit);
+        (levels ^ self.low) & self.used
     }
 
     /// Has edges of switches raise an interrupt, or no more. What has happened before raises none.
@@ -130,16 +148,6 @@ impl State {
             self.plan(FIRST_US);
         }
     }
-}
-
-/// Returns the inputs whose pins are high.
-fn levels() -> u16 {
-    let all = gpio::levels();
-    let pins = ACTIVE.inputs.iter().enumerate();
-    pins.fold(0, |bits, (i, pin)| match pin {
-        Some(pin) => bits | u16::from(all & 1 << pin.bit != 0) << i,
-        None => bits,
-    })
 }
 
 /// Sets up the pins and the interrupts. Start-up.

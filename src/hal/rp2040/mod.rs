@@ -6,6 +6,7 @@
 //! | priority | interrupt | file | does |
 //! |---|---|---|---|
 //! | - | PIO0, DMA channels 0 and 1 | `stepper` | step and direction pins, from words in RAM, without the CPU |
+//! | - | PIO1 | `register` | outputs behind shift registers |
 //! | 0 | IO_IRQ_BANK0, TIMER_IRQ_1 | `inputs`, `encoder` | samples the switches when one moves; takes the time of a pulse |
 //! | 1 | UART0_IRQ, UART1_IRQ | `uart` | bytes between the line and the rings |
 //! | 1 | SysTick | `time` | counts milliseconds |
@@ -29,6 +30,7 @@
 pub mod arithmetic;
 pub mod card;
 pub mod drivers;
+mod early;
 pub mod eeprom;
 pub mod encoder;
 #[path = "../host/flash.rs"]
@@ -41,6 +43,7 @@ mod last_words;
 pub mod panic;
 mod pieces;
 pub mod pwm;
+mod register;
 pub mod stepper;
 #[path = "../host/text.rs"]
 pub mod text;

@@ -1,7 +1,7 @@
 //! Timing constants of the RP2040.
 
 use super::Chip;
-use crate::boards::MOTORS;
+use crate::boards::{ACTIVE, MOTORS};
 use crate::dda::Ticks;
 use crate::hal::contract::Timing;
 
@@ -10,11 +10,17 @@ use crate::hal::contract::Timing;
 const USUAL: Ticks =
     Ticks { step: 64, shortest: 64, fine: 66, coarse: 66, coarsest: 66, settles: u16::MAX / 4 };
 
+/// The same, where a shift register has to take eight bits at the beginning and eight at the end of a pulse: 141 cycles
+/// for a pulse of 0.52 us and the pause behind it.
+const SHIFTED: Ticks =
+    Ticks { step: 71, shortest: 71, fine: 73, coarse: 73, coarsest: 73, settles: u16::MAX / 4 };
+
 impl Timing for Chip {
     /// Half the system clock.
     const TIMER_HZ: u32 = 64_000_000;
     const PULSE_US: u8 = 0;
-    const TICKS: [Ticks; MOTORS] = [USUAL; MOTORS];
+    const TICKS: [Ticks; MOTORS] =
+        if ACTIVE.registers.is_some() { [SHIFTED; MOTORS] } else { [USUAL; MOTORS] };
     /// Seven segments of this length in the ring cover the millisecond by which the feeder is ahead, and most of
     /// another one.
     const BLOCK_S_MIN: f32 = 0.000_25;

@@ -1,7 +1,7 @@
 // node bridge.mjs: an emulated board for a program that talks to it over standard input and output. Each line of the input is a request in JSON, each line of
 // the output its answer:
 //
-//   {"board": {"elf": "file", "motors": [[step, dir], ...], "drivers": [address, ...]}, "cut": true, "stick": true, "panic": "file", "crash": "stack", "reset": true, "sense": [[channel, value]], "send": [[port, "hex"]], "now": [[port, byte]], "usb": {"open": bool, "reads": bool}, "faults": [["sleep", ms], ...], "ask": [[byte, ...]], "unmasked": true, "loaded": true, "baud": [[port, rate]], "drive": [[gpio, high]], "wire": [...], "spindle": {"index": gpio, "sync": gpio, "pulses": n}, "noise": {"gpio": gpio, "period": cycles}, "marks": n, "turn": rpm, "drivers": [...], "ails": [{"address": n, "powered": bool, "deaf": bool, "reset": true, "status": bits, "global": bits}], "card": {"file": "image", "select": gpio, "clock": gpio}, "slot": {"there": bool, "access": us, "keep": "file"}, "record": bool, "until": cycle, "line": true}
+//   {"board": {"elf": "file", "motors": [[step, dir], ...], "drivers": [address, ...], "registers": [{"data": gpio, "clock": gpio, "latch": gpio, "outputs": n}, ...]}, "cut": true, "stick": true, "panic": "file", "crash": "stack", "reset": true, "sense": [[channel, value]], "send": [[port, "hex"]], "now": [[port, byte]], "usb": {"open": bool, "reads": bool}, "faults": [["sleep", ms], ...], "ask": [[byte, ...]], "unmasked": true, "loaded": true, "baud": [[port, rate]], "drive": [[gpio, high]], "wire": [...], "spindle": {"index": gpio, "sync": gpio, "pulses": n}, "noise": {"gpio": gpio, "period": cycles}, "marks": n, "turn": rpm, "drivers": [...], "ails": [{"address": n, "powered": bool, "deaf": bool, "reset": true, "status": bits, "global": bits}], "card": {"file": "image", "select": gpio, "clock": gpio}, "slot": {"there": bool, "access": us, "keep": "file"}, "record": bool, "until": cycle, "line": true}
 //
 // `board` comes first, and again where another board is to take the place of the one before. Ports are 0 and 1 for the UARTs, and 2 for USB; `usb` says what the program at its other end does, `faults` what goes wrong there (`trouble`), `ask` which requests the computer makes.
 // With `record` edges of steps are recorded from there on, or what has been recorded is told and no more is. With `cut` the supply fails, and comes again; with `stick` the CPU gets stuck. What is sent and driven comes next; then the board runs to the cycle, or, with `line`, to the end of the next line that it says.
@@ -9,19 +9,23 @@ import { readFileSync, writeFileSync } from 'node:fs';
 import { createInterface } from 'node:readline';
 import { Machine } from './machine.mjs';
 import { Motors, Noise, Spindle } from './pins.mjs';
+import { Register } from './register.mjs';
 import { SdCard } from './sdcard.mjs';
 import { Drivers } from './tmc2209.mjs';
 
 const PWM = 0x40050000;
 const FUNCTION_PWM = 4;
+// The override of a pin's output.
+const INVERT = 1;
 
-let elf, machine, motors, drivers, card;
+let elf, machine, motors, drivers, registers, card;
 // What the answer tells of edges.
 let recorded;
 
 function powerUp(board) {
   ({ elf } = board);
   machine = new Machine(elf);
+  registers = (board.registers ?? []).map((register, which) => new Register(machine, which, register));
   motors = new Motors(machine, board.motors.map(([step, dir]) => ({ step, dir })));
   drivers = new Drivers(machine, motors, board.drivers);
 }
@@ -35,7 +39,10 @@ function handle({ there, access, keep }) {
 
 function act(request) {
   if (request.board) powerUp(request.board);
-  if (request.cut) machine.cutPower();
+  if (request.cut) {
+    machine.cutPower();
+    registers.forEach((register) => register.powerUp());
+  }
   if (request.stick) machine.stick();
   if (request.panic) machine.panic(elf, request.panic);
   if (request.crash) machine.crash(request.crash);
@@ -71,7 +78,8 @@ function shares() {
   return pulsing.map((gpio) => {
     const slice = PWM + 0x14 * (gpio >> 1 & 7);
     const compare = mcu.readUint32(slice + 0xc) >>> (gpio & 1 ? 16 : 0) & 0xffff;
-    return [gpio, Math.min(1, compare / mcu.readUint32(slice + 0x10))];
+    const share = Math.min(1, compare / mcu.readUint32(slice + 0x10));
+    return [gpio, (mcu.gpio[gpio].ctrl >> 8 & 3) === INVERT ? 1 - share : share];
   });
 }
 
@@ -96,7 +104,8 @@ function answer() {
     gaps: motors.gaps.map((gap) => (Number.isFinite(gap) ? gap : null)),
     last: motors.lastStep,
     rotors: drivers.rotors,
-    levels: machine.levels.reduce((bits, level, gpio) => bits + (level === 1 ? 2 ** gpio : 0), 0),
+    levels: machine.levels.slice(0, 30).reduce((bits, level, gpio) => bits + (level === 1 ? 2 ** gpio : 0), 0),
+    registers: registers.map(({ held, least }) => ({ held, least: Number.isFinite(least) ? least : null })),
     shares: shares(),
     units: machine.mcu.gpio.map(({ functionSelect }) => functionSelect),
     floated: machine.floated >>> 0,

@@ -324,9 +324,13 @@ export class Machine {
   changed(gpio, state) {
     if (state === FLOATS) this.floated |= 1 << gpio;
     if (state > 1 || this.levels[gpio] === state) return;
-    this.levels[gpio] = state;
-    const cycle = this.pios[0].now ?? this.cycle;
-    for (const listener of this.edgeListeners) listener(gpio, state, cycle);
+    this.output(gpio, state, this.pios[0].now ?? this.pios[1].now ?? this.cycle);
+  }
+
+  // A pin of the chip, or what is behind it, has changed.
+  output(gpio, level, cycle) {
+    this.levels[gpio] = level;
+    for (const listener of this.edgeListeners) listener(gpio, level, cycle);
   }
 
   // Drives an input.

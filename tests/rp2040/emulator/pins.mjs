@@ -1,6 +1,7 @@
 // What is wired to the pins of the board: motors that count their steps, switches that they work, and the sensors of a spindle.
 
 import { CLOCK_HZ } from './machine.mjs';
+import { FIRST } from './register.mjs';
 
 // A switch that is worked while a motor is at or beyond a step, and until it is `back` steps back.
 class Switch {
@@ -42,21 +43,27 @@ export class Motors {
     this.lastStep = 0;
     this.wired = [];
     this.stepListeners = [];
-    // While someone records: when each motor's steps rise, and the shortest pulse.
+    // While someone records: when each motor's steps rise, edges of outputs behind a register that are no steps, and the shortest pulse.
     this.times = undefined;
+    this.edges = [];
     this.shortest = Infinity;
     this.watchDirections();
-    machine.edgeListeners.push((gpio, level, cycle) => { level ? this.rose(gpio, cycle) : this.fell(gpio, cycle); });
+    machine.edgeListeners.push((gpio, level, cycle) => {
+      if (this.times && gpio >= FIRST[1]) this.edges.push([gpio - FIRST[1], level === 1, cycle]);
+      if (level) this.rose(gpio, cycle);
+      else this.fell(gpio, cycle);
+    });
   }
 
   // Begins to record, or ends: then all that has been recorded.
   record(on) {
-    const { times, shortest } = this;
+    const { times, edges, shortest } = this;
     const [hold, setup] = [this.hold, this.setup].map((least) => (Number.isFinite(least) ? least : null));
     this.times = on ? this.pins.map(() => []) : undefined;
+    this.edges = [];
     this.shortest = Infinity;
     this.watchDirections();
-    return { times, shortest, hold, setup };
+    return { times, edges, shortest, hold, setup };
   }
 
   // The least time from the end of a pulse to the next change of the motor's direction, and from there to the next pulse.

@@ -62,7 +62,7 @@ fn mistakes_are_explained() {
             &job,
             &["--board", "uno"],
             "no board uno; there are mega2560-grbl, mega2560-grbl-lathe, mega2560-lathe, pico, pico6, picobob, \
-             picohal, ramps14, ramps14-cnc, skr-pico",
+             picocnc, picohal, ramps14, ramps14-cnc, skr-pico",
         ),
     ];
     for (elf, job, more, want) in cases {

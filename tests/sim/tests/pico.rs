@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use kerf::boards::inputs::{ENDS, PROBE};
-use kerf::boards::{Board, PICO, PICO6, SKR_PICO, gp};
+use kerf::boards::{Board, PICO, PICO6, PICOCNC, SKR_PICO, gp};
 use kerf_sim::bench::{ideal, spiral};
 use kerf_sim::emulated::even::{FAST, evenness};
 use kerf_sim::emulated::heat::Heat;
@@ -437,7 +437,7 @@ fn the_heatbreak_is_cooled_while_the_hot_end_is_hot_or_may_be() {
 
 /// Longest time from the edge of a limit switch to the last step, us: two samples, the entry of the interrupt, which
 /// may find others, and the step under way.
-const STOP_US: f64 = 12.0;
+pub const STOP_US: f64 = 12.0;
 
 /// Moments of the edge in a millisecond, us. `KERF_LONG=1` tries 300.
 fn moments() -> Vec<u64> {
@@ -778,8 +778,11 @@ fn the_image_keeps_to_the_transcripts() {
     due.extend(share_of(&also, 4).cloned());
     let (printing, others): (Vec<_>, Vec<_>) =
         due.into_iter().partition(|one| begins(&PRINTING, one));
+    let (carded, others): (Vec<_>, Vec<_>) =
+        others.into_iter().partition(|one| begins(&["card"], one));
     transcript::play_all(others, 2, || greeted(&PICO));
     transcript::play_all(printing, 2, || greeted(&SKR_PICO));
+    transcript::play_all(carded, 1, || greeted(&PICOCNC));
 }
 
 /// A board that has greeted on both ports: a greeting takes 10 ms on the slower port.

@@ -2,7 +2,7 @@
 //! card. `cargo xtask test` runs these tests, and installs the emulator.
 
 use fatfs::FatType;
-use kerf::boards::PICO;
+use kerf::boards::PICOCNC;
 use kerf_sim::emulated::Emulated;
 use kerf_sim::{Runs, USB};
 
@@ -19,7 +19,7 @@ struct Session {
 
 impl Session {
     fn new(card: &[u8]) -> Self {
-        let mut board = Emulated::load(&firmware(&PICO), &PICO).unwrap();
+        let mut board = Emulated::load(&firmware(&PICOCNC), &PICOCNC).unwrap();
         board.insert_card(card).unwrap();
         board.run_for_ms(300).unwrap();
         Self { board, heard: String::new() }

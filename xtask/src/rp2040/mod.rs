@@ -15,8 +15,9 @@ use crate::toolchain::Toolchain;
 const TARGET: &str = "thumbv6m-none-eabi";
 
 /// Linker scripts of `cortex-m-rt` and `embassy-rp`, which find `memory.x` in the folder of the chip's sources. With
-/// `--nmagic` sections are not aligned to pages.
-const FLAGS: &str = "-C linker=ld.lld -C link-arg=-Tlink.x -C link-arg=-Tlink-rp.x -C link-arg=-Lsrc/hal/rp2040 -C link-arg=--nmagic";
+/// `--nmagic` sections are not aligned to pages. `--wrap` has `src/hal/rp2040/early.rs` run before memory is initialised,
+/// around what `embassy-rp` runs then.
+const FLAGS: &str = "-C linker=ld.lld -C link-arg=-Tlink.x -C link-arg=-Tlink-rp.x -C link-arg=-Lsrc/hal/rp2040 -C link-arg=--nmagic -C link-arg=--wrap=__pre_init";
 
 /// Flash that the image may take: 2 MiB minus the part of `memory.x` that stores settings.
 const FLASH: u64 = (2 << 20) - (68 << 10);

@@ -76,6 +76,7 @@ enum Sender {
     CncjsMarlin,
     Octoprint,
     MarlinHost,
+    Pronsole,
 }
 
 impl Sender {
@@ -111,6 +112,7 @@ impl Sender {
             Sender::CncjsMarlin => ("cncjs-marlin", "cncjs-marlin.js", None),
             Sender::Octoprint => ("octoprint", "octoprint-server.py", None),
             Sender::MarlinHost => ("marlin-host", "marlin-host.py", None),
+            Sender::Pronsole => ("pronsole", "pronsole-card.py", None),
         }
     }
 }
@@ -120,13 +122,19 @@ impl Sender {
     fn prints(self) -> bool {
         matches!(
             self,
-            Sender::Printcore | Sender::CncjsMarlin | Sender::Octoprint | Sender::MarlinHost
+            Sender::Printcore
+                | Sender::CncjsMarlin
+                | Sender::Octoprint
+                | Sender::MarlinHost
+                | Sender::Pronsole
         )
     }
 
     /// Returns the boards for this sender: the one by default, and the emulated one.
     fn boards(self) -> [Board; 2] {
         match self.prints() {
+            // It uploads to a card.
+            _ if self == Sender::Pronsole => [Board::PicoCnc; 2],
             true => [Board::Ramps14, Board::SkrPico],
             false => [Board::default(), Board::Pico],
         }
@@ -150,10 +158,12 @@ pub fn run_short() -> Result<()> {
     run(&SendersArgs { sender, job, brief: true, ..Default::default() })
 }
 
-/// Returns the share that a number chooses. The shares of consecutive numbers together are all senders.
+/// Returns the share that a number chooses. The shares of consecutive numbers together are all senders but those for
+/// emulated boards alone.
 fn share(number: u64) -> Vec<Sender> {
     let first = (number % SHARE as u64) as usize;
-    Sender::value_variants().iter().copied().skip(first).step_by(SHARE).collect()
+    let senders = Sender::value_variants().iter().copied();
+    senders.filter(|sender| !sender.boards()[0].is_rp2040()).skip(first).step_by(SHARE).collect()
 }
 
 /// Runs all senders with whole jobs.
@@ -222,7 +232,7 @@ mod tests {
     #[test]
     fn shares_are_all_senders_together_and_have_hosts_of_both_kinds() {
         let shares = [41, 42].map(share);
-        assert_eq!(shares.concat().len(), Sender::value_variants().len());
+        assert_eq!(shares.concat().len() + 1, Sender::value_variants().len());
         for share in shares {
             assert!(share.iter().any(|sender| sender.prints()), "{share:?}");
             assert!(share.iter().any(|sender| !sender.prints()), "{share:?}");

@@ -13,7 +13,7 @@ use embassy_rp::interrupt::InterruptExt;
 
 use super::machine::{self, Chunk, Place, WIRING};
 use super::words::{CYCLES_PER_COUNT, OF_A_SEGMENT, OF_THE_END, Out, Writer};
-use super::{BEGINS, CHUNK_CYCLES, PULSE_US, RING, RUNNING, STOPPED, exec, mask};
+use super::{BEGINS, CHUNK_CYCLES, INVERTED, PULSE_US, RING, RUNNING, STOPPED, exec, mask};
 use crate::boards::MOTORS;
 use crate::dda::{Dda, SEGMENTS, Segment, contact};
 use crate::hal::event::Event;
@@ -118,6 +118,7 @@ impl Feeder {
     }
 
     fn begin(&mut self) {
+        self.writer.set_inverted(INVERTED.load(Relaxed));
         self.writer.set_pulse(PULSE_US.load(Relaxed) as u8);
         machine::set_pulse(self.writer.pulse_count());
         (self.begins, self.ended) = (true, false);
@@ -206,6 +207,12 @@ impl Feeder {
         self.dda.settle(queued, position);
         (self.flying, self.ended) = (0, false);
         self.writer.rest();
+        self.show();
+    }
+
+    /// Sets the pins as they are between pulses. While nothing is sent.
+    pub(super) fn show(&mut self) {
+        self.writer.set_inverted(INVERTED.load(Relaxed));
         machine::show(self.writer.low());
     }
 

@@ -1,7 +1,7 @@
 //! The state machine, its FIFO and the two DMA channels: this module owns all their registers.
 //!
 //! ```text
-//! RAM: chunk n, n + 1  --channel n mod 2-->  FIFO (4 words)  -->  state machine  -->  pins
+//! RAM: chunk n, n + 1  --channel n mod 2-->  FIFO (4 words)  -->  state machine  -->  pins, or shift register
 //! ```
 
 use core::cell::UnsafeCell;
@@ -9,23 +9,23 @@ use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 use embassy_rp::interrupt::{DMA_IRQ_0, InterruptExt, PIO0_IRQ_0, Priority};
 use embassy_rp::pac::{DMA, PIO0};
-use embassy_rp::pio::program::pio_asm;
 
+use super::program::{self, Layout};
 use super::words::{CHANGES, Count, Entry, List, Wiring};
-use super::{CHUNK, CHUNKS, STOPPED, gpio, mask};
+use super::{CHUNK, CHUNKS, INVERTED, STOPPED, gpio, mask, register};
 use crate::boards::{ACTIVE, MOTORS, Port};
 
 /// The number of the state machine, of four.
 const SM: usize = 0;
-/// The address of its program. The program has to be loaded at this address, because its jumps are not relocated.
-const ORIGIN: u8 = 0;
-/// Addresses at which the program has taken the first word of an entry but not carried it out.
-const HALF_TAKEN: [core::ops::RangeInclusive<u8>; 2] = [1..=4, 10..=12];
-const TAKEN: u8 = 13;
+/// Where its program is in an entry, by the address of the instruction.
+const LAYOUT: Layout =
+    if ACTIVE.registers.is_some() { program::OF_SHIFTED } else { program::OF_DIRECT };
 /// Bit of the interrupt flag that a marked entry raises.
 const MARKED: u8 = 1;
 /// How often [`place`] reads again when the state machine moves on meanwhile.
 const TRIES: u8 = 8;
+/// How often [`show`] looks at most whether the state machine waits again; each time takes ten cycles or more.
+const POLLS: u8 = 20;
 /// Words of an entry.
 const WORDS: u32 = 2;
 
@@ -41,14 +41,18 @@ const BUSY: u32 = 1 << 24;
 const PINS: u8 = 30;
 
 /// The motors' pins.
-pub(super) static WIRING: Wiring = Wiring::new(ACTIVE.motors);
+pub(super) static WIRING: Wiring = Wiring::new(ACTIVE.motors, ACTIVE.registers);
 
 const _: () = {
+    let (port, pins) = match ACTIVE.registers {
+        Some(registers) => (Port::Steps, registers.steps.outputs),
+        None => (Port::Gpio, PINS),
+    };
     let mut m = 0;
     while m < MOTORS {
         let (step, dir) = (ACTIVE.motors[m].step, ACTIVE.motors[m].dir);
-        assert!(step.port as u8 == Port::Gpio as u8 && dir.port as u8 == Port::Gpio as u8);
-        assert!(step.bit < PINS && dir.bit < PINS);
+        assert!(step.port as u8 == port as u8 && dir.port as u8 == port as u8);
+        assert!(step.bit < pins && dir.bit < pins);
         m += 1;
     }
 };
@@ -88,60 +92,17 @@ fn length(chunk: u32) -> u32 {
 
 /// Connects the pins and loads the program. Start-up.
 pub(super) fn start() {
-    let program = pio_asm!(
-        ".origin 0",
-        ".wrap_target",
-        "start:",
-        "    pull block",
-        "    out x, 1",
-        "    jmp !x tick",
-        // Pins change.
-        "    out x, 1",
-        "    pull block",
-        "    out y, 32",
-        "    mov pins, y",
-        "    jmp !x start",
-        "    irq nowait 0",
-        "    jmp start",
-        "tick:",
-        "    out x, 31",
-        "rest:",
-        "    jmp x-- rest",
-        "    pull block",
-        "    out pins, 32",
-        "    mov x, isr",
-        "pulse:",
-        "    jmp x-- pulse",
-        "    mov pins, y",
-        ".wrap",
-    );
-    for (i, instruction) in program.program.code.iter().enumerate() {
-        PIO0.instr_mem(i).write(|w| w.set_instr_mem(*instruction));
-    }
     let sm = PIO0.sm(SM);
     sm.clkdiv().write(|w| w.set_int(1));
-    sm.execctrl().write(|w| {
-        w.set_wrap_bottom(program.program.wrap.target);
-        w.set_wrap_top(program.program.wrap.source);
-    });
-    sm.shiftctrl().write(|w| {
-        w.set_out_shiftdir(true);
-        w.set_in_shiftdir(true);
-    });
-    // Pins become outputs by instructions that the state machine carries out at once.
-    for motor in ACTIVE.motors {
-        for pin in [motor.step, motor.dir] {
-            sm.pinctrl().write(|w| {
-                w.set_set_base(pin.bit);
-                w.set_set_count(1);
-            });
-            execute(SET_PINS);
-            execute(SET_PINDIRS);
-            gpio::connect_output(pin, gpio::Unit::Pio0);
-        }
+    if let Some(registers) = ACTIVE.registers {
+        register::load(PIO0, SM, &program::shifted());
+        register::connect(PIO0, SM, registers.steps, gpio::Unit::Pio0);
+        // The register has anything at power-up, and keeps what it has over a reset.
+        show(0);
+    } else {
+        register::load(PIO0, SM, &program::direct());
+        connect_motors();
     }
-    // All pins of the chip. Only the motors' pins are connected to the state machine.
-    sm.pinctrl().write(|w| w.set_out_count(PINS));
     PIO0.irqs(0).inte().write(|w| w.set_sm0(true));
     DMA.inte(0).write_value(0b11);
     for interrupt in [DMA_IRQ_0, PIO0_IRQ_0] {
@@ -151,10 +112,25 @@ pub(super) fn start() {
     }
 }
 
-/// `set pins, 0`, `set pindirs, 1`, `jmp 0`, `pull block`, `mov isr, osr`.
-const SET_PINS: u16 = 0b111_00000_000_00000;
-const SET_PINDIRS: u16 = 0b111_00000_100_00001;
-const JMP_START: u16 = ORIGIN as u16;
+/// Makes the motors' pins outputs of the state machine.
+fn connect_motors() {
+    let sm = PIO0.sm(SM);
+    sm.shiftctrl().write(|w| {
+        w.set_out_shiftdir(true);
+        w.set_in_shiftdir(true);
+    });
+    for motor in ACTIVE.motors {
+        for pin in [motor.step, motor.dir] {
+            register::drive_low(PIO0, SM, pin);
+            gpio::connect_output(pin, gpio::Unit::Pio0);
+        }
+    }
+    // All pins of the chip. Only the motors' pins are connected to the state machine.
+    sm.pinctrl().write(|w| w.set_out_count(PINS));
+}
+
+/// `jmp 0`, `pull block`, `mov isr, osr`.
+const JMP_START: u16 = 0;
 const PULL: u16 = 0b100_00000_1010_0000;
 const TO_PULSE: u16 = 0b101_00000_110_00_111;
 
@@ -270,8 +246,8 @@ pub fn place() -> Place {
         let (place, waiting) = (sent(), waiting());
         let at = PIO0.sm(SM).addr().read().addr();
         let taken = match at {
-            TAKEN => WORDS,
-            at if HALF_TAKEN.iter().any(|range| range.contains(&at)) => 1,
+            at if LAYOUT.taken.contains(&at) => WORDS,
+            at if LAYOUT.half_taken.iter().any(|range| range.contains(&at)) => 1,
             _ => 0,
         };
         found = back(place, waiting + taken);
@@ -331,13 +307,14 @@ fn entry(chunk: u32, number: u32) -> Entry {
 /// cannot run.
 pub(super) fn steps_behind(place: Place) -> [i32; MOTORS] {
     let mut count = Count::default();
+    let inverted = INVERTED.load(Relaxed);
     let (mut at, end) = (place, SENT.load(Relaxed));
     for _ in 0..CHUNKS {
         if at.chunk == end {
             break;
         }
         for number in at.words / WORDS..length(at.chunk) / WORDS {
-            count.add(&WIRING, entry(at.chunk, number));
+            count.add(&WIRING, inverted, entry(at.chunk, number));
         }
         at = Place { chunk: at.chunk.wrapping_add(1), words: 0 };
     }
@@ -368,10 +345,15 @@ pub(super) fn drop_words() -> [i32; MOTORS] {
     steps
 }
 
-/// Sets the pins to `pins`, while nothing else is sent.
+/// Sets the pins to `pins`, while nothing else is sent. Cost: a microsecond, until the state machine waits again.
 pub(super) fn show(pins: u32) {
     for word in [CHANGES, pins] {
         PIO0.txf(SM).write_value(word);
     }
     run();
+    for _ in 0..POLLS {
+        if waiting() == 0 && PIO0.sm(SM).addr().read().addr() == 0 {
+            break;
+        }
+    }
 }

@@ -2,7 +2,9 @@
 //!
 //! An entry of two words is a pause, a pulse, and the pins for that pulse ([`words`]). The state machine runs at the
 //! system clock, so each edge comes at its exact cycle whatever the CPU does, and all motors share one time base. The
-//! pins may be anywhere, because an entry has bits for all pins of the chip.
+//! pins may be anywhere, because an entry has bits for all pins of the chip. On a board with [registers](crate::boards::Registers) they are outputs
+//! of a shift register: another program sends the same entries bit by bit, and all outputs change with its latch
+//! ([`program`]).
 //!
 //! The **feeder**, the handler of DMA_IRQ_0 and PIO0_IRQ_0, runs the step generator ([`Dda`]) ahead of time and
 //! writes chunks of entries, each about half a millisecond long. While one chunk is sent the next one waits behind
@@ -19,18 +21,20 @@
 
 mod feeder;
 mod machine;
+mod program;
 pub mod words;
 
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
 
 use embassy_rp::interrupt::{DMA_IRQ_0, InterruptExt};
 
-use super::{exec, gpio, mask};
+use super::{exec, gpio, mask, register};
 use crate::boards::{ACTIVE, MOTORS};
 use crate::dda::{Dda, SEGMENTS, Segment};
 use crate::hal::ring::Ring;
 use crate::hal::segments::Segments;
 use feeder::FEEDER;
+use machine::WIRING;
 pub use machine::{Place, place};
 
 /// Entries of a chunk: enough for a step each microsecond, and some more.
@@ -50,6 +54,8 @@ static STOPPED: AtomicBool = AtomicBool::new(false);
 static BEGINS: AtomicBool = AtomicBool::new(false);
 /// How long pulses last, us.
 static PULSE_US: AtomicU32 = AtomicU32::new(2);
+/// The outputs of a register that are inverted, as bits of an entry. A pin of the chip is inverted at its pad instead.
+static INVERTED: AtomicU32 = AtomicU32::new(0);
 
 /// Sets PIO, DMA and pins up, and returns the filling end of the segment ring. Start-up; `None` after the first time.
 pub fn start() -> Option<Segments> {
@@ -131,6 +137,10 @@ pub(super) fn contact(place: Place) {
 
 /// Sets which direction pins are inverted: bit m for motor m. Thread mode, while nothing runs.
 pub fn set_inverted(motors: u8) {
+    if ACTIVE.registers.is_some() {
+        let dirs = |motors| WIRING.turned(motors);
+        return invert(dirs(u8::MAX), dirs(motors));
+    }
     for (m, motor) in ACTIVE.motors.iter().enumerate() {
         gpio::invert(motor.dir, motors & 1 << m != 0);
     }
@@ -140,7 +150,25 @@ pub fn set_inverted(motors: u8) {
 /// the values may change only while nothing runs.
 pub fn set_step_output(pulse_us: u8, inverted: u8) {
     PULSE_US.store(pulse_us.into(), Relaxed);
+    if ACTIVE.registers.is_some() {
+        let steps = |motors| WIRING.stepping(motors);
+        return invert(steps(u8::MAX), steps(inverted));
+    }
     for (m, motor) in ACTIVE.motors.iter().enumerate() {
         gpio::invert(motor.step, inverted & 1 << m != 0);
     }
+}
+
+/// Inverts the outputs `inverted` of the outputs `of`, and no other of these. They change at once if nothing runs.
+fn invert(of: u32, inverted: u32) {
+    let pins = INVERTED.load(Relaxed) & !of | inverted;
+    if pins == INVERTED.load(Relaxed) {
+        return;
+    }
+    INVERTED.store(pins, Relaxed);
+    feeder::alone(|feeder| {
+        if !RUNNING.load(Relaxed) && !is_stopped() {
+            feeder.show();
+        }
+    });
 }

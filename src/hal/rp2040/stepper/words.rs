@@ -10,10 +10,13 @@
 //! pulse with the old directions, one tick before the first pulse with the new ones. Between the end of that pulse and
 //! the change is [`HOLD`], in entries of its own: drivers read the direction some time after the edge of a step.
 //!
+//! The pins of an entry are pins of the chip, or outputs of a shift register, to which the state machine sends them bit
+//! by bit ([`Program`]).
+//!
 //! Time is counted in cycles of the system clock. An entry lasts at least [`Writer::least`]. An entry that ought to be
 //! shorter is extended to that, and the rests of the entries after it make up for the delay.
 
-use crate::boards::{MOTORS, MotorPins};
+use crate::boards::{MOTORS, MotorPins, Pin, Registers};
 use crate::dda::{Dda, Pins, SEGMENTS, STEP};
 
 /// An entry: what the state machine takes at a time.
@@ -26,17 +29,37 @@ pub const MARK: u32 = 2;
 /// Position of the rest in the first word.
 const REST: u32 = 1;
 
-/// Least cycles that the program takes for a pulse, for an entry besides its rest and its pulse, and for an entry
-/// that changes pins.
-const PULSE_LEAST: i32 = 3;
-const AROUND: i32 = 7;
-const CHANGE: i32 = 8;
+/// The cycles that a program takes.
+#[derive(Clone, Copy)]
+pub struct Program {
+    /// The shortest pulse.
+    pulse: i32,
+    /// An entry besides its rest and its pulse.
+    around: i32,
+    /// An entry that changes pins.
+    change: i32,
+    /// From the end of a pulse to the change of pins by the next entry. 0 stands for some cycles.
+    lead: i32,
+}
+
+impl Program {
+    /// The program that sets pins of the chip.
+    pub const DIRECT: Program = Program { pulse: 3, around: 7, change: 8, lead: 0 };
+    /// The program that shifts eight bits out. Each bit takes 8 cycles; the latch follows 4 cycles behind the last edge of
+    /// the clock, and is high for as long.
+    pub const SHIFTED: Program = Program { pulse: 67, around: 74, change: 74, lead: 74 };
+
+    /// Returns the number of entries that change nothing and last for `cycles`.
+    const fn changes(self, cycles: i32) -> usize {
+        (cycles as u32).div_ceil(self.change as u32) as usize
+    }
+}
 
 /// Least cycles from the end of a pulse to a change of directions: a microsecond.
 const HOLD: i32 = CYCLES_PER_US as i32;
 
-/// Entries that hold directions for as long, if pulses are wider.
-const HOLDS: usize = (HOLD / CHANGE) as usize;
+/// The most entries that hold directions for as long.
+const HOLDS: usize = Program::DIRECT.changes(HOLD);
 
 /// Entries that a segment makes besides those of its ticks.
 pub const OF_A_SEGMENT: usize = HOLDS + 1;
@@ -56,8 +79,9 @@ const PAIRS: usize = MOTORS.div_ceil(2);
 /// The carry bits of both phases of a pair.
 const CARRIES: u32 = (STEP as u32) << 16 | STEP as u32;
 
-/// The pins of the motors.
+/// The pins of the motors, and the program that sets them.
 pub struct Wiring {
+    program: Program,
     /// Step pins of each set of motors.
     steps: [u32; 1 << MOTORS],
     /// The direction pin of each motor.
@@ -65,16 +89,18 @@ pub struct Wiring {
 }
 
 impl Wiring {
-    /// Makes the wiring of these motors. Bits are numbers of pins.
-    pub const fn new(motors: &[MotorPins]) -> Self {
-        let mut wiring = Self { steps: [0; 1 << MOTORS], dirs: [0; MOTORS] };
+    /// Makes the wiring of these motors. Bits are numbers of pins, or the outputs of the shift register in the order in
+    /// which they are sent: the last one first.
+    pub const fn new(motors: &[MotorPins], registers: Option<Registers>) -> Self {
+        let program = if registers.is_some() { Program::SHIFTED } else { Program::DIRECT };
+        let mut wiring = Self { program, steps: [0; 1 << MOTORS], dirs: [0; MOTORS] };
         let mut m = 0;
         while m < MOTORS {
-            wiring.dirs[m] = 1 << motors[m].dir.bit;
+            wiring.dirs[m] = bit_of(motors[m].dir, registers);
             let mut set = 0;
             while set < 1 << MOTORS {
                 if set >> m & 1 != 0 {
-                    wiring.steps[set] |= 1 << motors[m].step.bit;
+                    wiring.steps[set] |= bit_of(motors[m].step, registers);
                 }
                 set += 1;
             }
@@ -83,10 +109,23 @@ impl Wiring {
         wiring
     }
 
+    /// Returns the step pins of the motors in `motors`.
+    pub fn stepping(&self, motors: u8) -> u32 {
+        self.steps[usize::from(motors) % (1 << MOTORS)]
+    }
+
     /// Returns the direction pins of the motors in `backwards`.
-    fn turned(&self, backwards: u8) -> u32 {
+    pub fn turned(&self, backwards: u8) -> u32 {
         let dirs = self.dirs.iter().enumerate();
         dirs.fold(0, |pins, (m, dir)| if backwards >> m & 1 != 0 { pins | dir } else { pins })
+    }
+}
+
+/// Returns the bit of a pin in an entry.
+const fn bit_of(pin: Pin, registers: Option<Registers>) -> u32 {
+    match registers {
+        Some(Registers { steps, .. }) => 1 << (steps.outputs - 1 - pin.bit),
+        None => 1 << pin.bit,
     }
 }
 
@@ -137,6 +176,8 @@ pub struct Writer {
     wiring: &'static Wiring,
     /// The pins between pulses.
     low: u32,
+    /// The pins that are inverted.
+    inverted: u32,
     /// Cycles from the last pulse to the tick that is being written, less what entries have taken since. Negative if
     /// they took more.
     age: i32,
@@ -149,17 +190,23 @@ pub struct Writer {
 impl Writer {
     /// All pins low.
     pub const fn new(wiring: &'static Wiring) -> Self {
-        Self { wiring, low: 0, age: 0, period: 0, pulse: 2 * CYCLES_PER_US as i32 }
+        Self { wiring, low: 0, inverted: 0, age: 0, period: 0, pulse: 2 * CYCLES_PER_US as i32 }
     }
 
     /// Sets how long pulses last from now on, in microseconds; 0 means half of one.
     pub fn set_pulse(&mut self, us: u8) {
-        self.pulse = (i32::from(us) * CYCLES_PER_US as i32).max(SHORTEST);
+        let pulse = i32::from(us) * CYCLES_PER_US as i32;
+        self.pulse = pulse.max(SHORTEST).max(self.wiring.program.pulse);
+    }
+
+    /// Sets the pins that are inverted from now on. The feeder, while nothing is sent.
+    pub fn set_inverted(&mut self, pins: u32) {
+        self.low ^= core::mem::replace(&mut self.inverted, pins) ^ pins;
     }
 
     /// Returns the number that the program counts down in a pulse.
     pub fn pulse_count(&self) -> u32 {
-        (self.pulse - PULSE_LEAST) as u32
+        (self.pulse - self.wiring.program.pulse) as u32
     }
 
     /// Begins a motion: the first tick comes after `cycles`.
@@ -175,7 +222,7 @@ impl Writer {
 
     /// Returns the cycles of the shortest entry with a pulse.
     fn least(&self) -> i32 {
-        self.pulse + AROUND
+        self.pulse + self.wiring.program.around
     }
 
     /// Returns the cycles from a tick to the next.
@@ -207,7 +254,7 @@ impl Writer {
             self.age = self.age.saturating_add(i32::from(ticks).saturating_mul(self.period));
             return;
         }
-        let pins = self.wiring.steps[full] | self.low;
+        let pins = self.wiring.steps[full] ^ self.low;
         let (period, least) = (self.period, self.least());
         let mut rest = self.age - least;
         for place in to.take(ticks.into()) {
@@ -236,7 +283,7 @@ impl Writer {
                 break;
             }
             let set = (due | due >> (16 - PAIRS)) as usize & ((1 << MOTORS) - 1);
-            *place = [head(rest), sets[set] | self.low];
+            *place = [head(rest), sets[set] ^ self.low];
             rest = rest.min(0) - least;
             used += 1;
         }
@@ -248,15 +295,20 @@ impl Writer {
         }
     }
 
-    /// Puts entries that last for [`HOLD`]: one without a pulse, or, if that would last longer, some that change nothing.
+    /// Puts entries that last until a change can follow [`HOLD`] behind the last pulse: one without a pulse, or, if that
+    /// would last longer, some that change nothing.
     fn hold(&mut self, to: &mut List) {
-        let rest = HOLD - self.least();
+        let program = self.wiring.program;
+        let wanted = HOLD - program.lead;
+        let rest = wanted - self.least();
         if rest >= 0 {
             to.put([head(rest), self.low]);
+            self.age -= wanted;
         } else {
-            (0..HOLDS).for_each(|_| to.put([CHANGES, self.low]));
+            let changes = program.changes(wanted);
+            (0..changes).for_each(|_| to.put([CHANGES, self.low]));
+            self.age -= changes as i32 * program.change;
         }
-        self.age -= HOLD;
     }
 
     /// Puts an entry without a pulse for the time that has passed. The next entry begins behind it.
@@ -320,8 +372,8 @@ impl Pins for Out<'_, '_> {
 
     fn direction(&mut self, backwards: u8) {
         self.writer.hold(self.to);
-        self.writer.low = self.writer.wiring.turned(backwards);
-        self.writer.age -= CHANGE;
+        self.writer.low = self.writer.wiring.turned(backwards) ^ self.writer.inverted;
+        self.writer.age -= self.writer.wiring.program.change;
         self.to.put([CHANGES, self.writer.low]);
     }
 
@@ -342,8 +394,9 @@ pub struct Count {
 }
 
 impl Count {
-    /// Adds an entry that is carried out.
-    pub fn add(&mut self, wiring: &Wiring, [head, pins]: Entry) {
+    /// Adds an entry that is carried out, with the pins that are inverted.
+    pub fn add(&mut self, wiring: &Wiring, inverted: u32, [head, pins]: Entry) {
+        let pins = pins ^ inverted;
         if head & CHANGES != 0 {
             return;
         }
@@ -361,7 +414,7 @@ const _: () = assert!(SEGMENTS > 1);
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::boards::gp;
+    use crate::boards::{Port, ShiftRegister, gp, pin};
     use crate::dda::Segment;
     use avr_embassy::ring::Ring;
     use proptest::prelude::*;
@@ -369,12 +422,35 @@ mod tests {
     use std::vec::Vec;
 
     /// The pins are in no particular order.
-    static WIRING: Wiring = Wiring::new(&[
-        MotorPins { step: gp(11), dir: gp(10), enable: None },
-        MotorPins { step: gp(6), dir: gp(5), enable: None },
-        MotorPins { step: gp(19), dir: gp(28), enable: None },
-        MotorPins { step: gp(14), dir: gp(13), enable: None },
-    ]);
+    static WIRING: Wiring = Wiring::new(
+        &[
+            MotorPins { step: gp(11), dir: gp(10), enable: None },
+            MotorPins { step: gp(6), dir: gp(5), enable: None },
+            MotorPins { step: gp(19), dir: gp(28), enable: None },
+            MotorPins { step: gp(14), dir: gp(13), enable: None },
+        ],
+        None,
+    );
+
+    const CHAIN: ShiftRegister =
+        ShiftRegister { data: gp(14), clock: gp(15), latch: gp(16), outputs: 8 };
+
+    /// Steps at the outputs 0, 2, 4 and 6 of a register, directions at those behind them.
+    static BEHIND: Wiring = {
+        let mut motors = [MotorPins { step: gp(0), dir: gp(0), enable: None }; 4];
+        let mut m = 0;
+        while m < 4 {
+            motors[m].step = pin(Port::Steps, 2 * m as u8);
+            motors[m].dir = pin(Port::Steps, 2 * m as u8 + 1);
+            m += 1;
+        }
+        Wiring::new(&motors, Some(Registers { steps: CHAIN, outputs: CHAIN }))
+    };
+
+    #[test]
+    fn the_last_output_is_sent_first() {
+        assert_eq!((BEHIND.steps[1], BEHIND.dirs[3]), (0x80, 0x01));
+    }
 
     /// Steps: when, of which motors, and which go backwards.
     type Rises = Vec<(i64, u8, u8)>;
@@ -419,13 +495,19 @@ mod tests {
     const FIRST: u32 = 800;
 
     /// Returns the entries of segments, written `chunk` ticks at a time, and what the program counts in a pulse.
-    fn written(segments: &[Segment], chunk: u16, pulse_us: u8) -> (Vec<Entry>, i64) {
+    fn written(
+        (wiring, inverted): (&'static Wiring, u32),
+        segments: &[Segment],
+        chunk: u16,
+        pulse_us: u8,
+    ) -> (Vec<Entry>, i64) {
         let ring: &'static Ring<Segment, 8> = Box::leak(Box::default());
         let (mut producer, mut consumer) = ring.split().unwrap();
         segments.iter().for_each(|segment| producer.push(*segment).unwrap());
-        let (mut dda, mut writer) = (Dda::new(), Writer::new(&WIRING));
+        let (mut dda, mut writer) = (Dda::new(), Writer::new(wiring));
         let mut room = std::vec![[0; 2]; 4_000];
         let mut list = List::new(&mut room);
+        writer.set_inverted(inverted);
         writer.set_pulse(pulse_us);
         writer.begin(FIRST, &mut list);
         loop {
@@ -448,26 +530,34 @@ mod tests {
         (room, writer.pulse_count().into())
     }
 
-    /// Returns when steps rise, by the timing of the program.
-    fn rises(entries: &[Entry], pulse: i64) -> Rises {
-        let (mut now, mut low, mut all) = (0, 0, Vec::new());
+    /// Returns when steps rise, by the timing of the program. Directions stand for a microsecond behind a pulse.
+    fn rises((wiring, inverted): (&Wiring, u32), entries: &[Entry], pulse: i64) -> Rises {
+        let (mut now, mut low, mut fell, mut all) = (0, 0, i64::MIN / 2, Vec::new());
+        let Program { pulse: least, around, change, lead } = wiring.program;
+        // The latch of a register stays high for four cycles before the next entry.
+        let behind = if lead == 0 { 0 } else { 4 };
         for [head, pins] in entries {
+            let pins = pins ^ inverted;
             if head & CHANGES != 0 {
-                low = *pins;
-                now += 8;
+                let changed = now + i64::from(change - behind);
+                assert!(pins == low || changed - fell >= HOLD.into(), "{}", changed - fell);
+                low = pins;
+                now += i64::from(change);
                 continue;
             }
-            now += 7 + i64::from(head >> REST);
-            let high = |m: &usize| pins & WIRING.steps[1 << m] != 0;
+            now += i64::from(around - behind) + i64::from(head >> REST);
+            let high = |m: &usize| pins & wiring.steps[1 << m] != 0;
             let motors = (0..MOTORS).filter(high).fold(0, |set, m| set | 1 << m);
-            let turned = |m: &usize| pins & WIRING.dirs[*m] != 0;
+            let turned = |m: &usize| pins & wiring.dirs[*m] != 0;
             let backwards = (0..MOTORS).filter(turned).fold(0, |set, m| set | 1 << m);
             // Directions were set before the pulse.
-            assert_eq!(pins & !WIRING.steps[15], low);
+            assert_eq!(pins & !wiring.steps[15], low);
+            now += pulse + i64::from(least);
             if motors != 0 {
-                all.push((now, motors, backwards & motors));
+                all.push((now - pulse - i64::from(least), motors, backwards & motors));
+                fell = now;
             }
-            now += pulse + 3;
+            now += i64::from(behind);
         }
         all
     }
@@ -485,14 +575,19 @@ mod tests {
             segments in prop::collection::vec(
                 (
                     prop::array::uniform4(prop_oneof![Just(0), Just(STEP), 0u16..=STEP]),
-                    1u16..60, 110u16..5_000, 0u8..16,
+                    1u16..60, 150u16..5_000, 0u8..16,
                 ),
                 1..7,
             ),
             chunk in 1u16..40,
+            // Behind a register, with these outputs inverted; or pins of the chip.
+            behind in prop::option::of(0u32..256),
         ) {
+            let wired = behind.map_or((&WIRING, 0), |inverted| (&BEHIND, inverted));
+            // The register takes longer, so that ticks of the shortest period would come late behind a turn.
+            let least = if wired.0.program.lead == 0 { 0 } else { 40 };
             let segments: Vec<_> =
-                segments.into_iter().map(|(i, t, p, b)| segment(i, t, p, b)).collect();
+                segments.into_iter().map(|(i, t, p, b)| segment(i, t, p - 40 + least, b)).collect();
             let ring: &'static Ring<Segment, 8> = Box::leak(Box::default());
             let (mut producer, mut consumer) = ring.split().unwrap();
             segments.iter().for_each(|segment| producer.push(*segment).unwrap());
@@ -501,11 +596,11 @@ mod tests {
                 dda.tick(&mut plan, &mut consumer);
                 plan.now += plan.period;
             }
-            let (entries, pulse) = written(&segments, chunk, 0);
-            let found = rises(&entries, pulse);
+            let (entries, pulse) = written(wired, &segments, chunk, 0);
+            let found = rises(wired, &entries, pulse);
             prop_assert_eq!(from_the_first(&found), from_the_first(&plan.rises));
             let mut count = Count::default();
-            entries.iter().for_each(|entry| count.add(&WIRING, *entry));
+            entries.iter().for_each(|entry| count.add(wired.0, wired.1, *entry));
             let mut expected = [0; MOTORS];
             for (_, motors, backwards) in plan.rises {
                 for (m, steps) in expected.iter_mut().enumerate() {
@@ -520,11 +615,21 @@ mod tests {
     /// A step each microsecond, with pulses of half of one.
     #[test]
     fn a_million_steps_a_second() {
-        let (entries, pulse) = written(&[segment([STEP; 4], 1_000, 64, 0)], 500, 0);
-        let rises = rises(&entries, pulse);
+        let (entries, pulse) = written((&WIRING, 0), &[segment([STEP; 4], 1_000, 64, 0)], 500, 0);
+        let rises = rises((&WIRING, 0), &entries, pulse);
         assert_eq!(rises.len(), 1_000);
         assert!(rises.windows(2).all(|pair| pair[1].0 - pair[0].0 == 128));
         assert_eq!(pulse + 3, 64);
+    }
+
+    /// Behind a register the shortest pulse is 0.52 us, and a step takes 142 cycles.
+    #[test]
+    fn nine_hundred_thousand_steps_a_second_behind_a_register() {
+        let (entries, pulse) = written((&BEHIND, 0), &[segment([STEP; 4], 1_000, 71, 0)], 500, 0);
+        let rises = rises((&BEHIND, 0), &entries, pulse);
+        assert_eq!(rises.len(), 1_000);
+        assert!(rises.windows(2).all(|pair| pair[1].0 - pair[0].0 == 142));
+        assert_eq!(pulse, 0);
     }
 
     /// A pulse that is due too soon after another comes late, and the pulses after it come in time again.
@@ -532,8 +637,8 @@ mod tests {
     fn late_pulses_are_made_up_for() {
         let close = segment([STEP, 0, 0, 0], 4, 64, 0);
         let wide = segment([STEP, 0, 0, 0], 4, 1_000, 0);
-        let (entries, pulse) = written(&[wide, close, wide], 100, 2);
-        let rises = from_the_first(&rises(&entries, pulse));
+        let (entries, pulse) = written((&WIRING, 0), &[wide, close, wide], 100, 2);
+        let rises = from_the_first(&rises((&WIRING, 0), &entries, pulse));
         assert_eq!(rises.len(), 12);
         assert_eq!(rises[7].0 - rises[3].0, 4 * (256 + 7), "as fast as pulses can");
         assert_eq!(rises[11].0 - rises[3].0, 4 * 128 + 4 * 2_000);

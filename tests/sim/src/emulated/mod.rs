@@ -13,7 +13,7 @@ pub(crate) mod process;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
-use kerf::boards::{Board, Encoder, MOTORS, Pin, Port, Usart};
+use kerf::boards::{Board, Encoder, MOTORS, Pin, Port, ShiftRegister, Usart};
 use process::{Answers, Lent};
 use serde::{Deserialize, Serialize};
 
@@ -84,6 +84,33 @@ struct PowerUp {
     motors: Vec<(u8, u8)>,
     /// The address of each motor's driver, if the board has them.
     drivers: Vec<u8>,
+    /// The shift registers of steps and of other outputs.
+    registers: Vec<Chain>,
+}
+
+/// A chain of shift registers at pins of the chip.
+#[derive(Serialize, Debug)]
+struct Chain {
+    data: u8,
+    clock: u8,
+    latch: u8,
+    outputs: u8,
+}
+
+impl Chain {
+    fn of(register: ShiftRegister) -> Self {
+        let ShiftRegister { data, clock, latch, outputs } = register;
+        Self { data: data.bit, clock: clock.bit, latch: latch.bit, outputs }
+    }
+}
+
+/// What is in a chain of shift registers.
+#[derive(Deserialize, Clone, Default, Debug)]
+struct Latched {
+    /// The levels of its outputs, as bits.
+    held: u32,
+    /// The shortest of the times that a register asks for, cycles.
+    least: Option<u64>,
 }
 
 /// The state of the program at the other end of USB.
@@ -160,6 +187,15 @@ const UART: u8 = 2;
 const LINES: usize = 3;
 /// The line at which the drivers of a board listen: UART1.
 pub const DRIVERS: usize = 1;
+
+/// Returns the emulator's number of a pin: outputs of registers follow those of the chip.
+fn number(pin: Pin) -> u8 {
+    match pin.port {
+        Port::Steps => 32 + pin.bit,
+        Port::Outputs => 64 + pin.bit,
+        _ => pin.bit,
+    }
+}
 
 /// Returns the emulator's line of a board's port.
 fn line(board: &Board, port: usize) -> usize {
@@ -257,6 +293,8 @@ struct Answer {
     #[serde(default)]
     levels: u32,
     #[serde(default)]
+    registers: Vec<Latched>,
+    #[serde(default)]
     shares: Vec<(u8, f64)>,
     #[serde(default)]
     units: Vec<u8>,
@@ -298,6 +336,9 @@ pub struct Recorded {
     /// The cycles at which each motor's step pulses rise.
     #[serde(default)]
     pub times: Vec<Vec<u64>>,
+    /// Edges of the outputs behind a register that are no steps: which output, whether it rises, and the cycle.
+    #[serde(default)]
+    pub edges: Vec<(u8, bool, u64)>,
     /// The shortest pulse, cycles.
     #[serde(default)]
     pub shortest: Option<f64>,
@@ -320,7 +361,7 @@ pub struct Emulated {
 
 /// Whether a board's chip is emulated, not simulated.
 pub fn is_emulated(board: &Board) -> bool {
-    board.motors[0].step.port == Port::Gpio
+    board.motors[0].step.port.is_of_rp2040()
 }
 
 /// Returns the path of the emulator that belongs to an image.
@@ -339,9 +380,15 @@ impl Emulated {
             "no {}: `cargo xtask sim --board pico` puts it there",
             program.display()
         );
-        let pins = board.motors.iter().map(|motor| (motor.step.bit, motor.dir.bit));
+        let pins = board.motors.iter().map(|motor| (number(motor.step), number(motor.dir)));
+        let registers = board.registers.iter().flat_map(|both| [both.steps, both.outputs]);
         let drivers = board.drivers.map_or(vec![], |drivers| drivers.addresses.to_vec());
-        let power_up = PowerUp { elf: elf.to_owned(), motors: pins.collect(), drivers };
+        let power_up = PowerUp {
+            elf: elf.to_owned(),
+            motors: pins.collect(),
+            drivers,
+            registers: registers.map(Chain::of).collect(),
+        };
         let mut board = Emulated {
             board,
             process: Lent::take(program)?,
@@ -538,7 +585,22 @@ impl Emulated {
 
     /// Whether an output is high.
     pub fn is_high(&self, pin: Pin) -> bool {
-        self.answer.levels >> pin.bit & 1 != 0
+        let levels = match pin.port {
+            Port::Steps | Port::Outputs => self.latched(pin.port).held,
+            _ => self.answer.levels,
+        };
+        levels >> pin.bit & 1 != 0
+    }
+
+    fn latched(&self, port: Port) -> Latched {
+        let which = usize::from(port == Port::Outputs);
+        self.answer.registers.get(which).cloned().unwrap_or_default()
+    }
+
+    /// The shortest of all times that the shift register of a port asks for, since power-up: data before the clock, the
+    /// clock high and low, the clock before the latch, and the latch high. Cycles; `None` if nothing was sent.
+    pub fn register_time(&self, port: Port) -> Option<u64> {
+        self.latched(port).least
     }
 
     /// Whether the line of a UART is at a pin.
