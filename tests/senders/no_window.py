@@ -1,5 +1,5 @@
-"""A `tkinter` without windows: each name is a class that does nothing. With it, modules of bCNC that draw windows can
-be imported on a machine without a display and without Tk."""
+"""A `tkinter` and a `wx` without windows: each name is a class that does nothing. With them, modules of bCNC and printrun
+that draw windows can be imported on a machine without a display."""
 
 import sys
 import types
@@ -9,6 +9,11 @@ class _Windows(types.ModuleType):
     TkVersion = TclVersion = 8.6
     __path__ = []
 
+    @staticmethod
+    def get_space(_):
+        """The space around a widget of printrun."""
+        return 0
+
     def __getattr__(self, name):
         if name.startswith("__"):
             raise AttributeError(name)
@@ -17,9 +22,13 @@ class _Windows(types.ModuleType):
         return thing
 
 
-def install():
-    """Makes `import tkinter` find this module."""
-    for name in ["tkinter", "tkinter.font", "tkinter.colorchooser", "tkinter.messagebox", "tkinter.ttk"]:
+TK = ["tkinter", "tkinter.font", "tkinter.colorchooser", "tkinter.messagebox", "tkinter.ttk"]
+WX = ["wx", "printrun.gui", "printrun.gui.widgets"]
+
+
+def install(names=TK):
+    """Makes `import` find this module for these names."""
+    for name in names:
         sys.modules[name] = _Windows(name)
         if "." in name:
-            setattr(sys.modules["tkinter"], name.split(".")[1], sys.modules[name])
+            setattr(sys.modules[names[0]], name.rsplit(".", 1)[1], sys.modules[name])

@@ -7,7 +7,10 @@ import sys
 import tempfile
 
 from steps import ensure, main, started, step, until  # first: redirects what the library prints
+import no_window
 import printing
+
+no_window.install(no_window.WX)
 from printrun.pronsole import pronsole
 
 PORT, JOB = sys.argv[1:]
@@ -71,7 +74,6 @@ def close():
 def test():
     started("printrun")
     step("connect", 30, connect)
-    step("settings", 20, lambda: printing.settings(ask))
     step("mount", 20, mount)
     step("upload", 120, upload)
     step("print", 600, prints)

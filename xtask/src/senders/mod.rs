@@ -215,7 +215,8 @@ pub fn run(args: &SendersArgs) -> Result<()> {
     let print = folder.join("print.gcode");
     std::fs::write(&print, job::prints(if args.brief { job::BRIEF } else { job::MOVES }))?;
     let session = &|(sender, elf): (Sender, &PathBuf)| {
-        let job = if sender.prints() { &print } else { &job };
+        // The board of pronsole has no heaters.
+        let job = if sender.prints() && sender != Sender::Pronsole { &print } else { &job };
         let board = board_of(sender);
         Session { sender, program: &program, elf, board, job, folder: &folder }.run()
     };
