@@ -526,6 +526,49 @@ fn a_percent_sign_spoils_no_upload() {
     });
 }
 
+/// All lines of an upload come in one packet, and nothing of it runs.
+#[test]
+fn an_upload_in_one_packet_keeps_its_order() {
+    for_all(&[], |mut session, card| {
+        let dialect = session.dialect;
+        let all = format!("{}\nG1 X5 F600\nG1 X6\n{}\n", dialect.write("B.NC"), dialect.finish());
+        session.machine.send(all.as_bytes());
+        session.run(3_000);
+        assert_eq!(session.steps(), [0, 0], "{dialect:?}: {}", session.heard);
+        let found = text(&session.card(&card), "B.NC");
+        assert_eq!(found.as_deref(), Some("G1 X5 F600\nG1 X6\n"), "{dialect:?}: {}", session.heard);
+        // What comes before an upload runs, and what comes behind it.
+        let all = format!(
+            "G91 G1 X1 F600\n{}\nG1 X6\n{}\nG1 X1\n",
+            dialect.write("B.NC"),
+            dialect.finish()
+        );
+        session.machine.send(all.as_bytes());
+        session.run(5_000);
+        let found = text(&session.card(&card), "B.NC").unwrap_or_default();
+        assert!(["G1 X6\n", "G1 X5 F600\nG1 X6\n"].contains(&&*found), "{dialect:?}: {found}");
+    });
+}
+
+/// A line that is too long is missing in the file, so there is none.
+#[test]
+fn a_line_that_is_too_long_spoils_an_upload() {
+    for_all(&[], |mut session, card| {
+        let dialect = session.dialect;
+        session.say(&dialect.write("B.NC"));
+        session.say("G1 X1 F600");
+        assert!(!dialect.is_good(&session.ask(&format!("G1 X2 ({})", "x".repeat(300)))));
+        if dialect != Dialect::RepRap {
+            assert!(!dialect.is_good(&session.ask(dialect.finish())), "{dialect:?}");
+            assert!(!names(&session.card(&card)).contains(&String::from("B.NC")));
+        }
+        if dialect == Dialect::Tinyg {
+            assert!(!dialect.is_good(&session.ask("{sdw:\"\"}")), "an empty name");
+        }
+        assert_eq!(session.steps(), [0, 0]);
+    });
+}
+
 /// While one port uploads, G-code of the other is refused.
 #[test]
 fn another_port_does_not_write_into_the_file() {

@@ -152,6 +152,15 @@ impl Card {
         }
     }
 
+    /// Spoils the file that is being written, if there is one: a line of it has been refused.
+    pub fn spoil(&mut self, status: Status) {
+        #[cfg(feature = "card-write")]
+        if writes() {
+            self.spoilt = self.spoilt.or(Some(status));
+        }
+        let _ = status;
+    }
+
     /// Ends the print, or spoils the file that is being written: an alarm or a flush has dropped lines. The file stays
     /// selected.
     pub fn interrupt(&mut self) {
@@ -226,7 +235,7 @@ impl Card {
             return status;
         }
         let done = self.go_on(|card, volume| card.writer.finish(volume, &mut card.blocks));
-        if done == Status::Ok {
+        if done != Status::Again {
             self.close();
         }
         done

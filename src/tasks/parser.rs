@@ -523,6 +523,13 @@ fn begin(
     let before = port.speech.get();
     let mut speech = before;
     let settings = links.settings.borrow();
+    #[cfg(feature = "sd")]
+    if let Class::Fault(status) = class
+        && !port.is_plain()
+        && port.number == links.feeder.get()
+    {
+        links.card.borrow_mut().spoil(status);
+    }
     let mut request = match class {
         Class::Fault(status) => Request::refused(status, line, length, &mut speech, &settings),
         _ => match Request::begin(line, length, &mut speech, &settings) {

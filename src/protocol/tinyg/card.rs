@@ -53,7 +53,8 @@ impl Request {
         let is_true = pair.kind == Kind::True
             || !matches!(pair.kind, Kind::Text) && matches!(text, [b't' | b'T']);
         match what {
-            _ if pair.kind == Kind::Null => return Ok(()),
+            // An empty string is null, too.
+            _ if pair.kind == Kind::Null => return Err(Status::UnsupportedType),
             Files::Write if is_true => return of(c.machine.card(Op::Finish)),
             Files::Drop if is_true => return of(c.machine.card(Op::Drop)),
             Files::Run | Files::Delete | Files::Write if is_text => {}

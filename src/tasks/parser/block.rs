@@ -90,6 +90,8 @@ pub fn run_block(
     };
     match links.may_feed(port) {
         #[cfg(feature = "card-write")]
+        true if card::writes() && jog(block).is_some() => (Status::NotAccepted, true),
+        #[cfg(feature = "card-write")]
         true if card::writes() => (links.card.borrow_mut().append(block), true),
         // An empty line asks for nothing.
         true if locked && block.trim_ascii().is_empty() => (Status::Ok, true),
