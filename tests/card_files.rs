@@ -6,6 +6,7 @@ use std::thread;
 use fatfs::FatType;
 use kerf::hal::imp::{Machine, card::Blocks};
 
+use crate::heat_patterns::Random;
 use crate::sd_image::{BLOCK, image, lost, names, text};
 use crate::seeds::seeds;
 
@@ -237,24 +238,18 @@ fn a_file_is_written_listed_run_and_deleted() {
 #[test]
 fn files_of_any_length_are_replaced_and_lose_nothing() {
     for seed in seeds(4) {
-        let mut random = seed;
-        let mut below = move |below: u64| {
-            random = random
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (random >> 33) % below
-        };
-        let dialect = ALL[below(3) as usize];
+        let mut random = Random::new(seed);
+        let mut below = move |most| random.below(most);
+        let dialect = ALL[below(3)];
         let fat = if below(2) == 0 { FatType::Fat16 } else { FatType::Fat32 };
         let card = image(fat, &[("A.NC", program(30)), ("KEEP.NC", program(200))]);
         let work = move || {
             let mut session = Session::start(dialect, &card);
             for _ in 0..8 {
-                let name = ["A.NC", "B.NC", "LONGNAME.TXT", "C"][below(4) as usize];
+                let name = ["A.NC", "B.NC", "LONGNAME.TXT", "C"][below(4)];
                 let mut file = String::new();
                 for _ in 0..below(120) {
-                    file +=
-                        &format!("G1 X{} F{}\n", below(1_000), "1".repeat(1 + below(6) as usize));
+                    file += &format!("G1 X{} F{}\n", below(1_000), "1".repeat(1 + below(6)));
                 }
                 session.write(name, &file);
                 let now = session.card(&card);
@@ -463,13 +458,8 @@ impl Session {
 #[test]
 fn files_in_any_order() {
     for seed in seeds(12) {
-        let mut random = seed ^ 0x5A5A;
-        let mut below = move |below: u64| {
-            random = random
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (random >> 33) % below
-        };
+        let mut random = Random::new(seed);
+        let mut below = move |most| random.below(most);
         let dialect = ALL[seed as usize % 3];
         let fat = if below(2) == 0 { FatType::Fat16 } else { FatType::Fat32 };
         let keep = program(40);
@@ -480,8 +470,8 @@ fn files_in_any_order() {
             let mut done = Vec::new();
             for _ in 0..60 {
                 let lines = below(3) > 0;
-                let op = if lines { Op::Line } else { OPS[below(OPS.len() as u64) as usize] };
-                let name = ["A.NC", "B.NC", "KEEPS.NC"][below(3) as usize];
+                let op = if lines { Op::Line } else { OPS[below(OPS.len())] };
+                let name = ["A.NC", "B.NC", "KEEPS.NC"][below(3)];
                 done.push(op);
 
                 session.act(op, name, &mut pulled);

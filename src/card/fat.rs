@@ -13,7 +13,7 @@ use crate::hal::time::millis;
 pub const BLOCK_SHIFT: u8 = 9;
 /// Bytes of an entry of a directory, and the number of entries in a block.
 pub const ENTRY: usize = 32;
-pub const ENTRIES: u8 = 16;
+const ENTRIES: u8 = 16;
 /// The most blocks of a directory that are read: 2,048 entries, in 0.2 s.
 const DIRECTORY_MOST: u8 = 128;
 /// The longest time for which a directory is read, ms. The watchdog acts after half a second.
@@ -32,16 +32,16 @@ const END: u32 = 0x0FFF_FFF8;
 
 /// Bits of the attributes of an entry. A part of a long name has the bit of a label, too.
 pub const HIDDEN: u8 = 0x02;
-pub const LABEL: u8 = 0x08;
-pub const FOLDER: u8 = 0x10;
+const LABEL: u8 = 0x08;
+const FOLDER: u8 = 0x10;
 /// The first byte of an entry that has been deleted.
-pub const DELETED: u8 = 0xE5;
+const DELETED: u8 = 0xE5;
 
 /// A volume whose sizes have been checked.
 #[derive(Clone, Copy)]
 pub struct Volume {
     /// The first block of the table of clusters.
-    pub table: u32,
+    table: u32,
     /// Blocks from there to the copy of the table; 0 without a copy.
     #[cfg(feature = "card-write")]
     pub copy: u32,
@@ -57,7 +57,7 @@ pub struct Volume {
     /// The number behind the last cluster.
     pub end: u32,
     /// Blocks of a cluster, as a power of two.
-    pub shift: u8,
+    shift: u8,
     pub is_32: bool,
 }
 
@@ -65,11 +65,11 @@ pub struct Volume {
 pub struct Cursor {
     /// The cluster in FAT32, and the block.
     cluster: u32,
-    pub block: u32,
+    block: u32,
     /// Blocks from here on until the next cluster, or the end of the directory.
-    pub left: u16,
+    left: u16,
     /// The next entry of the block.
-    pub entry: u8,
+    entry: u8,
     /// Blocks that have been read, and the time of the first one, ms.
     read: u8,
     since: u32,
@@ -82,8 +82,23 @@ pub struct Found {
     pub attributes: u8,
     /// Its first cluster, which has not been checked.
     pub first: u32,
-    /// Where its entry is: the block, and the byte in it.
-    pub place: (u32, u16),
+    /// Where its entry is.
+    pub place: Place,
+}
+
+/// Where an entry of a directory is: the block, and the byte in it.
+pub type Place = (u32, u16);
+
+/// What is at a place of a directory.
+pub enum Slot {
+    /// Nothing, here and behind it.
+    End,
+    /// A file that has been deleted.
+    Deleted,
+    /// A label, or a part of a long name.
+    Other,
+    /// A file or a folder.
+    Taken(Found),
 }
 
 /// A file that is read.
@@ -176,17 +191,39 @@ impl Volume {
         Ok(self.data + ((cluster - FIRST) << self.shift))
     }
 
+    /// Returns the number of a block of a file within its cluster.
+    pub fn in_cluster(&self, block: u32) -> u32 {
+        block & ((1 << self.shift) - 1)
+    }
+
+    /// Returns how many links a block of the table has, as a power of two.
+    pub fn links(&self) -> u8 {
+        if self.is_32 { 7 } else { 8 }
+    }
+
+    /// Returns the block of the table that has the link of a cluster.
+    pub fn table_block(&self, cluster: u32) -> u32 {
+        self.table + (cluster >> self.links())
+    }
+
+    /// Returns where the link of a cluster is in its block of the table.
+    pub fn link_at(&self, cluster: u32) -> usize {
+        let at = usize::from((cluster & ((1 << self.links()) - 1)) as u16);
+        if self.is_32 { at * 4 } else { at * 2 }
+    }
+
+    /// Returns the link of a cluster, from its block of the table. 0: the cluster is free.
+    pub fn link(&self, cluster: u32, table: &[u8]) -> u32 {
+        let at = self.link_at(cluster);
+        if self.is_32 { double(table, at) & LINK } else { word(table, at).into() }
+    }
+
     /// Returns the cluster behind a cluster; `None` if it is the last one of its chain.
     #[inline(never)]
     fn next(&self, cluster: u32, blocks: &mut Blocks) -> Result<Option<u32>, Fault> {
         self.block_of(cluster)?;
-        let shift = if self.is_32 { 7 } else { 8 };
-        let table = blocks.read(self.table + (cluster >> shift))?;
-        let at = usize::from((cluster & ((1 << shift) - 1)) as u16);
-        let (link, end) = match self.is_32 {
-            true => (double(table, at * 4) & LINK, END),
-            false => (word(table, at * 2).into(), END & 0xFFFF),
-        };
+        let link = self.link(cluster, blocks.read(self.table_block(cluster))?);
+        let end = if self.is_32 { END } else { END & 0xFFFF };
         if link >= end {
             return Ok(None);
         }
@@ -214,28 +251,40 @@ impl Volume {
     #[inline(never)]
     pub fn entry(&self, at: &mut Cursor, blocks: &mut Blocks) -> Result<Option<Found>, Fault> {
         loop {
-            if at.entry >= ENTRIES && !self.advance(at, blocks)? {
-                return Ok(None);
-            }
-            if at.left == 0 {
-                return Ok(None);
-            }
-            let block = blocks.read(at.block)?;
-            let begins = usize::from(at.entry) * ENTRY;
-            let entry = block.get(begins..begins + ENTRY).unwrap_or(&[]);
-            at.entry += 1;
-            match byte(entry, 0) {
-                0 => return Ok(None),
-                DELETED => {}
-                _ if byte(entry, 11) & LABEL != 0 => {}
-                _ => return Ok(Some(found(entry, self.is_32, (at.block, begins as u16)))),
+            match self.slot(at, blocks)? {
+                Some((_, Slot::Taken(found))) => return Ok(Some(found)),
+                Some((_, Slot::Deleted | Slot::Other)) => {}
+                Some((_, Slot::End)) | None => return Ok(None),
             }
         }
     }
 
+    /// Returns the next place of a directory, and what is there; `None` if the directory has no more places.
+    #[inline(always)]
+    pub fn slot(
+        &self,
+        at: &mut Cursor,
+        blocks: &mut Blocks,
+    ) -> Result<Option<(Place, Slot)>, Fault> {
+        if at.entry >= ENTRIES && !self.advance(at, blocks)? || at.left == 0 {
+            return Ok(None);
+        }
+        let begins = usize::from(at.entry) * ENTRY;
+        let entry = blocks.read(at.block)?.get(begins..begins + ENTRY).unwrap_or(&[]);
+        at.entry += 1;
+        let place = (at.block, begins as u16);
+        let slot = match byte(entry, 0) {
+            0 => Slot::End,
+            DELETED => Slot::Deleted,
+            _ if byte(entry, 11) & LABEL != 0 => Slot::Other,
+            _ => Slot::Taken(found(entry, self.is_32, place)),
+        };
+        Ok(Some((place, slot)))
+    }
+
     /// Goes to the next block of a directory. Returns whether there is one.
     #[inline(never)]
-    pub fn advance(&self, at: &mut Cursor, blocks: &mut Blocks) -> Result<bool, Fault> {
+    fn advance(&self, at: &mut Cursor, blocks: &mut Blocks) -> Result<bool, Fault> {
         (at.entry, at.read, at.left) = (0, at.read + 1, at.left - 1);
         if at.read >= DIRECTORY_MOST || millis().wrapping_sub(at.since) > DIRECTORY_MS {
             return Err(Fault::Failed);
@@ -284,8 +333,7 @@ impl File {
         }
         for _ in 0..most {
             if self.before == before {
-                let in_cluster = block & ((1 << volume.shift) - 1);
-                return Ok(Some(volume.block_of(self.cluster)? + in_cluster));
+                return Ok(Some(volume.block_of(self.cluster)? + volume.in_cluster(block)));
             }
             // A chain that is shorter than its file.
             self.cluster = volume.next(self.cluster, blocks)?.ok_or(Fault::Failed)?;
@@ -305,7 +353,7 @@ impl Found {
 /// Reads an entry of a directory.
 #[inline(never)]
 #[small]
-fn found(entry: &[u8], is_32: bool, place: (u32, u16)) -> Found {
+fn found(entry: &[u8], is_32: bool, place: Place) -> Found {
     let high = if is_32 { word(entry, 20) } else { 0 };
     Found {
         entry: Entry { name: shown_name(entry), size: double(entry, 28) },
@@ -345,14 +393,14 @@ fn is_signed(sector: &[u8]) -> bool {
 }
 
 #[small]
-pub fn byte(bytes: &[u8], at: usize) -> u8 {
+fn byte(bytes: &[u8], at: usize) -> u8 {
     bytes.get(at).copied().unwrap_or(0)
 }
 
 /// Returns two bytes as a number.
 #[inline(never)]
 #[small]
-pub fn word(bytes: &[u8], at: usize) -> u16 {
+fn word(bytes: &[u8], at: usize) -> u16 {
     u16::from_le_bytes([byte(bytes, at), byte(bytes, at + 1)])
 }
 

@@ -152,13 +152,12 @@ impl Card {
         }
     }
 
-    /// Spoils the file that is being written, if there is one: a line of it has been refused.
+    /// Spoils the file that is being written, if there is one: it lacks a line, for this reason.
+    #[cfg(feature = "card-write")]
     pub fn spoil(&mut self, status: Status) {
-        #[cfg(feature = "card-write")]
         if writes() {
             self.spoilt = self.spoilt.or(Some(status));
         }
-        let _ = status;
     }
 
     /// Ends the print, or spoils the file that is being written: an alarm or a flush has dropped lines. The file stays
@@ -166,8 +165,7 @@ impl Card {
     pub fn interrupt(&mut self) {
         #[cfg(feature = "card-write")]
         if writes() {
-            self.spoilt = self.spoilt.or(Some(Status::KillJob));
-            return;
+            return self.spoil(Status::KillJob);
         }
         let _ = self.print(false);
     }
@@ -256,7 +254,7 @@ impl Card {
             Err(fault) => {
                 let status =
                     if fault == Fault::Full { Status::CardFull } else { Status::CardError };
-                self.spoilt = Some(status);
+                self.spoil(status);
                 self.writer.give_up();
                 status
             }

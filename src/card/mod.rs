@@ -47,6 +47,11 @@ pub fn writes() -> bool {
     cfg!(feature = "card-write") && use_byte().get() == WRITES
 }
 
+/// Whether a file is in use: lines are taken from it, or written to it. Thread mode, 20 cycles.
+pub fn is_in_use() -> bool {
+    prints() || writes()
+}
+
 /// The length of a short name in bytes, with its point.
 pub const NAME_MAX: usize = 12;
 
@@ -57,6 +62,11 @@ pub struct Entry {
     pub name: [u8; NAME_MAX],
     /// The length in bytes.
     pub size: u32,
+}
+
+/// Returns the letters of a name that is padded with zeros.
+pub fn letters(name: &[u8; NAME_MAX]) -> impl Iterator<Item = u8> {
+    name.iter().copied().take_while(|letter| *letter != 0)
 }
 
 /// An operation on the card.
@@ -76,8 +86,6 @@ pub enum Op<'a> {
     Delete(&'a [u8]),
     /// Begins to write a file, M28: lines are written from now on, and not run.
     Create(&'a [u8]),
-    /// Appends a line. [`Again`](crate::status::Status::Again): not all of it has been taken yet.
-    Append(&'a [u8]),
     /// Completes the file, M29. [`Again`](crate::status::Status::Again): it is not complete yet.
     Finish,
     /// Gives up the file that is being written, or ends the print.

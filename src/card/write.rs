@@ -11,10 +11,7 @@
 
 use super::NAME_MAX;
 use super::device::{BLOCK, Blocks, Fault};
-use super::fat::{
-    BLOCK_SHIFT, DELETED, ENTRIES, ENTRY, FIRST, FOLDER, LABEL, LINK, Volume, byte, double,
-    shown_name, word,
-};
+use super::fat::{BLOCK_SHIFT, ENTRY, FIRST, LINK, Place, Slot, Volume, double, shown_name};
 
 /// Bytes of a short name without its point.
 const NAME: usize = 11;
@@ -40,19 +37,18 @@ enum Stage {
     Fills,
     /// Looks for a free cluster.
     Finds,
-    /// Takes the cluster that was found as the last one of a chain; writes the copy of the table.
+    /// Takes the cluster that was found as the last one of a chain.
     Takes,
-    TakesCopy,
-    /// Links the cluster before to it; writes the copy of the table.
+    /// Links the cluster before to it.
     Links,
-    LinksCopy,
+    /// Writes the block of the table that has changed to the copy of the table.
+    Copies,
     /// Writes the buffer.
     Stores,
     /// Enters the file into the directory.
     Enters,
-    /// Frees clusters; writes the copy of the table.
+    /// Frees clusters.
     Frees,
-    FreesCopy,
 }
 
 /// A file that is being written.
@@ -72,15 +68,11 @@ pub struct Writer {
     /// Where to look for a free cluster, and how many have been looked at.
     search: u32,
     looked: u32,
-    /// The next cluster to be freed, and the block of the table that has changed.
+    /// The next cluster to be freed.
     frees: u32,
+    /// The block of the table that has changed, and what is done when its copy has been written.
     changed: u32,
-}
-
-/// An entry of the directory for a file: its place, and the first cluster of the file that it replaces.
-struct Slot {
-    place: (u32, u16),
-    replaces: u32,
+    then: Stage,
 }
 
 impl Writer {
@@ -99,6 +91,7 @@ impl Writer {
             looked: 0,
             frees: 0,
             changed: 0,
+            then: Stage::Idle,
         }
     }
 
@@ -179,8 +172,7 @@ impl Writer {
 
     /// Has the buffer written, to a new cluster if the last one is full.
     fn store(&mut self, volume: &Volume) {
-        let in_cluster = self.size >> BLOCK_SHIFT & ((1 << volume.shift) - 1);
-        let is_full = self.last == 0 || in_cluster == 0;
+        let is_full = self.last == 0 || volume.in_cluster(self.size >> BLOCK_SHIFT) == 0;
         self.stage = if is_full { Stage::Finds } else { Stage::Stores };
         self.looked = 0;
     }
@@ -195,37 +187,47 @@ impl Writer {
             }
             Stage::Finds => self.find(volume, blocks)?,
             Stage::Takes => {
-                self.changed = set_link(volume, self.search, LINK, blocks)?;
-                self.stage = Stage::TakesCopy;
-            }
-            Stage::TakesCopy => {
-                copy(volume, self.changed, blocks)?;
-                self.stage = if self.last == 0 { Stage::Stores } else { Stage::Links };
-                if self.last == 0 {
+                let is_first = self.last == 0;
+                let then = if is_first { Stage::Stores } else { Stage::Links };
+                self.link(self.search, LINK, then, volume, blocks)?;
+                if is_first {
                     (self.first, self.last) = (self.search, self.search);
                 }
             }
             Stage::Links => {
-                self.changed = set_link(volume, self.last, self.search, blocks)?;
-                self.stage = Stage::LinksCopy;
+                self.link(self.last, self.search, Stage::Stores, volume, blocks)?;
+                self.last = self.search;
             }
-            Stage::LinksCopy => {
-                copy(volume, self.changed, blocks)?;
-                (self.last, self.stage) = (self.search, Stage::Stores);
+            Stage::Copies => {
+                if volume.copy != 0 {
+                    blocks.copy(self.changed, self.changed + volume.copy)?;
+                }
+                self.stage = self.then;
             }
             Stage::Stores => {
-                let in_cluster = self.size >> BLOCK_SHIFT & ((1 << volume.shift) - 1);
-                blocks.write(volume.block_of(self.last)? + in_cluster, &self.buffer)?;
+                let block = volume.in_cluster(self.size >> BLOCK_SHIFT);
+                blocks.write(volume.block_of(self.last)? + block, &self.buffer)?;
                 (self.size, self.fill) = (self.size + self.fill as u32, 0);
                 self.stage = Stage::Fills;
             }
             Stage::Enters => self.enter(volume, blocks)?,
             Stage::Frees => self.free_some(volume, blocks)?,
-            Stage::FreesCopy => {
-                copy(volume, self.changed, blocks)?;
-                self.stage = if self.frees == 0 { Stage::Idle } else { Stage::Frees };
-            }
         }
+        Ok(())
+    }
+
+    /// Sets the link of a cluster, then has the copy of the table written.
+    fn link(
+        &mut self,
+        cluster: u32,
+        to: u32,
+        then: Stage,
+        volume: &Volume,
+        blocks: &mut Blocks,
+    ) -> Result<(), Fault> {
+        self.changed = volume.table_block(cluster);
+        blocks.change(self.changed, |table| put_link(volume, cluster, to, table))?;
+        (self.stage, self.then) = (Stage::Copies, then);
         Ok(())
     }
 
@@ -237,10 +239,9 @@ impl Writer {
         if !(FIRST..volume.end).contains(&self.search) {
             self.search = FIRST;
         }
-        let (block, shift) = place(volume, self.search);
-        let table = blocks.read(block)?;
-        let behind = (((self.search >> shift) + 1) << shift).min(volume.end);
-        let free = (self.search..behind).find(|cluster| link(volume, *cluster, table) == 0);
+        let table = blocks.read(volume.table_block(self.search))?;
+        let behind = (((self.search >> volume.links()) + 1) << volume.links()).min(volume.end);
+        let free = (self.search..behind).find(|cluster| volume.link(*cluster, table) == 0);
         self.looked += behind - self.search;
         self.search = free.unwrap_or(behind);
         if free.is_some() {
@@ -254,7 +255,7 @@ impl Writer {
         blocks.rest()?;
         // Bounded by the time in which a directory may be read. Without patience it would begin anew for each block.
         blocks.patient = true;
-        let slot = slot(volume, &self.name, blocks)?.ok_or(Fault::Full)?;
+        let (place, replaces) = place(volume, &self.name, blocks)?.ok_or(Fault::Full)?;
         let mut entry = [0; ENTRY];
         put(&mut entry, 0, &self.name);
         put(&mut entry, 11, &[ARCHIVE]);
@@ -263,7 +264,7 @@ impl Writer {
         put(&mut entry, 20, &[higher, highest]);
         put(&mut entry, 26, &[low, high]);
         put(&mut entry, 28, &self.size.to_le_bytes());
-        let (block, at) = (slot.place.0, usize::from(slot.place.1));
+        let (block, at) = (place.0, usize::from(place.1));
         blocks.change(block, |bytes| {
             // Behind the entry that ended the directory the next one ends it.
             if bytes.get(at) == Some(&0) {
@@ -271,58 +272,36 @@ impl Writer {
             }
             put(bytes, at, &entry);
         })?;
-        self.free(slot.replaces);
+        self.free(replaces);
         Ok(())
     }
 
     /// Frees the clusters of a chain that lie in one block of the table.
     fn free_some(&mut self, volume: &Volume, blocks: &mut Blocks) -> Result<(), Fault> {
-        if !(FIRST..volume.end).contains(&self.frees) {
+        let is_cluster = |cluster| (FIRST..volume.end).contains(&cluster);
+        if !is_cluster(self.frees) {
             self.stage = Stage::Idle;
             return Ok(());
         }
-        let (block, shift) = place(volume, self.frees);
+        self.changed = volume.table_block(self.frees);
         let mut cluster = self.frees;
-        blocks.change(block, |table| {
-            let is_here = |cluster| {
-                (FIRST..volume.end).contains(&cluster) && cluster >> shift == self.frees >> shift
-            };
-            while is_here(cluster) {
-                let next = link(volume, cluster, table);
+        blocks.change(self.changed, |table| {
+            while is_cluster(cluster) && volume.table_block(cluster) == self.changed {
+                let next = volume.link(cluster, table);
                 put_link(volume, cluster, 0, table);
                 // A chain that runs into itself ends here, because a free cluster has no link.
                 cluster = next;
             }
         })?;
-        let is_end = !(FIRST..volume.end).contains(&cluster);
-        self.frees = if is_end { 0 } else { cluster };
-        (self.changed, self.stage) = (block, Stage::FreesCopy);
+        self.frees = cluster;
+        (self.stage, self.then) = (Stage::Copies, Stage::Frees);
         Ok(())
     }
 }
 
-/// Returns the block of the table that has the link of a cluster, and how many links it has, as a power of two.
-fn place(volume: &Volume, cluster: u32) -> (u32, u8) {
-    let shift = if volume.is_32 { 7 } else { 8 };
-    (volume.table + (cluster >> shift), shift)
-}
-
-/// Returns where the link of a cluster is in its block.
-fn offset(volume: &Volume, cluster: u32) -> usize {
-    let (_, shift) = place(volume, cluster);
-    let at = (cluster & ((1 << shift) - 1)) as usize;
-    if volume.is_32 { at * 4 } else { at * 2 }
-}
-
-/// Returns the link of a cluster.
-fn link(volume: &Volume, cluster: u32, table: &[u8; BLOCK]) -> u32 {
-    let at = offset(volume, cluster);
-    if volume.is_32 { double(table, at) & LINK } else { word(table, at).into() }
-}
-
 /// Sets the link of a cluster in its block. The upper four bits in FAT32 are nobody's and are kept.
 fn put_link(volume: &Volume, cluster: u32, to: u32, table: &mut [u8; BLOCK]) {
-    let at = offset(volume, cluster);
+    let at = volume.link_at(cluster);
     let bytes = match volume.is_32 {
         true => (double(table, at) & !LINK | to & LINK).to_le_bytes(),
         false => to.to_le_bytes(),
@@ -337,18 +316,6 @@ fn put(block: &mut [u8], at: usize, bytes: &[u8]) {
     }
 }
 
-/// Sets the link of a cluster on the card. Returns the block that has changed.
-fn set_link(volume: &Volume, cluster: u32, to: u32, blocks: &mut Blocks) -> Result<u32, Fault> {
-    let (block, _) = place(volume, cluster);
-    blocks.change(block, |table| put_link(volume, cluster, to, table))?;
-    Ok(block)
-}
-
-/// Writes a block of the table to the copy of the table, if there is one.
-fn copy(volume: &Volume, block: u32, blocks: &mut Blocks) -> Result<(), Fault> {
-    if volume.copy == 0 { Ok(()) } else { blocks.copy(block, block + volume.copy) }
-}
-
 /// Makes the count of free clusters unknown, because it will not be right any more.
 fn mark(volume: &Volume, blocks: &mut Blocks) -> Result<(), Fault> {
     if volume.info == 0 {
@@ -361,31 +328,31 @@ fn mark(volume: &Volume, blocks: &mut Blocks) -> Result<(), Fault> {
     Ok(())
 }
 
-/// Returns the entry of a file with this name, or else a free one. `None`: there is no free one.
-fn slot(volume: &Volume, name: &[u8; NAME], blocks: &mut Blocks) -> Result<Option<Slot>, Fault> {
+/// Returns the place of the entry of a file with this name and the first cluster of the file, or else a free place and 0.
+/// `None`: there is no free one. A folder of this name is [`Fault::Failed`].
+fn place(
+    volume: &Volume,
+    name: &[u8; NAME],
+    blocks: &mut Blocks,
+) -> Result<Option<(Place, u32)>, Fault> {
     let mut at = volume.root()?;
     let mut free = None;
-    loop {
-        if at.entry >= ENTRIES && !volume.advance(&mut at, blocks)? || at.left == 0 {
-            return Ok(free);
-        }
-        let begins = usize::from(at.entry) * ENTRY;
-        let entry = blocks.read(at.block)?.get(begins..begins + ENTRY).unwrap_or(&[]);
-        at.entry += 1;
-        let place = (at.block, begins as u16);
-        let attributes = byte(entry, 11);
-        match byte(entry, 0) {
-            0 => return Ok(free.or(Some(Slot { place, replaces: 0 }))),
-            DELETED => free = free.or(Some(Slot { place, replaces: 0 })),
-            _ if attributes & LABEL != 0 || !entry.starts_with(name) => {}
-            _ if attributes & FOLDER != 0 => return Err(Fault::Failed),
-            _ => {
-                let high = if volume.is_32 { word(entry, 20) } else { 0 };
-                let replaces = u32::from(high) << 16 | u32::from(word(entry, 26));
-                return Ok(Some(Slot { place, replaces }));
+    while let Some((place, slot)) = volume.slot(&mut at, blocks)? {
+        match slot {
+            Slot::End => return Ok(free.or(Some((place, 0)))),
+            Slot::Deleted => free = free.or(Some((place, 0))),
+            Slot::Other => {}
+            Slot::Taken(found) => {
+                // Other names may be shown alike.
+                let entry = blocks.read(place.0)?.get(usize::from(place.1)..);
+                if entry.is_some_and(|entry| entry.starts_with(name)) {
+                    let replaces = Some((place, found.first));
+                    return if found.is_folder() { Err(Fault::Failed) } else { Ok(replaces) };
+                }
             }
         }
     }
+    Ok(free)
 }
 
 /// Returns a name as an entry has it: eight letters and three, padded with blanks. `None`: it is too long, or has a

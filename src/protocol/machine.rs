@@ -235,9 +235,9 @@ pub trait Machine {
         None
     }
 
-    /// Writes the name of the selected file, or of the one that is being written; zeros without one.
-    fn card_name(&mut self, name: &mut [u8; NAME_MAX]) {
-        *name = [0; NAME_MAX];
+    /// Returns the name of the selected file, or of the one that is being written, padded with zeros; zeros without one.
+    fn card_name(&mut self) -> [u8; NAME_MAX] {
+        [0; NAME_MAX]
     }
 
     /// Whether lines of the selected file are being run.

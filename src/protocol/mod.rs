@@ -13,6 +13,7 @@
 //! | [`notice`] | what the machine reports without being asked |
 //! | [`out`] | where dialects write to |
 //! | [`tinyg`], [`grbl`], `reprap` | the dialects of TinyG, of grbl, and of printing hosts |
+//! | `files` | shared by the dialects of TinyG and grbl: files of an SD card |
 //! | `write`, `steps`, `by_name` | shared by grbl's dialect and that of printing hosts: numbers and texts, steps per millimetre, settings by name |
 //!
 //! Everything outside the dialects is neutral: the [`Status`](crate::status::Status), the names of settings and
@@ -24,6 +25,8 @@
 mod by_name;
 pub mod checksum;
 pub mod dialect;
+#[cfg(all(feature = "sd", any(feature = "dialect-tinyg", feature = "dialect-grbl")))]
+mod files;
 #[cfg(feature = "dialect-grbl")]
 pub mod grbl;
 pub mod line;

@@ -2,8 +2,9 @@
 //!
 //! The power task [looks](look) at them every 20 ms. While a driver of an axis in use has not taken its settings, or
 //! has switched its motor off, lines that move are refused; if that begins in motion it is an alarm, and so is a reset
-//! of a driver in motion. In the first half second after the start such lines wait. Homes are forgotten then, and at rest, too. A reset
-//! at rest is told, and so are warnings: one of them each turn. Thread mode. Cost: 600 cycles a turn.
+//! of a driver in motion. In the first half second after the start such lines wait. A driver that fails or resets has
+//! the homes forgotten, at rest, too. A reset at rest is told, and so are warnings: one of them each turn. Thread mode.
+//! Cost: 600 cycles a turn.
 
 use super::links::Links;
 use super::storage::Storage;

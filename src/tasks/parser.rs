@@ -523,7 +523,8 @@ fn begin(
     let before = port.speech.get();
     let mut speech = before;
     let settings = links.settings.borrow();
-    #[cfg(feature = "sd")]
+    // The file that is being written would lack the line.
+    #[cfg(feature = "card-write")]
     if let Class::Fault(status) = class
         && !port.is_plain()
         && port.number == links.feeder.get()

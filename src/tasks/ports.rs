@@ -17,7 +17,6 @@ use super::lines::{Class, LineId, LinePool};
 use super::links::Links;
 use super::tx::Tx;
 use super::view::{Seen, View};
-#[cfg(feature = "card-write")]
 use crate::card;
 use crate::config::Settings;
 use crate::hal::event::{is_unheard, set_eager};
@@ -338,7 +337,7 @@ impl Links {
 
     /// Whether anything is under way, or a file of the SD card is in use.
     fn is_busy(&self, port: &Port) -> bool {
-        crate::card::prints() || crate::card::writes() || View::of(self, port).is_busy()
+        card::is_in_use() || View::of(self, port).is_busy()
     }
 
     /// Sets the dialect of a port. The port does not wait for a decision any more.
@@ -357,6 +356,7 @@ impl Links {
     #[small]
     pub fn open_anew(&self) {
         let port = self.port(USB);
+        #[cfg(feature = "card-write")]
         self.forsake_file(USB);
         if self.is_busy(port) || self.has_data() || port.is_resetting() {
             return;
@@ -460,10 +460,6 @@ impl Links {
             self.card.borrow_mut().leave();
         }
     }
-
-    /// Does nothing in an image that writes no files.
-    #[cfg(not(feature = "card-write"))]
-    fn forsake_file(&self, _: u8) {}
 
     /// Whether G-code of this port is taken. If the machine is at rest, the port becomes the feeder.
     pub fn may_feed(&self, port: &Port) -> bool {

@@ -245,8 +245,7 @@ impl<'a> View<'a> {
             return true;
         }
         let waits = links.feeder().lines.borrow().has_data();
-        let uses_file = crate::card::prints() || crate::card::writes();
-        let free = !waits && !uses_file && !self.is_busy();
+        let free = !waits && !crate::card::is_in_use() && !self.is_busy();
         if free {
             links.feeder.set(self.port.number);
             // Nothing has been reported to the new feeder yet.
@@ -517,8 +516,8 @@ impl Machine for View<'_> {
     }
 
     #[cfg(feature = "sd")]
-    fn card_name(&mut self, name: &mut [u8; NAME_MAX]) {
-        *name = self.links.card.borrow().name();
+    fn card_name(&mut self) -> [u8; NAME_MAX] {
+        self.links.card.borrow().name()
     }
 
     #[cfg(feature = "sd")]
@@ -529,11 +528,7 @@ impl Machine for View<'_> {
     #[cfg(feature = "sd")]
     fn card_entry(&mut self, number: u8) -> Result<Option<Entry>, Status> {
         let mut card = self.links.card.borrow_mut();
-        if crate::card::prints() || crate::card::writes() {
-            Err(Status::NotAccepted)
-        } else {
-            card.entry(number)
-        }
+        if crate::card::is_in_use() { Err(Status::NotAccepted) } else { card.entry(number) }
     }
 
     #[cfg(feature = "bed-plane")]

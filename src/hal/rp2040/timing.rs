@@ -10,8 +10,8 @@ use crate::hal::contract::Timing;
 const USUAL: Ticks =
     Ticks { step: 64, shortest: 64, fine: 66, coarse: 66, coarsest: 66, settles: u16::MAX / 4 };
 
-/// The same, where a shift register has to take eight bits at the beginning and eight at the end of a pulse: 141 cycles
-/// for a pulse of 0.52 us and the pause behind it.
+/// Ticks on a board whose steps are behind a shift register. A pulse begins with eight bits that are shifted out, and
+/// ends with eight more. So a step takes 141 cycles at least: 0.52 us of pulse, and as much of pause.
 const SHIFTED: Ticks =
     Ticks { step: 71, shortest: 71, fine: 73, coarse: 73, coarsest: 73, settles: u16::MAX / 4 };
 

@@ -13,10 +13,11 @@
 //! The last three are Kerf's own. `$F`, `$F=`, `$FD=` and `$FW=` mount the card first, because it may have been changed.
 
 use super::request::Step;
-use super::status::{BUSY, LOCKED, UNSUPPORTED, error_number};
+use super::status::{LOCKED, error_number};
 use super::write::{close, int, message, text};
-use crate::card::{NAME_MAX, Op};
+use crate::card::letters;
 use crate::machine::Doing;
+use crate::protocol::files::{self, Files};
 use crate::protocol::{Machine, Out, Value};
 use crate::status::Status;
 use crate::text;
@@ -27,25 +28,6 @@ const READ: u8 = 61;
 
 /// The first part behind the mounting.
 const MOUNTED: u8 = 1;
-
-/// What a command does.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Files {
-    /// `$FM`.
-    Mount,
-    /// `$F`.
-    List,
-    /// `$F=`.
-    Run,
-    /// `$FD=`.
-    Delete,
-    /// `$FW=`.
-    Write,
-    /// `$FW`.
-    Finish,
-    /// `$FX`.
-    Drop,
-}
 
 /// Returns what the letters behind a `$` do with files. `None`: something else.
 pub fn of(letters: &[u8]) -> Option<Files> {
@@ -71,36 +53,17 @@ pub fn part(
     out: &mut impl Out,
 ) -> Step {
     let name = name.strip_prefix(b"/").unwrap_or(name);
-    match what {
-        Files::Finish => return done(machine.card(Op::Finish), at, out),
-        Files::Drop => return done(machine.card(Op::Drop), at, out),
-        Files::Run if matches!(machine.doing(), Doing::Alarm(_)) => return Step::Error(LOCKED),
-        _ if at == 0 => return mount(machine, what == Files::Mount),
-        _ => {}
-    }
-    match what {
-        Files::List => list(at, machine, out),
-        Files::Run => match machine.card(Op::Open(name)) {
-            Status::Ok => done(machine.card(Op::Print(true)), at, out),
+    let mounts = !matches!(what, Files::Finish | Files::Drop);
+    let is_locked = what == Files::Run && matches!(machine.doing(), Doing::Alarm(_));
+    match (at, what) {
+        (0, _) if is_locked => Step::Error(LOCKED),
+        (0, _) if mounts => match files::mount(machine) {
+            Status::Ok => Step::Later(MOUNTED),
+            Status::CardError => Step::Error(MOUNT),
             status => done(status, at, out),
         },
-        Files::Delete => done(machine.card(Op::Delete(name)), at, out),
-        Files::Write => done(machine.card(Op::Create(name)), at, out),
-        Files::Mount | Files::Finish | Files::Drop => Step::Error(UNSUPPORTED),
-    }
-}
-
-/// Mounts the card, at rest or in an alarm. `is_all`: nothing more is to be done.
-fn mount(machine: &mut impl Machine, is_all: bool) -> Step {
-    let rests = matches!(machine.doing(), Doing::Rests | Doing::Alarm(_));
-    if !rests || machine.value(Value::FileUse) > 1 {
-        return Step::Error(BUSY);
-    }
-    match machine.card(Op::Begin) {
-        Status::Ok if is_all => Step::Done,
-        Status::Ok => Step::Later(MOUNTED),
-        Status::Again => Step::Later(0),
-        _ => Step::Error(MOUNT),
+        (_, Files::List) => list(at, machine, out),
+        _ => done(files::carry_out(what, name, machine), at, out),
     }
 }
 
@@ -109,7 +72,7 @@ fn list(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Step {
     match machine.card_entry(at - MOUNTED) {
         Ok(Some(entry)) if at < u8::MAX => {
             text(out, text!("[FILE:/"));
-            out.put_all(entry.name.iter().copied().take_while(|letter| *letter != 0));
+            out.put_all(letters(&entry.name));
             text(out, text!("|SIZE:"));
             int(out, i32::try_from(entry.size).unwrap_or(i32::MAX));
             close(out);
@@ -145,8 +108,6 @@ pub fn field(machine: &mut impl Machine, out: &mut impl Out) {
     int(out, tenths / 10);
     out.put(b'.');
     int(out, tenths % 10);
-    let mut name = [0; NAME_MAX];
-    machine.card_name(&mut name);
     out.put(b',');
-    out.put_all(name.iter().copied().take_while(|letter| *letter != 0));
+    out.put_all(letters(&machine.card_name()));
 }

@@ -1,8 +1,10 @@
 //! Recognizes which command a line is.
 
 #[cfg(feature = "sd")]
-use super::card::{self, Files};
+use super::card;
 use crate::gcode::comment;
+#[cfg(feature = "sd")]
+use crate::protocol::files::Files;
 use crate::units::AXES;
 
 /// The command of a line.

@@ -5,7 +5,7 @@ use super::command::{value, words};
 use super::host::{self, Step};
 use super::write::{int, line_end, text};
 use crate::capability::Capability;
-use crate::card::{Entry, NAME_MAX, Op};
+use crate::card::{Entry, NAME_MAX, Op, letters};
 use crate::progmem::Text;
 use crate::protocol::{Machine, Out};
 use crate::status::Status;
@@ -110,7 +110,7 @@ fn list(at: u8, machine: &mut impl Machine, out: &mut impl Out) -> Step {
 
 #[small]
 fn put(entry: &Entry, out: &mut impl Out) {
-    out.put_all(entry.name.iter().copied().take_while(|letter| *letter != 0));
+    out.put_all(letters(&entry.name));
     out.put(b' ');
     size(entry.size, out);
     line_end(out);

@@ -15,25 +15,11 @@ use super::json::{Kind, Pair};
 use super::request::{Context, Phase, Request};
 use super::write::Writer;
 use crate::capability::Capability;
-use crate::card::Op;
-use crate::machine::Doing;
-use crate::protocol::{Machine, Out, Value};
+use crate::card::letters;
+use crate::config::Fixed;
+use crate::protocol::files::{self, Files};
+use crate::protocol::{Machine, Out};
 use crate::status::Status;
-
-/// What a name does with files.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Files {
-    /// `sdl`.
-    List,
-    /// `sdr`.
-    Run,
-    /// `sdd`.
-    Delete,
-    /// `sdw`.
-    Write,
-    /// `sdx`.
-    Drop,
-}
 
 /// The progress of an operation: the card has been mounted.
 const MOUNTED: u8 = 1;
@@ -52,23 +38,18 @@ impl Request {
         let is_text = matches!(pair.kind, Kind::Text | Kind::Number);
         let is_true = pair.kind == Kind::True
             || !matches!(pair.kind, Kind::Text) && matches!(text, [b't' | b'T']);
-        match what {
+        let what = match what {
             // An empty string is null, too.
             _ if pair.kind == Kind::Null => return Err(Status::UnsupportedType),
-            Files::Write if is_true => return of(c.machine.card(Op::Finish)),
-            Files::Drop if is_true => return of(c.machine.card(Op::Drop)),
-            Files::Run | Files::Delete | Files::Write if is_text => {}
+            Files::Write if is_true => Files::Finish,
+            Files::Drop if is_true => Files::Drop,
+            Files::Run | Files::Delete | Files::Write if is_text => {
+                self.mount(c.machine)?;
+                what
+            }
             _ => return Err(Status::UnsupportedType),
-        }
-        self.mount(c.machine)?;
-        let status = match what {
-            Files::Run => match c.machine.card(Op::Open(text)) {
-                Status::Ok => c.machine.card(Op::Print(true)),
-                status => status,
-            },
-            Files::Delete => c.machine.card(Op::Delete(text)),
-            _ => c.machine.card(Op::Create(text)),
         };
+        let status = files::carry_out(what, text, c.machine);
         if status != Status::Again {
             self.item = 0;
         }
@@ -80,11 +61,7 @@ impl Request {
         if self.item == MOUNTED {
             return Ok(());
         }
-        let rests = matches!(machine.doing(), Doing::Rests | Doing::Alarm(_));
-        if !rests || machine.value(Value::FileUse) > 1 {
-            return Err(Status::NotAccepted);
-        }
-        of(machine.card(Op::Begin))?;
+        of(files::mount(machine))?;
         self.item = MOUNTED;
         Ok(())
     }
@@ -130,10 +107,9 @@ impl Request {
             writer.byte(b'\\');
             writer.byte(b'n');
         }
-        let name = entry.name.iter().copied().take_while(|letter| *letter != 0);
-        name.for_each(|letter| writer.printable(letter));
+        letters(&entry.name).for_each(|letter| writer.printable(letter));
         writer.byte(b' ');
-        writer.fixed(crate::config::Fixed::int(i32::try_from(entry.size).unwrap_or(i32::MAX)));
+        writer.fixed(Fixed::int(i32::try_from(entry.size).unwrap_or(i32::MAX)));
         if !is_value {
             writer.end_line();
         }

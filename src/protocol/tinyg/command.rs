@@ -1,7 +1,5 @@
 //! Text mode: lines that begin with `$`.
 
-#[cfg(feature = "sd")]
-use super::card::Files;
 use super::help::Hint;
 use super::json::{Kind, Pair};
 use super::listing::Series;
@@ -10,6 +8,8 @@ use super::token::{Group, Operation, Target, resolve};
 use super::{Mode, help};
 use crate::capability::Capability;
 use crate::config::{Name, Owner};
+#[cfg(feature = "sd")]
+use crate::protocol::files::Files;
 use crate::protocol::{Machine, Out, Span};
 use crate::status::Status;
 

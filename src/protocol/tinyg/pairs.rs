@@ -2,14 +2,14 @@
 
 use super::Format;
 use super::amend::{is_amended, reported};
-#[cfg(feature = "sd")]
-use super::card::Files;
 use super::json::{self, Kind, Pair};
 use super::notice::put_exception;
 use super::request::{Context, Phase, Request};
 use super::token::{Group, Operation, Target, Token, resolve};
 use super::write::Writer;
 use crate::config::Name;
+#[cfg(feature = "sd")]
+use crate::protocol::files::Files;
 use crate::protocol::{Machine, Out};
 use crate::status::Status;
 use crate::text;

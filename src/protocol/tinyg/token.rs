@@ -1,7 +1,5 @@
 //! Names in requests and responses: settings, values, groups and actions.
 
-#[cfg(feature = "sd")]
-use super::card::Files;
 #[cfg(feature = "drivers")]
 use super::value::FIRST_DRIVER;
 use super::value::{
@@ -18,6 +16,8 @@ use crate::config::{Fixed, Owner, Setting};
 use crate::gcode::tables::TableRow;
 use crate::machine::Alarm;
 use crate::progmem::Text;
+#[cfg(feature = "sd")]
+use crate::protocol::files::Files;
 use crate::protocol::{Machine, Value};
 use crate::units::AXES;
 use crate::{named, plain, progmem};

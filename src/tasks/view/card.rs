@@ -3,7 +3,7 @@
 use kerf_macros::small;
 
 use super::View;
-use crate::card::{Op, prints, writes};
+use crate::card::{Op, is_in_use, prints, writes};
 use crate::machine;
 use crate::status::Status;
 
@@ -17,9 +17,8 @@ pub(super) fn card(view: &mut View<'_>, what: Op<'_>) -> Status {
         return Status::Muted;
     }
     let mut card = view.links.card.borrow_mut();
-    let disturbs =
-        !matches!(what, Op::Print(_) | Op::Seek(_) | Op::Append(_) | Op::Finish | Op::Drop);
-    if disturbs && (prints() || writes()) {
+    let disturbs = !matches!(what, Op::Print(_) | Op::Seek(_) | Op::Finish | Op::Drop);
+    if disturbs && is_in_use() {
         return Status::NotAccepted;
     }
     match what {
@@ -33,11 +32,9 @@ pub(super) fn card(view: &mut View<'_>, what: Op<'_>) -> Status {
         #[cfg(feature = "card-write")]
         Op::Create(name) => card.create(name),
         #[cfg(feature = "card-write")]
-        Op::Append(line) => card.append(line),
-        #[cfg(feature = "card-write")]
         Op::Finish => card.finish(),
         #[cfg(not(feature = "card-write"))]
-        Op::Create(_) | Op::Append(_) | Op::Finish => Status::NotBuiltIn,
+        Op::Create(_) | Op::Finish => Status::NotBuiltIn,
         Op::Drop => {
             card.close();
             Status::Ok

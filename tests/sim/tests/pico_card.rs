@@ -82,7 +82,7 @@ fn a_file_is_written_and_run_over_usb() {
         assert_eq!(text(&now, "KEEP.NC"), Some(zigzag(50)));
         assert_eq!((lost(&now), names(&now).len()), (0, 3));
         assert_eq!(ends(&session.board), [0, 0], "nothing has moved");
-        // The same lines from the card end where they end.
+        // The file is run from the card. Below, the same lines come over USB, to compare the times.
         session.ask("{sdr:\"PART.NC\"}", "\"f\":[1,0,");
         let began = session.board.cycle();
         session.heard.clear();
