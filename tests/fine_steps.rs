@@ -28,5 +28,8 @@ fn lines_that_lie_on_a_line_are_driven_to_their_end() {
 
 #[test]
 fn the_way_out_is_driven_before_the_way_back() {
-    assert_eq!(driven("x0\n"), (0, 3 * 12_800));
+    let (end, most) = driven("x0\n");
+    assert_eq!(end, 0);
+    // The means round the turn by 18 um at 500 mm/s^2.
+    assert!((3 * 12_800 - 240..=3 * 12_800).contains(&most), "{most}");
 }

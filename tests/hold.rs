@@ -175,7 +175,9 @@ proptest! {
 fn on_its_way(jerk: f32, segments: usize) -> Rig {
     let mut rig = Rig::new(Config::new(100.0, 1_000.0, jerk));
     rig.line(at([200.0, 70.0]), 80.0, 1);
-    (0..segments).for_each(|_| assert_eq!(rig.turn(), Step::Segment));
+    for _ in 0..segments {
+        while rig.turn() == Step::Again {}
+    }
     rig
 }
 
@@ -240,7 +242,7 @@ fn what_was_said_of_positions_before_the_first_move_holds() {
 #[test]
 fn it_stops_in_the_middle_and_goes_on_to_the_end() {
     for jerk in [0.0, 20_000.0] {
-        for segments in [1, 3, 40, 200, 1_000] {
+        for segments in [1, 3, 40, 200, 600] {
             let mut rig = on_its_way(jerk, segments);
             until_held(&mut rig);
             let there = rig.pins.position;

@@ -232,7 +232,8 @@ fn exact_stop_stops_between_moves_and_not_within_an_arc() {
     let (continuous, end) = time("g64 g1 f600 x2\nx4\nx6\n");
     let (exact_path, _) = time("g61 g1 f600 x2\nx4\nx6\n");
     let (exact_stop, stop_end) = time("g61.1 g1 f600 x2\nx4\nx6\n");
-    assert_eq!(continuous, exact_path);
+    // Without means a move takes less time, by what they cover.
+    assert!((10..80).contains(&(continuous - exact_path)), "{continuous} and {exact_path} ms");
     // There are two more stops. Each costs half of the ramp down and half of the ramp up.
     assert!(exact_stop > continuous + 100, "{exact_stop} and {continuous} ms");
     let (one, _) = time("g1 f600 x2\n");

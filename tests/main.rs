@@ -89,7 +89,6 @@ mod docs;
 mod dwells;
 mod fine_steps;
 mod gcode_props;
-mod governor;
 mod grbl;
 mod grbl_alarms;
 mod grbl_random;

@@ -142,7 +142,6 @@ fn lines(axes: usize) -> Worst {
             for velocity in [10.0, 60.0, 300.0] {
                 let points = path(&mut random, &Kind { axes, way, turn }, 400);
                 worst.add(off(&points, velocity, 5_000.0, 0.0));
-                worst.add(off(&points, velocity, 5_000.0, 1e6));
             }
         }
     }
@@ -175,6 +174,25 @@ fn steps_keep_to_the_path() {
     let most = [(0.8, 0.32), (0.95, 0.43), (1.06, 0.52), (0.8, 0.32)];
     for (worst, (most, rms)) in worst.iter().zip(most) {
         assert!(worst.most <= most && worst.rms <= rms, "{worst:?} of {most}, {rms}");
+    }
+}
+
+/// Means round corners. What they round grows with the acceleration: 41 um at a right angle that is passed at rest, at
+/// 5,000 mm/s^2, and 4 um at 500. Corners within the means add up.
+#[test]
+fn means_round_corners_by_little() {
+    let mut random = Random(7);
+    for (accel, jerk, most) in [(500.0, 18_519.0, 4.5), (5_000.0, 1e6, 4.5)] {
+        let mut worst = Worst::default();
+        for way in [(0.05, 0.2), (0.2, 1.0), (1.0, 5.0)] {
+            for turn in [0.1, 1.0] {
+                for velocity in [10.0, 60.0, 300.0] {
+                    let points = path(&mut random, &Kind { axes: 2, way, turn }, 400);
+                    worst.add(off(&points, velocity, accel, jerk));
+                }
+            }
+        }
+        assert!(worst.most <= most, "{worst:?} of {most} steps at {accel} mm/s^2");
     }
 }
 

@@ -1,7 +1,7 @@
 //! Jerk limits that have no effect.
 //!
 //! A jerk limit that lets an axis reach its acceleration limit within a millisecond has no effect. The motion code
-//! ignores it (`motion::governor::effective_jerk`), because no slice of motion is shorter. The sender gets a warning
+//! ignores it (`motion::dynamics::effective_jerk`), because no sample of motion is as short. The sender gets a warning
 //! when it sets such a limit. Cost on AVR: 1,500 cycles.
 
 use super::groups::axis;
@@ -38,8 +38,7 @@ impl Settings {
 mod tests {
     use super::*;
     use crate::config::Name;
-    use crate::motion::dynamics::PER_SECOND_CUBED;
-    use crate::motion::governor::effective_jerk;
+    use crate::motion::dynamics::{PER_SECOND_CUBED, effective_jerk};
     use proptest::prelude::*;
 
     fn setting(name: &str) -> Setting {

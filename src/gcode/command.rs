@@ -33,8 +33,8 @@ pub struct Commands {
     pub motion: Motion,
     /// G61.1 is in force: moves end at standstill. Without a move this asks for nothing.
     pub exact_stop: bool,
-    /// G64, for a straight move: successive short moves may be merged into one if they stay within a tolerance. The
-    /// value is the tolerance in units of [`Length`] plus one. 0 with G61 and G61.1: moves are not merged.
+    /// G64: corners may be rounded, and successive short straight moves may be merged into one if they stay within a
+    /// tolerance. The value is the tolerance in units of [`Length`] plus one. 0 with G61 and G61.1.
     pub blend: u8,
     /// M0, M1, M2, M30, M60.
     pub stop: Stop,
@@ -49,6 +49,15 @@ impl Commands {
     /// Whether the line asks for a move.
     pub fn moves(&self) -> bool {
         !matches!(self.motion, Motion::None | Motion::SetPosition { .. } | Motion::Check)
+    }
+
+    /// Whether the line moves along its path exactly, without a stop at its end: G61.
+    pub fn is_exact_path(&self) -> bool {
+        let follows = matches!(
+            self.motion,
+            Motion::Traverse { .. } | Motion::Feed { .. } | Motion::Arc { .. } | Motion::Cycle(_)
+        );
+        follows && self.blend == 0 && !self.exact_stop
     }
 
     /// Whether the line asks for one straight move and for nothing else.

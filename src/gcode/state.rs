@@ -311,7 +311,7 @@ impl State {
         }
         out.exact_stop = self.modal.path == PathMode::ExactStop;
         // A line without a straight move is not merged with others.
-        out.blend = if out.is_straight() { self.modal.blend() } else { 0 };
+        out.blend = self.modal.blend();
         Ok(())
     }
 

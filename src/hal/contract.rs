@@ -317,6 +317,8 @@ pub trait Timing {
     /// Shortest block with steps, s: twice the time that exec takes for it while the step interrupt is busy. At most
     /// 1/1,024.
     const BLOCK_S_MIN: f32 = 0.000_75;
+    /// How long a sample of motion is, ms: see [`smooth`](crate::motion::smooth). 1, 2 or 4.
+    const SAMPLE_MS: u8 = 4;
     /// The share of the step rate that chords and short blocks may use, because exec has much more to do there than in a
     /// long line: five eighths, or 1.
     const SHORT_SHARE: f32 = 0.625;
@@ -334,6 +336,8 @@ pub const TIMER_HZ: u32 = <imp::Chip as Timing>::TIMER_HZ;
 pub const PULSE_US: u8 = <imp::Chip as Timing>::PULSE_US;
 /// [`Timing::BLOCK_S_MIN`] of the chip of this image.
 pub const BLOCK_S_MIN: f32 = <imp::Chip as Timing>::BLOCK_S_MIN;
+/// [`Timing::SAMPLE_MS`] of the chip of this image.
+pub const SAMPLE_MS: u8 = <imp::Chip as Timing>::SAMPLE_MS;
 /// [`Timing::SHORT_SHARE`] of the chip of this image.
 pub const SHORT_SHARE: f32 = <imp::Chip as Timing>::SHORT_SHARE;
 /// [`Timing::LOOK_AHEAD`] of the chip of this image.

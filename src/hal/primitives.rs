@@ -5,7 +5,6 @@
 
 use super::contract::contract;
 use super::imp;
-use avr_embassy::ring::Index;
 
 contract! {
     /// Arithmetic for which the compiler's own takes several times as long on a small chip.
@@ -27,10 +26,6 @@ contract! {
         /// Returns 2^23 over the square root of a number from 2^14 on, 0.006 % exact. For a smaller number the result
         /// is arbitrary. Cost: 80.
         fn inverse_root(x: u16) -> u16;
-        /// Returns how many pairs of a mark and a value come before the first pair whose mark has its highest bit set
-        /// or whose value is below `least`. If there is no such pair, returns the number of all pairs, at most
-        /// [`Index::MAX`]. Cost: 14 for each pair.
-        fn passed_over(marks: &[Index], values: &[u16], least: u16) -> Index;
         /// Returns `a / b`, not inlined. Cost: 370, where the compiler's division takes 490.
         fn ratio(a: f32, b: f32) -> f32;
         /// Returns a number rounded down. For 2^31 or more, for a number below 0 and for a NaN the result is 2^31.

@@ -19,6 +19,7 @@ use super::block::{Line, PARTS_LOG2};
 use super::divide::quotient;
 use super::float::{below, greater, least, less, lesser, ratio, scaled, size, some, whole};
 use super::short::Short;
+use super::smooth::SAMPLE_S;
 use crate::boards::MOTORS;
 use crate::capability::Capability;
 use crate::config::StepRatio;
@@ -133,6 +134,9 @@ pub struct Advance {
     goal: i32,
     /// How fast `goal` changes, phase units/s; 0 if it jumps.
     pace: f32,
+    /// Where distances are sampled: the lead for the velocity at the end of the last sample, before the means, phase
+    /// units.
+    raw: i32,
 }
 
 #[small]
@@ -154,6 +158,7 @@ impl Advance {
         made: 0,
         goal: 0,
         pace: 0.0,
+        raw: 0,
     };
 
     /// Sets the parameters, from the next block on.
@@ -181,6 +186,26 @@ impl Advance {
             self.factor = self.time * self.ratio(way as f32, length);
         }
         some(self.factor) || !self.is_over()
+    }
+
+    /// Begins a block as [`Advance::begin`] does, where distances are sampled: the goal stays, because it comes from the
+    /// means.
+    #[inline(never)]
+    pub fn begin_sampled(&mut self, way: u32, length: f32) {
+        self.factor = if way == 0 { 0.0 } else { self.time * self.ratio(way as f32, length) };
+    }
+
+    /// Returns by how much the lead for this velocity, mm/s, is above that of the last sample.
+    pub fn step_to(&mut self, velocity: f32) -> i32 {
+        let end = whole(least(self.factor * velocity, MOST) + 0.5) as i32;
+        end - core::mem::replace(&mut self.raw, end)
+    }
+
+    /// Moves the goal by `more` in a sample. Returns whether there is a lead to be made or taken back.
+    pub fn aim_by(&mut self, more: i32) -> bool {
+        self.goal += more;
+        self.pace = more as f32 * (1.0 / SAMPLE_S);
+        self.goal != 0 || self.made != 0 || some(self.speed)
     }
 
     /// Returns phase units of the motor for each mm of the path. Files round the ends of lines: with four decimals by
@@ -234,17 +259,16 @@ impl Advance {
     /// Sets the lead to 0 at the present position of the motor, which stands still.
     pub fn cut(&mut self) {
         self.end();
-        (self.made, self.speed, self.leads) = (0, 0.0, false);
+        (self.made, self.raw, self.speed, self.leads) = (0, 0, 0.0, false);
         self.on = some(self.time);
     }
 
-    /// Sets the goal for the end of a stretch of `seconds`. The machine is at `velocity`, mm/s, at the end of a
-    /// slice, of which `pending` seconds are left after the stretch.
+    /// Sets the goal for the end of a stretch of `seconds`, at which the machine is at `velocity`, mm/s.
     #[inline(never)]
-    pub fn aim(&mut self, velocity: f32, seconds: f32, pending: f32) {
+    pub fn aim(&mut self, velocity: f32, seconds: f32) {
         let end = whole(least(self.factor * velocity, MOST) + 0.5) as i32;
         let way = end - self.goal;
-        let pace = ratio(way as f32, greater(seconds + pending, SHORTEST));
+        let pace = ratio(way as f32, greater(seconds, SHORTEST));
         self.goal += rounded(pace * seconds);
         self.pace = if core::mem::take(&mut self.jumps) { 0.0 } else { pace };
     }
@@ -392,7 +416,7 @@ mod tests {
         assert!(advance.begin((3.1 * f32::from(STEP)) as u32, 1.0));
         for n in 1..=30u16 {
             let velocity = 2.0 * f32::from(n);
-            advance.aim(velocity, 0.002, 0.0);
+            advance.aim(velocity, 0.002);
             let lead = run(&mut advance, 1)[0];
             let exact = 0.05 * 3.1 * f64::from(velocity);
             assert!((lead - exact).abs() < 0.02, "{velocity} mm/s: {lead} of {exact}");
@@ -416,10 +440,10 @@ mod tests {
     fn a_lead_that_is_late_catches_up_with_a_goal_that_moves() {
         let mut advance = advance();
         advance.begin((3.1 * f32::from(STEP)) as u32, 1.0);
-        // Without a jerk limit: from rest 2,000 mm/s^2 at once, 310 steps/s of lead.
+        // From rest 2,000 mm/s^2 at once, 310 steps/s of lead.
         let late = (1..=12u16).map(|n| {
             let velocity = 4.0 * f32::from(n);
-            advance.aim(velocity, 0.002, 0.0);
+            advance.aim(velocity, 0.002);
             0.05 * 3.1 * f64::from(velocity) - run(&mut advance, 1)[0]
         });
         let late: std::vec::Vec<_> = late.collect();
@@ -444,16 +468,6 @@ mod tests {
             assert_eq!(line.extent.has_whole_steps(), length < 0.0);
             assert_eq!(pushed(-way, &line), 0);
         }
-    }
-
-    #[test]
-    fn a_slice_is_shared_by_its_stretches() {
-        let mut advance = advance();
-        advance.begin((3.1 * f32::from(STEP)) as u32, 1.0);
-        advance.aim(10.0, 0.0005, 0.0015);
-        let quarter = advance.goal;
-        advance.aim(10.0, 0.0015, 0.0);
-        assert!((advance.goal - 4 * quarter).abs() <= 4, "{quarter} of {}", advance.goal);
     }
 
     #[test]

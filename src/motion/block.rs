@@ -11,6 +11,7 @@ use super::float::size;
 use super::pace::Drivers;
 use super::retract::Retract;
 use super::short::Short;
+use super::smooth::Spans;
 use super::snapshot::Origin;
 use crate::boards::MOTORS;
 use crate::gcode::command::Surface;
@@ -137,6 +138,8 @@ pub enum QueuedAction {
     Advance(Lead),
     /// The origin of the lines from here on, for reports. Does not stop the machine.
     Origin(Origin),
+    /// The means for the motion from here on. Done at a standstill.
+    Smooth(Spans),
     /// M0, M1, M60.
     ProgramStop,
     /// M2, M30.
@@ -221,8 +224,6 @@ pub struct Line {
     pub entry: Short,
     /// Acceleration limit on the path, mm/s^2.
     pub accel: Short,
-    /// Jerk limit on the path, mm/s^3; 0 for none.
-    pub jerk: Short,
 }
 
 impl Line {

@@ -11,7 +11,6 @@ use kerf_macros::small;
 
 use super::dynamics::{Axis, Dynamics};
 use super::float::{cube_root, greater, least, some};
-use super::governor::effective_jerk;
 use super::junction::{Heading, ONE, turn};
 use super::limits::Slowest;
 use super::path::Path;
@@ -26,8 +25,6 @@ const TURNING: f32 = 0.75;
 /// The share that turning and slowing down may take together: on an arc they are at right angles. The remainder is for
 /// the corners between chords, at which the path turns at once.
 const BOTH: f32 = 0.95;
-/// Takes the place of [`TURNING`] under a jerk limit, where slowing down may take all of the acceleration.
-const TURNING_JERK: f32 = 0.65;
 /// A corner between two chords changes the velocity by no more than the acceleration does in this time, s.
 const CORNER_S: f32 = 0.01;
 /// How far rounding moves a position, as a logarithm: 0.5 um, in 2^-14 mm.
@@ -58,7 +55,7 @@ const EVEN: bool = SHORT_SHARE == 1.0;
 pub struct Curve {
     /// Highest velocity on the path, mm/s.
     velocity: f32,
-    /// Highest acceleration along the path if there is no jerk limit; 0 for what axes allow.
+    /// Highest acceleration along the path; 0 for what axes allow.
     accel: Short,
     /// Whether a chord of the arc has been made: the next one follows without a corner.
     pub(super) goes_on: bool,
@@ -96,9 +93,7 @@ impl Curve {
             curve.velocity = least(curve.velocity, cube_root(jerk * radius * radius));
         }
         if some(accel) {
-            let ramps = some(jerk) && some(effective_jerk(jerk, accel));
-            let turning = if ramps { TURNING_JERK } else { TURNING };
-            curve.velocity = least(curve.velocity, sqrt(turning * accel * radius));
+            curve.velocity = least(curve.velocity, sqrt(TURNING * accel * radius));
             let feed = feed * (1.0 / 60.0);
             // An override may double the feed.
             let top = least(curve.velocity, feed + feed);
@@ -106,7 +101,7 @@ impl Curve {
             let both = BOTH * accel;
             curve.accel = Short::new(sqrt(both * both - turns * turns));
             // At a corner the velocity then changes by what the turning acceleration does in [`CORNER_S`].
-            longest = CORNER_S * turning * accel * radius / least(curve.velocity, feed);
+            longest = CORNER_S * TURNING * accel * radius / least(curve.velocity, feed);
         }
         // The radius of curvature of a helix is that of its arc times the square of the slope.
         curve.velocity *= slope;
@@ -143,7 +138,7 @@ impl Bend {
             accel = Short::new(accel.get() * path.stretch);
         }
         path.slow_down(velocity);
-        if path.jerk == Short::ZERO && accel != Short::ZERO && accel < path.accel {
+        if accel != Short::ZERO && accel < path.accel {
             path.accel = accel;
         }
     }
@@ -399,6 +394,7 @@ mod tests {
             accel: Short::new(accel),
             jerk: Short::new(jerk),
             deviation: Short::new(0.01),
+            corner: Short::ZERO,
         };
         Dynamics { axes: [axis; 6], junction: accel, ..Dynamics::default() }
     }

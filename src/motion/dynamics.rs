@@ -3,15 +3,24 @@
 //! Owned by the planner task, made from the settings when they change. Settings are integers in the units of the
 //! sender, whose conversion takes longer than planning a block.
 
-use super::float::{greater, lesser};
-use super::governor::JERK_TIME_MIN;
+use super::float::{below, greater, lesser, some};
 use super::line::Motors;
 use super::pace::Drivers;
 use super::short::Short;
+use super::smooth::{CORNER_S, Spans};
 use crate::boards::MOTORS;
 use crate::config::StepRatio;
+use crate::kinematics;
 use crate::math::sqrt;
 use crate::units::PerAxis;
+
+/// A jerk limit counts as none if it lets the acceleration reach its limit in less than this time, s.
+const JERK_TIME_MIN: f32 = 0.001;
+
+/// Returns the jerk limit if it has an effect, else 0; `accel` is the acceleration limit. Neither is negative. Cost: 160.
+pub fn effective_jerk(jerk: f32, accel: f32) -> f32 {
+    if some(jerk) && below(jerk * JERK_TIME_MIN, accel) { jerk } else { 0.0 }
+}
 
 /// The least time, s, that the acceleration takes to reach its limit under a jerk limit with an effect.
 const JERKY_S: f32 = 1.0625 * JERK_TIME_MIN;
@@ -56,6 +65,8 @@ pub struct Axis {
     pub jerk: Short,
     /// Junction deviation, mm.
     pub deviation: Short,
+    /// By how much the velocity may change at a corner where there are [means](super::smooth), mm/s.
+    pub corner: Short,
 }
 
 impl Axis {
@@ -68,17 +79,27 @@ impl Axis {
     /// Sets acceleration and jerk, mm/s^2 and mm/s^3; 0 or less for no limit. The velocities must be known. Cost:
     /// 3,000.
     ///
-    /// An acceleration limit far above what any ramp reaches under the jerk limit would make the potentials of
-    /// `speed_constraints` coarse. Between 0 and v a ramp reaches `sqrt(J v)`, in a direction between three axes a
-    /// third more: the limit is lowered to one and a half of this. Even the least limit that results is such that the
-    /// jerk limit has an effect ([`effective_jerk`](super::governor::effective_jerk)).
+    /// A ramp from 0 to v takes `v / A + A / J`, the least with an acceleration of `sqrt(J v)`. The limit is lowered to
+    /// this, and is this if there is none. Even the least limit that results is such that the jerk limit has an effect
+    /// ([`effective_jerk`]).
     #[inline(never)]
     #[small]
     pub fn limit_change(&mut self, accel: f32, jerk: f32) {
-        let most = 1.5 * sqrt(greater(jerk, 0.0) * greater(self.velocity, self.feed));
-        let limits = most > 0.0 && accel > most;
+        let most = sqrt(greater(jerk, 0.0) * greater(self.velocity, self.feed));
+        let limits = most > 0.0 && (accel > most || accel <= 0.0);
+        let accel = if accel > 0.0 { accel } else { most };
         let accel = if limits { lesser(accel, greater(most, jerk * JERKY_S)) } else { accel };
         (self.accel, self.jerk) = (Short::new(accel), Short::new(jerk));
+        self.corner = Short::new(accel * CORNER_S);
+    }
+
+    /// Returns how long the acceleration takes to reach its limit, s; 0 without a jerk limit that has an effect.
+    #[inline(never)]
+    #[small]
+    fn build_up(&self) -> f32 {
+        let (accel, jerk) = (self.accel.get(), self.jerk.get());
+        let jerk = effective_jerk(jerk, accel);
+        if jerk > 0.0 { accel / jerk } else { 0.0 }
     }
 }
 
@@ -93,6 +114,10 @@ pub struct Dynamics {
     pub drives: [u8; MOTORS],
     /// Highest step rate of each motor, steps/s, by the number of motors that move, less one.
     pub rates: [f32; MOTORS],
+    /// The means for motion within these limits.
+    pub spans: Spans,
+    /// Whether lines are driven with these means, which round corners.
+    pub rounds: bool,
     /// Whether lines may be merged: no motor has steps so fine that a [chain](super::chain) could have more steps than
     /// a block holds, not even on CoreXY.
     pub merges: bool,
@@ -130,10 +155,25 @@ impl Dynamics {
             *axis = machine.motor_axis(m);
             self.merges &= is_coarse(machine.ratio(m));
         }
+        self.spans = Spans::of(self.build_up());
         self.junction = machine.junction_acceleration() * PER_SECOND_SQUARED;
         let drivers = machine.drivers();
         for (others, rate) in self.rates.iter_mut().enumerate() {
             *rate = drivers.step_rate_max(others + 1);
         }
+    }
+
+    /// Returns the time in which the slowest axis with a motor reaches its acceleration limit, s; 0 if no such axis has
+    /// a jerk limit.
+    #[inline(never)]
+    #[small]
+    pub fn build_up(&self) -> f32 {
+        let mut most = 0.0;
+        for (n, axis) in self.axes.iter().enumerate() {
+            if self.drives.iter().any(|drives| kinematics::turns(*drives, n as u8)) {
+                most = greater(axis.build_up(), most);
+            }
+        }
+        most
     }
 }

@@ -1,9 +1,15 @@
 //! Exec: runs blocks, a few milliseconds at a time.
 //!
 //! Owned by the exec task (level 2), which asks [`Exec::step`] for a segment whenever the segment ring has room for
-//! one. The [`Governor`] decides how far the next stretch goes and how long it takes; [`Prep`] turns the stretch into
-//! a segment. A stretch ends where its block ends: a block that takes less than [`SEGMENT_S`] is one segment. Times
-//! are seconds, distances mm.
+//! one. The [`Governor`] decides how far the next stretch goes and how long it takes. Times are seconds, distances mm.
+//!
+//! With [means](super::smooth), which machines with jerk limits have, stretches fill samples of equal length
+//! ([`Sampler`]). The distances of each sample go through the means ([`Smooth`]), and [`Prep::slice`] turns them into a
+//! segment (`sampled`). So the motors are later than the path by the means, and a line ends, a spindle starts and a hold
+//! holds only when the means are empty.
+//!
+//! Without means, and in a pass in step with the spindle, [`Prep`] turns each stretch into a segment. A stretch then
+//! ends where its block ends: a block that takes less than [`SEGMENT_S`] is one segment.
 //!
 //! No velocity profile is planned ahead. Each stretch follows from the present velocity and from the velocity that is
 //! allowed at the end of the block, which the [speed constraints](super::speed_constraints) give. Blocks that are added
@@ -17,17 +23,19 @@
 //! remainder of its time. Alternatively [`Exec::drop_all`] drops everything that is queued, and the position is that of
 //! the last steps made.
 //!
-//! Cost on AVR: 6,300 cycles for a short block without a jerk limit, including [`Prep`], the task and its interrupt.
-//! A third of them are the governor's floats.
+//! Cost on AVR: 6,300 cycles for a short block without means, including [`Prep`], the task and its interrupt. A third
+//! of them are the governor's floats.
 
+mod sampled;
 mod spindle;
 
 use super::block::{Block, Body, Line, QueuedAction};
 use super::float::{below, greater, lesser, scaled, some, whole};
-use super::governor::{Ahead, Governor, Stretch, same};
+use super::governor::{Governor, Stretch, same};
 use super::prep::{CYCLES_MAX, FINE_LOG2, Prep};
-use super::queue::{BlockSource, Constraint};
-use super::short::Short;
+use super::queue::BlockSource;
+use super::sampler::Sampler;
+use super::smooth::Smooth;
 use super::snapshot::{Program, Snapshot};
 use super::thread::Thread;
 use crate::capability::Capability;
@@ -36,7 +44,6 @@ use crate::gcode::heating::Heat;
 use crate::gcode::overrides::Change;
 pub use crate::hal::BLOCK_S_MIN;
 use crate::hal::TIMER_HZ;
-use crate::hal::ring::Index;
 use spindle::Follows;
 
 /// Half CPU cycles in a second.
@@ -137,15 +144,17 @@ struct Running {
     active: bool,
     /// Whether the line takes long enough for fine ticks.
     long: bool,
-    /// Whether the line has no jerk limit and is short, so that another one follows soon.
+    /// Whether the line is short, so that another one follows soon.
     short: bool,
     /// Distance to go, mm.
     left: f32,
+    /// Where distances are sampled: what rounding has not taken from `left` yet, mm.
+    owed: f32,
     /// Velocity limit, mm/s.
     cruise: f32,
     /// Phase units of the dominant motor in a mm. Not valid while `fresh`.
     scale: f32,
-    /// Without a jerk limit: the square of the velocity that is allowed at the end of the line.
+    /// The square of the velocity that is allowed at the end of the line.
     headroom: f32,
     /// The version of the queue that `headroom` belongs to.
     version: u8,
@@ -153,7 +162,22 @@ struct Running {
     fresh: bool,
     /// Whether the governor has handed out the whole line; `Prep` still holds a part of it.
     done: bool,
-    jerk: bool,
+}
+
+impl Running {
+    /// Updates the feed and the headroom, if they have changed.
+    #[inline(always)]
+    fn look_ahead(&mut self, blocks: &mut BlockSource, governor: &mut Governor) {
+        let version = blocks.version();
+        if version != self.version {
+            self.version = version;
+            self.cruise = blocks.cruise();
+            if blocks.take_changed() {
+                governor.change_feed();
+            }
+            self.headroom = blocks.headroom();
+        }
+    }
 }
 
 /// The state of exec.
@@ -164,8 +188,10 @@ pub struct Exec {
     running: Running,
     /// Whether a feedhold is on.
     hold: bool,
-    /// Whether stretches are to be twice as long, except in long lines without a jerk limit.
+    /// Whether stretches of short lines are to be twice as long.
     coarse: bool,
+    /// Whether all stretches are to be twice as long.
+    hurry: bool,
     /// Whether the segment ring has room for longer stretches.
     long: bool,
     /// Whether a pass in step with the spindle is to end at once.
@@ -173,26 +199,10 @@ pub struct Exec {
     dwell_ms: u32,
     governor: Governor,
     prep: Prep,
+    sampler: Sampler,
+    smooth: Smooth,
     // Last of all, because few lines need it.
     follows: Follows,
-}
-
-/// The queue as the governor sees it.
-struct QueueView<'a> {
-    headroom: f32,
-    blocks: &'a BlockSource,
-}
-
-impl Ahead for QueueView<'_> {
-    fn headroom(&self) -> f32 {
-        self.headroom
-    }
-    fn slower(&self, n: Index, velocity: Short) -> (Index, Constraint) {
-        self.blocks.slower(n, velocity)
-    }
-    fn end(&self) -> f32 {
-        self.blocks.end_of_queue()
-    }
 }
 
 impl Exec {
@@ -203,20 +213,23 @@ impl Exec {
             long: false,
             short: false,
             left: 0.0,
+            owed: 0.0,
             cruise: 0.0,
             scale: 0.0,
             headroom: 0.0,
             version: 0,
             fresh: false,
             done: false,
-            jerk: false,
         };
         Self {
             prep: Prep::new(),
             governor: Governor::new(),
+            sampler: Sampler::new(),
+            smooth: Smooth::new(),
             running,
             hold: false,
             coarse: false,
+            hurry: false,
             long: true,
             breaks_off: false,
             dwell_ms: 0,
@@ -236,8 +249,8 @@ impl Exec {
         if self.prep.held(segment) {
             return Step::Segment;
         }
-        if self.hold && self.rests(blocks, out) {
-            if self.prep.relax(segment) {
+        if self.hold && self.rests(blocks) {
+            if self.empties(out, segment) {
                 return Step::Segment;
             }
             if standstill && self.ends_pass(blocks) {
@@ -247,7 +260,7 @@ impl Exec {
             return if standstill { Step::Held } else { Step::Standstill };
         }
         if self.dwell_ms > 0 {
-            if !self.prep.relax(segment) {
+            if !self.empties(out, segment) {
                 self.dwell(segment);
             }
             return Step::Segment;
@@ -257,8 +270,7 @@ impl Exec {
         }
         if !self.running.active {
             if blocks.is_empty() {
-                if self.prep.relax(segment) {
-                    self.halt(out);
+                if self.empties(out, segment) {
                     return Step::Segment;
                 }
                 return self.idle(standstill, out);
@@ -267,40 +279,30 @@ impl Exec {
                 && let Some(block) = blocks.oldest()
                 && let Body::QueuedAction(action) = block.body
             {
-                if !block.is_aside() && self.prep.relax(segment) {
-                    self.halt(out);
+                if !block.is_aside() && self.empties(out, segment) {
                     return Step::Segment;
                 }
                 return self.take_up(&action, blocks, standstill, out);
             }
         }
-        self.run(blocks, out, segment)
+        if self.is_sampled() {
+            self.run_sampled(blocks, out, segment)
+        } else {
+            self.run(blocks, out, segment)
+        }
     }
 
-    /// Sets whether stretches are twice as long, which halves the CPU time of their mathematics. In a `hurry` they are
-    /// twice as long too, and the governor makes no scan that may wait.
+    /// Sets whether stretches of short lines are twice as long without means, which halves the CPU time of their
+    /// mathematics, and, in a `hurry`, those of all lines.
     #[inline(always)]
     pub fn set_coarse(&mut self, coarse: bool, hurry: bool) {
-        self.coarse = coarse || hurry;
-        self.governor.set_hurry(hurry);
-    }
-
-    /// Sets whether no time is left for scans at the end of an acceleration.
-    #[inline(always)]
-    pub fn set_tight(&mut self, tight: bool) {
-        self.governor.set_tight(tight);
+        (self.coarse, self.hurry) = (coarse || hurry, hurry);
     }
 
     /// Sets whether the segment ring has room for stretches that are twice as long.
     #[inline(always)]
     pub fn set_long(&mut self, long: bool) {
         self.long = long;
-    }
-
-    /// Whether the block that runs has a jerk limit.
-    #[inline(always)]
-    pub fn has_jerk(&self) -> bool {
-        self.running.jerk
     }
 
     /// Begins a feedhold, or ends one. Cost: 15 if nothing changes.
@@ -323,7 +325,7 @@ impl Exec {
 
     /// In a hold: whether everything up to the standstill has been prepared.
     #[inline(never)]
-    fn rests(&mut self, blocks: &BlockSource, out: &mut Snapshot) -> bool {
+    fn rests(&mut self, blocks: &BlockSource) -> bool {
         let running = &self.running;
         let is_line = |block: &Block| matches!(block.body, Body::Line(_)) || block.is_aside();
         let must_go_on = match &self.follows {
@@ -344,18 +346,30 @@ impl Exec {
         } else {
             !self.governor.is_at_rest() && blocks.look(is_line) == Some(true)
         };
-        if !goes_on {
-            self.halt(out);
-            self.prep.rest();
-        }
         !goes_on
+    }
+
+    /// At a standstill of the path: makes the next segment in which motors still move, because the means are not empty or
+    /// the extruder has a lead to take back. Returns false, and no segment, if the motors stand still, too.
+    #[inline(never)]
+    fn empties(&mut self, out: &mut Snapshot, segment: &mut Segment) -> bool {
+        self.governor.stop();
+        if self.smooth.spans().is_some() && self.drains(out, segment) {
+            return true;
+        }
+        out.velocity = 0.0;
+        if self.prep.relax(segment) {
+            return true;
+        }
+        self.prep.rest();
+        false
     }
 
     /// Drops everything that is queued. The steppers stand still: held, or stopped within a segment. Returns the
     /// segment that [`Prep`] held back, which has not been queued. `out.target` is then where the queued segments and
     /// the returned one end; [`Dda::settle`](crate::dda::Dda::settle) makes the last steps made the position.
     ///
-    /// Blocks that set drivers, pressure advance, G95 or the origin still take effect, as do those that set the position before the
+    /// Blocks that set drivers, means, pressure advance, G95 or the origin still take effect, as do those that set the position before the
     /// first dropped line, dwell, output or stop.
     ///
     /// Cost: 600 a block.
@@ -364,6 +378,8 @@ impl Exec {
         self.halt(out);
         let mut moved = self.running.active || self.dwell_ms > 0;
         let held = self.prep.cut(&mut out.target);
+        self.sampler.clear();
+        self.smooth.clear();
         self.running.active = false;
         self.dwell_ms = 0;
         let keeps = match &mut self.follows {
@@ -400,6 +416,7 @@ impl Exec {
                     out.target = *steps
                 }
                 Body::QueuedAction(QueuedAction::Origin(origin)) => out.origin = *origin,
+                Body::QueuedAction(QueuedAction::Smooth(spans)) => self.smooth.set(*spans),
                 Body::QueuedAction(
                     QueuedAction::SetPosition(_)
                     | QueuedAction::Override(_)
@@ -462,6 +479,7 @@ impl Exec {
             QueuedAction::Heat(_) if Capability::Printer.is_built_in() => return Step::Heat,
             QueuedAction::Origin(origin) => out.origin = *origin,
             QueuedAction::Drivers(drivers) => self.prep.set_drivers(*drivers),
+            QueuedAction::Smooth(spans) => self.smooth.set(*spans),
             QueuedAction::Advance(lead) if Capability::Printer.is_built_in() => {
                 self.prep.set_lead(lead)
             }
@@ -538,7 +556,7 @@ impl Exec {
     fn begin_line(&mut self, line: &Line, version: u8, out: &mut Snapshot) {
         let length = line.extent.length();
         let long = below(scaled(line.cruise, FINE_LOG2), length);
-        let short = line.jerk == Short::ZERO && below(length, scaled(line.cruise, SHORT_LOG2));
+        let short = below(length, scaled(line.cruise, SHORT_LOG2));
         out.length = length;
         out.running = true;
         // Field by field, to write in place. The remaining fields are set before they are read.
@@ -546,12 +564,16 @@ impl Exec {
         running.active = true;
         (running.long, running.short) = (long, short);
         running.left = length;
+        running.owed = 0.0;
         running.version = version;
         running.fresh = true;
         running.done = false;
-        running.jerk = line.jerk != Short::ZERO;
-        self.governor.begin(line.accel.get(), line.jerk.get());
-        self.prep.begin(line, &mut out.steps, &mut out.target);
+        self.governor.begin(line.accel.get());
+        if self.is_sampled() {
+            self.begin_sampled(line, out);
+        } else {
+            self.prep.begin(line, &mut out.steps, &mut out.target);
+        }
     }
 
     /// Prepares the next stretch of the running line. Works in place: copying the line's state would cost as much as
@@ -565,19 +587,7 @@ impl Exec {
         if Capability::Lathe.is_built_in() && matches!(self.follows, Follows::Angle(_)) {
             return self.follow(blocks, out, segment);
         }
-        let version = blocks.version();
-        if version != running.version {
-            running.version = version;
-            running.cruise = blocks.cruise();
-            if blocks.take_changed() {
-                self.governor.change_feed();
-            }
-            if running.jerk {
-                self.governor.look_again();
-            } else {
-                running.headroom = blocks.headroom();
-            }
-        }
+        running.look_ahead(blocks, &mut self.governor);
         let (mut cruise, mut holds) = (running.cruise, self.hold);
         if Capability::Lathe.is_built_in()
             && let Follows::Speed(share) = self.follows
@@ -594,20 +604,20 @@ impl Exec {
                 return self.await_spindle(out, segment);
             }
         }
-        let ahead = QueueView { headroom: running.headroom, blocks };
+        let (left, headroom) = (running.left, running.headroom);
         let stretch = if holds {
-            self.governor.halt(running.left, &ahead, SEGMENT_S)
+            self.governor.take(SEGMENT_S);
+            self.governor.halt(left, headroom)
         } else {
-            let coarse = self.coarse && (running.jerk || running.short) || self.governor.hurry;
-            let seconds = if coarse && self.long { 2.0 * SEGMENT_S } else { SEGMENT_S };
-            self.governor.stretch(running.left, cruise, &ahead, seconds)
+            if (self.coarse && running.short || self.hurry) && self.long {
+                self.governor.take_long(2.0 * SEGMENT_S);
+            } else {
+                self.governor.take(SEGMENT_S);
+            }
+            self.governor.stretch(left, cruise, headroom)
         };
         self.hand_out(&stretch, blocks, out, segment, |exec| {
-            let running = &exec.running;
-            // Fine ticks leave no CPU time to lay out a ramp under a jerk limit.
-            let steady = !running.jerk || exec.governor.is_far_from_ramps();
-            let short = if running.jerk { !running.long } else { running.short };
-            (running.long && steady, short && exec.coarse)
+            (exec.running.long, exec.running.short && exec.coarse)
         })
     }
 
@@ -626,7 +636,7 @@ impl Exec {
         out.velocity = self.governor.velocity();
         let cycles = cycles_of(stretch.seconds);
         if self.prep.leads() {
-            self.prep.aim(out.velocity, stretch.seconds, self.governor.pending().0);
+            self.prep.aim(out.velocity, stretch.seconds);
         }
         if stretch.ends {
             out.left = 0.0;
@@ -663,6 +673,12 @@ impl Exec {
         segment: &mut Segment,
     ) -> Step {
         self.hand_out(stretch, blocks, out, segment, |_| (false, true))
+    }
+
+    /// For how many more segments the end of a line that has been prepared goes on.
+    #[inline(always)]
+    pub fn lag(&self) -> u8 {
+        if self.is_sampled() { self.smooth.spans().lag() } else { 0 }
     }
 
     /// The velocity along the path at the end of the queued segments, mm/s.

@@ -1,8 +1,9 @@
 //! Which line has been finished, to its last step.
 //!
 //! Owned by the exec task, which is ahead of the motors by the segments that are queued. A line whose last segment has
-//! been queued is finished when the segment after that has been taken, or when the motors stand still. Of the lines
-//! that wait for this only the oldest and the newest are remembered. Cost on AVR: 30 cycles a segment.
+//! been queued is finished when the segment after that has been taken, or when the motors stand still. With
+//! [means](super::smooth) the end of a line goes on for as many segments as they cover. Of the lines that wait for this
+//! only the oldest and the newest are remembered. Cost on AVR: 30 cycles a segment.
 
 /// A line that has been queued to its last segment.
 #[derive(Clone, Copy, Debug)]
@@ -27,10 +28,10 @@ impl Finished {
         Self { segments: 0, oldest: None, newest: None }
     }
 
-    /// Notes that all of `line` has been prepared.
+    /// Notes that all of `line` has been prepared, but for `lag` segments.
     #[inline(never)]
-    pub fn end(&mut self, line: u32) {
-        let queued = Some(Queued { line, segments: self.segments });
+    pub fn end(&mut self, line: u32, lag: u8) {
+        let queued = Some(Queued { line, segments: self.segments.wrapping_add(lag) });
         let place = if self.oldest.is_none() { &mut self.oldest } else { &mut self.newest };
         *place = queued;
     }
@@ -66,7 +67,7 @@ mod tests {
 
     fn queue(finished: &mut Finished, line: u32, segments: usize) {
         (0..segments).for_each(|_| finished.queue());
-        finished.end(line);
+        finished.end(line, 0);
     }
 
     #[test]

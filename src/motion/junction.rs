@@ -2,7 +2,8 @@
 //!
 //! The velocity limit is that of an imaginary arc that rounds the corner within the junction deviation. On that arc the
 //! centripetal acceleration is at most the junction acceleration (the method of TinyG and grbl). The path itself is not
-//! rounded: at the corner the velocity of each axis changes at once.
+//! rounded: at the corner the velocity of each axis changes at once. Where there are [means](super::smooth), these round
+//! the corner, and no axis may jump by more than they turn into its acceleration limit ([`limit_axes`]).
 //!
 //! Called by the line builder. Units: mm (degrees for rotary axes), s. Costs are AVR cycles.
 
@@ -10,6 +11,7 @@ use kerf_macros::small;
 
 use super::dynamics::Dynamics;
 use super::float::{below, scaled, some};
+use super::limits::over;
 use super::short::{Log, OCTAVE, Short};
 use crate::hal::arithmetic::product;
 use crate::math::sqrt;
@@ -28,6 +30,11 @@ const WIDE: u32 = 1 << 26;
 /// and acceleration, plus the logarithm of the square of the change of direction in 2^-28. It takes `c (1 + c) = 1.9`
 /// as at [`WIDE`], a quarter of the square, and the error of the logarithms into account.
 const STRAIGHT_ON: i16 = 30 * OCTAVE + 238 - 27;
+
+/// The logarithm of the units of a heading.
+const UNIT_LOG: i16 = 14 * OCTAVE;
+/// More than the error of a comparison of sums of two logarithms.
+const LOG_ERROR: i16 = OCTAVE / 4;
 
 /// The direction of a move.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -108,6 +115,36 @@ fn rough(sum: u32, deviation: Short, acceleration: f32) -> Short {
     }
     let product = deviation.log().0 + Log::of_float(acceleration).0;
     Log((product + STRAIGHT_ON - Log::of_wide(sum).0) / 2).power()
+}
+
+/// Returns `top`, or less if an axis would jump by more than [`Axis::corner`](super::dynamics::Axis::corner) at a corner
+/// between these directions, mm/s. The path has [turned](turn) there by `turned`.
+///
+/// Cost: 60 where the path is straight or no axis could jump as far; 250 for each axis that may.
+#[inline(never)]
+pub fn limit_axes(
+    (a, b): (&PerAxis<i16>, &PerAxis<i16>),
+    turned: u32,
+    dynamics: &Dynamics,
+    top: f32,
+) -> f32 {
+    if turned < STRAIGHT || !some(top) {
+        return top;
+    }
+    let most = Short::above(top);
+    let fast = most.log().0;
+    let mut limit = most;
+    for ((from, to), axis) in a.iter().zip(b).zip(&dynamics.axes) {
+        let change = to.abs_diff(*from);
+        if change == 0 || axis.corner == Short::ZERO {
+            continue;
+        }
+        // Logarithms mostly decide.
+        if axis.corner.log().0 + UNIT_LOG < Log::of(change).0 + fast + LOG_ERROR {
+            limit = limit.min(over(axis.corner, change));
+        }
+    }
+    if limit < most { limit.get() } else { top }
 }
 
 /// Returns the square of the change of direction, in 2^-28. Cost: 60 + 30 for each axis whose direction changes.

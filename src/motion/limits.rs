@@ -1,4 +1,4 @@
-//! What limits a straight move: feed, velocities, acceleration and jerk of its axes, step rates of its motors.
+//! What limits a straight move: feed, velocities and acceleration of its axes, step rates of its motors.
 //!
 //! Called by the line builder. Units: mm, s.
 
@@ -9,7 +9,7 @@ use super::divide::quotient;
 use super::dynamics::{Axis, Dynamics};
 use super::exec::BLOCK_S_MIN;
 use super::float::{below, least, scaled, some};
-use super::governor::{ACCEL_MOST, effective_jerk};
+use super::governor::ACCEL_MOST;
 use super::junction::{self, ONE};
 use super::path::Path;
 use super::short::{self, Log, Short};
@@ -17,7 +17,6 @@ use crate::boards::MOTORS;
 use crate::gcode::command::Feed;
 use crate::hal::SHORT_SHARE;
 use crate::hal::arithmetic::product;
-use crate::math::sqrt;
 
 /// Highest velocity, mm/s, above that of any machine; higher ones are clamped to it.
 const CRUISE_MOST: f32 = 1e5;
@@ -122,7 +121,7 @@ impl Path {
         })
     }
 
-    /// Limits acceleration and jerk, and sets the junction deviation. Cost: 350 where all axes that move have the
+    /// Limits the acceleration, and sets the junction deviation. Cost: 350 where all axes that move have the
     /// same limits.
     #[inline(never)]
     pub(super) fn limit_change(&mut self, dynamics: &Dynamics) {
@@ -135,20 +134,9 @@ impl Path {
         };
         self.slowest = (slowest.least, slowest.jerk);
         self.mixed = slowest.mixed;
+        self.accel = Short::new(ACCEL_MOST);
         if slowest.least != Short::ZERO {
-            let jerk = slowest.effective_jerk();
-            let accel =
-                if jerk != Short::ZERO { slowest.least } else { over(slowest.accel, slowest.unit) };
-            self.accel = accel.min(Short::new(ACCEL_MOST));
-            self.jerk = jerk;
-        } else if slowest.jerk != Short::ZERO {
-            let jerk = slowest.jerk.get();
-            // The acceleration that a ramp to full speed reaches, so that the jerk alone limits the ramp.
-            let accel = least(sqrt(jerk * power_of_two_above(self.cruise)), ACCEL_MOST);
-            self.accel = Short::new(accel);
-            self.jerk = Short::new(effective_jerk(jerk, accel));
-        } else {
-            self.accel = Short::new(ACCEL_MOST);
+            self.accel = over(slowest.accel, slowest.unit).min(self.accel);
         }
     }
 
@@ -328,17 +316,6 @@ pub(super) struct Slowest {
 }
 
 impl Slowest {
-    /// Returns the jerk limit if it has an effect, else 0.
-    #[inline(always)]
-    fn effective_jerk(&self) -> Short {
-        // The limit certainly has no effect if the acceleration builds up within 2^-10 s.
-        let octaves = Short::octaves_between(self.least, self.jerk);
-        if self.jerk == Short::ZERO || octaves >= 11 {
-            return Short::ZERO;
-        }
-        Short::new(effective_jerk(self.jerk.get(), self.least.get()))
-    }
-
     /// Takes in the limits of an axis with this part of the heading. Cost: 130.
     #[inline(never)]
     pub(super) fn look(&mut self, u: u16, accel: Short, jerk: Short) {
@@ -389,13 +366,6 @@ fn is_slower(a: Short, v: u16, b: Short, u: u16) -> bool {
 #[inline(always)]
 fn shifted(n: u32, bits: u8) -> u32 {
     if bits < 24 { n >> bits } else { 0 }
-}
-
-/// Returns the power of two that is not below `x`, so that blocks of nearly equal velocities have equal limits. Cost:
-/// 20.
-fn power_of_two_above(x: f32) -> f32 {
-    let bits = x.to_bits();
-    f32::from_bits((bits + 0x007F_FFFF) & 0xFF80_0000)
 }
 
 #[cfg(test)]

@@ -9,9 +9,7 @@
 //! the next one ([`Built::Merge`]). A block stores where between two steps its motors arrive, to 1/16 step. So each
 //! motor position is known even when coordinates are redefined.
 //!
-//! A ramp may go over many blocks. Without a jerk limit each block may have its own acceleration limit: what its axes
-//! allow in its direction. With a jerk limit, acceleration and jerk should stay equal over as many blocks as possible,
-//! so they are those of the slowest axis that moves, whatever the direction.
+//! A ramp may go over many blocks. Each block has its own acceleration limit: what its axes allow in its direction.
 
 use super::block::{Block, Extent, Line as Move, QueuedAction};
 use super::curve::{Bend, Curve};
@@ -141,6 +139,10 @@ impl Builder {
             let deviations = (self.heading.deviation, path.heading.deviation);
             let velocities = Velocities { cruise: path.cruise, top: entry };
             entry = junction::limit(turned, deviations, dynamics.junction, &velocities);
+            if dynamics.rounds {
+                let units = (&self.heading.unit, &path.heading.unit);
+                entry = junction::limit_axes(units, turned, dynamics, least(entry, velocities.top));
+            }
         }
         self.heading = path.heading;
         self.top = path.top;
@@ -150,7 +152,6 @@ impl Builder {
         };
         out.cruise = path.cruise;
         out.accel = path.accel;
-        out.jerk = path.jerk;
         Built::Line(entry)
     }
 

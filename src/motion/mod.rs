@@ -2,14 +2,13 @@
 //!
 //! ```text
 //! target -> line -> block queue -> exec -> segment ring -> dda -> pins
-//!    junction, curve   |   ^        governor, prep
-//!                speed_constraints  slice, rise, ramp, constraint, need
+//!    junction, curve   |   ^        governor, sampler, smooth, prep
+//!                speed_constraints  trapezoid, halt
 //! ```
 
 pub mod advance;
 pub mod block;
 pub mod chain;
-mod constraint;
 pub mod curve;
 pub mod divide;
 pub mod dynamics;
@@ -22,17 +21,15 @@ mod halt;
 pub mod junction;
 mod limits;
 pub mod line;
-mod need;
 pub mod pace;
 mod path;
 pub mod prep;
 pub mod queue;
-mod ramp;
 mod replan;
 pub mod retract;
-mod rise;
+mod sampler;
 pub mod short;
-mod slice;
+pub mod smooth;
 pub mod snapshot;
 pub mod source;
 pub mod speed_constraints;

@@ -49,7 +49,6 @@ pub(super) struct Path {
     /// The highest velocity under any override, at most twice the feed, mm/s.
     pub(super) top: f32,
     pub(super) accel: Short,
-    pub(super) jerk: Short,
     /// The least acceleration limit and the least jerk limit of the axes that move, 0 for none.
     pub(super) slowest: (Short, Short),
     /// Whether axes that move may have other limits than `slowest`.

@@ -18,7 +18,7 @@
 //! **Ends of blocks.** A block ends where its line ends, to 1/16 step ([`PART`]). If blocks ended on whole steps, a
 //! curve of short lines would be rounded twice: at its corners, and at the steps between them. The distance of a block
 //! is rarely a whole number of ticks, so the last stretch takes the nearest number of whole ticks. The difference that
-//! remains for a motor is its `debt`: the distance that lines require, less the distance in segments, modulo 2^16. The
+//! remains for a motor is its `debt`: the distance that lines require, less the distance in segments. The
 //! next block starts from where the motors are, which includes the debt in its distances. The time of the missing part
 //! is carried over with it. A dominant motor thus keeps its phase, and its steps stay even, over any number of blocks.
 //!
@@ -45,6 +45,7 @@ mod beside;
 mod cut;
 mod lead;
 mod minor;
+mod slice;
 mod ticks;
 
 use super::advance::{Advance, EXTRUDERS};
@@ -132,10 +133,11 @@ pub struct Prep {
     /// How far the dominant motor is past half a step, in its direction, at the block's end: 1/16 step, modulo 16.
     past: u8,
     /// The distance of a motor in blocks, the running one included, less its distance in segments: phase units,
-    /// positive forwards, modulo 2^16. At the end of a block its size is below that.
-    debt: [i16; MOTORS],
-    /// How far the end of the block is past the point half a step before its rounded whole step, in 1/16 step.
-    fraction: [u8; MOTORS],
+    /// positive forwards.
+    debt: [i32; MOTORS],
+    /// How far the end of the block, or of the sample, is past the point half a step before its rounded whole step,
+    /// phase units. A whole number of [`PART`]s at the end of a block.
+    place: [u16; MOTORS],
     minors: [Minor; MOTORS],
     /// The paces by the number of motors that move, less one.
     paces: [Pace; MOTORS],
@@ -157,7 +159,7 @@ impl Prep {
             own: 0,
             past: 0,
             debt: [0; MOTORS],
-            fraction: [HALF; MOTORS],
+            place: [STEP / 2; MOTORS],
             shift: u8::MAX,
             full: 0,
             minor: 0,
@@ -366,7 +368,7 @@ impl Prep {
         out.moving = self.full | self.minor;
         let (full, moving) = (self.full, out.moving);
         let ticks = out.ticks;
-        let travel = step.wrapping_mul(ticks);
+        let travel = product(step, ticks) as i32;
         each_motor!(M => {
             let mut increment = 0;
             if moving & 1 << M != 0 {
@@ -374,12 +376,9 @@ impl Prep {
                 increment = step;
                 if full & 1 << M == 0 {
                     increment = minor(self, M);
-                    travel = increment.wrapping_mul(ticks);
+                    travel = product(increment, ticks) as i32;
                 }
-                if out.backwards & 1 << M == 0 {
-                    travel = travel.wrapping_neg();
-                }
-                self.debt[M] = self.debt[M].wrapping_add_unsigned(travel);
+                self.debt[M] += if out.backwards & 1 << M != 0 { travel } else { -travel };
             }
             out.increment[M] = increment;
         });

@@ -9,9 +9,9 @@ use avr_embassy::{InterruptEnd, Shared};
 use super::block::{Block, Body, Line};
 use super::factors::Factors;
 use super::float::{OCTAVE, below, log, some};
-pub use super::source::{BlockSource, Constraint};
+pub use super::source::BlockSource;
 use super::speed_constraints::SpeedConstraints;
-use super::tail::{Key, Tail};
+use super::tail::Tail;
 use crate::hal::exec;
 use crate::hal::ring::{Index, Prefilled, Ring};
 use crate::hal::{Ceiling, Interrupt, LOOK_AHEAD, Thread};
@@ -26,9 +26,6 @@ pub const CAPACITY: usize = BLOCKS - 1;
 
 /// The bits of sequence numbers.
 pub(super) const SEQ: Index = Index::MAX >> 1;
-
-/// Marks a key that stays even if a lower key follows.
-pub(super) const FIRM: Index = !SEQ;
 
 /// Potentials above this many times the square of the velocity are counted from zero again.
 const COARSE: f32 = 1024.0;
@@ -220,21 +217,21 @@ impl BlockQueue {
     fn put(
         &mut self,
         complete: impl FnOnce(&mut Block),
-        key: Option<Key>,
+        key: Option<f32>,
         end: impl FnOnce(&mut SpeedConstraints) + Send,
     ) -> bool {
         if self.ring.free() == 0 {
             return false;
         }
         let seq = self.newest.wrapping_add(1) & SEQ;
-        let needless = key.map_or(0, |key| self.needless(key.key));
+        let needless = key.map_or(0, |key| self.needless(key));
         let Some(mut slot) = self.ring.slot() else { return false };
         complete(&mut slot);
         exec::lock(self.thread, |ceiling| {
             self.constraints.with(ceiling, |constraints| {
-                if let Some(Key { firm, entry, .. }) = key {
+                if key.is_some() {
                     constraints.drop_last(needless);
-                    constraints.add(seq | firm, entry);
+                    constraints.add(seq);
                 }
                 end(constraints);
                 constraints.version = constraints.version.wrapping_add(1);
@@ -259,8 +256,7 @@ impl BlockQueue {
                     Some((seq, constraints.older(next).of(newest.wrapping_sub(seq) & SEQ)))
                 })
             });
-            let needless = |(last, more)| last & FIRM == 0 && self.key(last) - more >= key;
-            if !last.is_some_and(needless) {
+            if !last.is_some_and(|(last, more)| self.key(last) - more >= key) {
                 return count;
             }
             count += 1;

@@ -12,9 +12,9 @@
 use super::block::{Block, Body, Line};
 use super::factors::{Factors, Reserve};
 use super::float::{below, least};
-use super::queue::{BlockQueue, FIRM, SEQ};
+use super::queue::{BlockQueue, SEQ};
 use super::short::Short;
-use super::speed_constraints::{self, Keys, kappa};
+use super::speed_constraints::Keys;
 use super::tail::WORTH;
 use crate::hal::exec;
 use crate::hal::ring::Index;
@@ -30,14 +30,12 @@ struct Behind {
     known: Known,
 }
 
-/// A cache: velocity and braking limits of the last line. The next line mostly has equal ones.
+/// A cache: the velocity of the last line. The next line mostly has an equal one.
 #[derive(Default)]
 struct Known {
     cruise: f32,
     reserve: Reserve,
     velocity: f32,
-    limits: (Short, Short),
-    kappa: f32,
 }
 
 impl Behind {
@@ -49,41 +47,29 @@ impl Behind {
         }
     }
 
-    /// Returns the velocity of the key of `this` line, and [`FIRM`] or 0; `None` if the line needs no key. The line
-    /// follows `before` without a stop; if `before` is `None`, it begins at a standstill.
+    /// Whether `this` line needs a key. The line follows `before` without a stop; if `before` is `None`, it begins at a
+    /// standstill.
     #[inline(never)]
-    fn key(
-        &mut self,
-        this: &Line,
-        before: Option<&Line>,
-        factors: &Factors,
-    ) -> Option<(Short, Index)> {
+    fn needs_key(&mut self, this: &Line, before: Option<&Line>, factors: &Factors) -> bool {
         let velocity = self.known.velocity(this, factors);
         let low = least(self.low, velocity);
         let entry = least(velocity, this.entry.get());
-        let mut firm = 0;
-        let mut brakes = this;
         if let Some(before) = before {
-            firm = if is_firm(this, before) { FIRM } else { 0 };
             let pace = self.known.velocity(before, factors);
             let most = least(low, entry);
-            if firm == 0 && (!below(most, pace) || most >= pace * WORTH) {
+            if !below(most, pace) || most >= pace * WORTH {
                 self.low = low;
-                return None;
-            }
-            if firm != 0 {
-                // The line before brakes with its own limits.
-                brakes = before;
+                return false;
             }
         }
         self.low = f32::MAX;
-        let entry = Short::new(entry);
-        let key = this.start + speed_constraints::key(entry.get(), self.known.kappa(brakes));
-        if firm == 0 && key >= self.key {
-            return None;
+        let entry = Short::new(entry).get();
+        let key = this.start + entry * entry;
+        if key >= self.key {
+            return false;
         }
         self.key = key;
-        Some((entry, firm))
+        true
     }
 }
 
@@ -95,15 +81,6 @@ impl Known {
             self.velocity = line.velocity(factors);
         }
         self.velocity
-    }
-
-    fn kappa(&mut self, line: &Line) -> f32 {
-        let limits = (line.accel, line.jerk);
-        if limits != self.limits {
-            self.limits = limits;
-            self.kappa = kappa(line.accel.get(), line.jerk.get());
-        }
-        self.kappa
     }
 }
 
@@ -146,9 +123,8 @@ impl BlockQueue {
             let before = line(block);
             if let Some((back, this)) = last {
                 behind.count_from(older.of(back as Index));
-                if let Some((entry, firm)) = behind.key(this, before, &self.tail.factors) {
-                    let seq = self.newest.wrapping_sub(back as Index) & SEQ;
-                    keys.add_before(seq | firm, entry);
+                if behind.needs_key(this, before, &self.tail.factors) {
+                    keys.add_before(self.newest.wrapping_sub(back as Index) & SEQ);
                 }
             }
             last = before.map(|line| (back, line));
@@ -193,11 +169,4 @@ fn line(block: Option<&Block>) -> Option<&Line> {
         Some(Block { body: Body::Line(line), .. }) => Some(line),
         _ => None,
     }
-}
-
-/// Whether jerk limits change between two lines.
-#[small]
-fn is_firm(line: &Line, before: &Line) -> bool {
-    let limits = |line: &Line| (line.accel, line.jerk);
-    limits(line) != limits(before) && (line.jerk != Short::ZERO || before.jerk != Short::ZERO)
 }

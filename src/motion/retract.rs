@@ -68,11 +68,11 @@ pub struct Retreat {
 impl Retreat {
     /// Returns a retreat at a standstill, in the cut, for this reason. `debt` is that of the motors in `Prep`, which
     /// the retreat makes good.
-    pub fn new(how: Retract, why: Status, debt: i16) -> Self {
-        let ahead = if how.way < 0 { debt.wrapping_neg() } else { debt };
+    pub fn new(how: Retract, why: Status, debt: i32) -> Self {
+        let ahead = if how.way < 0 { -debt } else { debt };
         let left = u32::from(how.way.unsigned_abs()) << STEP_LOG2;
-        let left = left.saturating_add_signed(i32::from(ahead));
-        let part = (STEP / 2).saturating_add_signed(ahead.wrapping_neg());
+        let left = left.saturating_add_signed(ahead);
+        let part = (STEP / 2).saturating_add_signed((ahead as i16).wrapping_neg());
         Self { how, why, left, velocity: 0.0, part }
     }
 
@@ -97,7 +97,7 @@ impl Retreat {
         &mut self,
         segment: &mut Segment,
         target: &mut [i32; MOTORS],
-        debt: &mut [i16; MOTORS],
+        debt: &mut [i32; MOTORS],
     ) {
         let increment = self.plan(segment.ticks, segment.period);
         let mut bit = 1;
@@ -136,7 +136,7 @@ impl Retreat {
         increment: u16,
         ticks: u16,
         target: &mut [i32; MOTORS],
-        debt: &mut [i16; MOTORS],
+        debt: &mut [i32; MOTORS],
     ) {
         let travel = product(increment, ticks);
         let left = self.left.saturating_sub(travel);
@@ -144,15 +144,14 @@ impl Retreat {
         let sum = travel + u32::from(self.part);
         self.part = sum as u16 & (STEP - 1);
         let steps = (sum >> STEP_LOG2) as i32;
-        // The distance required of X, less the distance in segments, modulo 2^16.
-        let owed = ((steps as u16) << STEP_LOG2).wrapping_sub(travel as u16);
-        let (steps, owed) =
-            if self.is_backwards() { (-steps, owed.wrapping_neg()) } else { (steps, owed) };
+        // The distance required of X, less the distance in segments.
+        let owed = (steps << STEP_LOG2) - travel as i32;
+        let (steps, owed) = if self.is_backwards() { (-steps, -owed) } else { (steps, owed) };
         let mut bit = 1;
         for (target, debt) in target.iter_mut().zip(debt.iter_mut()) {
             if self.how.motors & bit != 0 {
                 *target = target.wrapping_add(steps);
-                *debt = debt.wrapping_add_unsigned(owed);
+                *debt += owed;
             }
             bit <<= 1;
         }
@@ -172,7 +171,7 @@ mod tests {
     const TICKS: u16 = 80;
 
     /// Returns the velocity of each segment until X is out, steps/s, then how far X has gone, and its debt.
-    fn run(how: Retract, debt: i16) -> (std::vec::Vec<f64>, i32, i16) {
+    fn run(how: Retract, debt: i32) -> (std::vec::Vec<f64>, i32, i32) {
         let (mut target, mut debt) = ([0; MOTORS], [debt; MOTORS]);
         let mut retreat = Retreat::new(how, Status::Terminated, debt[0]);
         let mut speeds = std::vec::Vec::new();
@@ -193,7 +192,7 @@ mod tests {
             let (accel, velocity) = (Short::new(accel), Short::new(6_400.0));
             let (_, steps, debt) = run(Retract { motors: 1, way, accel, velocity }, 0);
             assert_eq!(steps, i32::from(way));
-            assert!(debt.unsigned_abs() < STEP / 8, "{way}: {debt}");
+            assert!(debt.unsigned_abs() < u32::from(STEP) / 8, "{way}: {debt}");
         }
     }
 
@@ -206,11 +205,11 @@ mod tests {
                 for before in [-16_384, -9_000, 9_000, 16_383] {
                     let (_, steps, debt) = run(how, before);
                     assert_eq!(steps, i32::from(way), "{accel} {velocity} {before}");
-                    assert!(debt.unsigned_abs() < STEP / 8, "{way} {before}: {debt}");
+                    assert!(debt.unsigned_abs() < u32::from(STEP) / 8, "{way} {before}: {debt}");
                 }
                 let (speeds, steps, debt) = run(how, 0);
                 assert_eq!(steps, i32::from(way), "{accel} {velocity}");
-                assert!(debt.unsigned_abs() < STEP / 8, "{way}: {debt}");
+                assert!(debt.unsigned_abs() < u32::from(STEP) / 8, "{way}: {debt}");
                 let (mut before, mut most) = (0.0f64, 0.0f64);
                 for speed in &speeds {
                     // The acceleration between the mean velocities of neighbouring segments.

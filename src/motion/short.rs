@@ -36,12 +36,6 @@ impl Short {
         Log::new(power.wrapping_sub(ONE), mantissa)
     }
 
-    /// How many powers of two lie between two numbers, the greater of which is `b`. Cost: 4.
-    #[inline(always)]
-    pub fn octaves_between(a: Self, b: Self) -> u8 {
-        b.parts().1.saturating_sub(a.parts().1)
-    }
-
     /// Makes a number from a mantissa without the leading 1, and an exponent.
     #[inline(always)]
     pub fn of_parts(mantissa: u8, power: u8) -> Self {

@@ -12,24 +12,12 @@ use kerf_macros::small;
 use super::block::{Block, Body, Line};
 use super::factors::{Factors, Reserve};
 use super::float::lesser;
-use super::queue::{BLOCKS, FIRM, SEQ};
-use super::short::Short;
+use super::queue::{BLOCKS, SEQ};
 use super::speed_constraints::SpeedConstraints;
 use crate::hal::ring::{Consumer, Index};
 
 /// How many actions in a row [`BlockSource::goes_on`] looks behind.
 const ASIDE: usize = 3;
-
-/// A limit ahead of exec.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Constraint {
-    /// The velocity at the constraint, mm/s.
-    pub velocity: Short,
-    /// Brake potential from the end of the oldest block to the constraint.
-    pub ahead: f32,
-    /// Whether jerk limits change there. Later constraints then apply only to the line that begins there.
-    pub firm: bool,
-}
 
 /// Exec's end of the queue.
 pub struct BlockSource {
@@ -153,12 +141,12 @@ impl BlockSource {
     }
 
     /// Returns the square of the velocity, (mm/s)^2, that is allowed at the end of the oldest block, a line, so that
-    /// all later constraints are met; for motion without a jerk limit. Cost: 900.
+    /// all later constraints are met. Cost: 900.
     pub fn headroom(&self) -> f32 {
         let end = self.queue_end();
         let first = self.constraints.look(|constraints| {
             let seq = constraints.nth(0)?;
-            let key = self.line(seq, |line| line.sharp_key(&constraints.factors()))?;
+            let key = self.line(seq, |line| line.key(&constraints.factors()))?;
             Some(self.lifted(seq, key))
         });
         let key = match first {
@@ -168,27 +156,6 @@ impl BlockSource {
             None => end,
         };
         key - self.end()
-    }
-
-    /// Returns the first constraint ahead from the `n`th on that is slower than `velocity`, or firm, with its number.
-    /// The last constraint is the end of the queue. Cost: 450, 25 for each one that is passed over, and 1,500 more
-    /// the first time after a change.
-    pub fn slower(&self, n: Index, velocity: Short) -> (Index, Constraint) {
-        self.constraints.look(|constraints| {
-            let found = constraints.slower(n, velocity);
-            let Some(seq) = constraints.nth(found) else {
-                let ahead = self.end_of_queue();
-                return (found, Constraint { velocity: Short::ZERO, ahead, firm: true });
-            };
-            let start = self.line(seq, |line| line.start).unwrap_or(constraints.end);
-            let (velocity, firm) = (constraints.entry(found), seq & FIRM != 0);
-            (found, Constraint { velocity, ahead: self.lifted(seq, start) - self.end(), firm })
-        })
-    }
-
-    /// Returns the potential from the end of the oldest block to the end of the queue.
-    pub fn end_of_queue(&self) -> f32 {
-        self.queue_end() - self.end()
     }
 
     /// Returns the potential at the end of the queue, counted as at the oldest block.

@@ -14,26 +14,10 @@
 //! applies, and it applies to all blocks before it: adding a block needs no backward pass over the queue. The end of
 //! the queue has a key too, with w = 0.
 //!
-//! **With a jerk limit** J the deceleration takes A/J to build up and A/J to end, which takes additional distance
-//! (`constraint` says how much). With k = A^2 / 2J the distance is sufficient if
-//!
-//! ```text
-//! (v + k)^2 + P <= (w - k)^2 + Q  =: key        k^2 + Q if w < 2 k
-//! ```
-//!
-//! A machine that can slow down for the lower of two such keys is below the velocity of the other key at its place. So
-//! a lower key makes a higher one before it needless with a jerk limit too. But exec has to find out which of the
-//! remaining keys is binding: it scans from the nearest one to the first before which it could stop. Without a jerk
-//! limit k is 0, and the first key is binding.
-//!
 //! **Lowest keys.** Keys that come after a lower one matter once the lower one has been passed; keys that come before a
 //! lower one never matter. So [`SpeedConstraints`] keeps a list of rising keys ([`SpeedConstraints::seqs`]). Adding a
 //! key drops the keys at the list's end that are not below it; passing a block drops its key at the front. Each key is
 //! added once and dropped once. A block that adds no limit (equal feed, no corner) needs no entry.
-//!
-//! Where jerk limits change, k changes, and keys before and after cannot be compared. The key of such a place is
-//! *firm*: no lower key drops it, and no scan goes beyond it. It is computed with the k of the line before. The line
-//! that begins there must be able to stop within its own length.
 //!
 //! **Overrides.** The velocity at a corner is the lesser of what the corner allows and of what the feeds allow times a
 //! factor ([`Line::entry`]). Which keys are needless depends on the factor, so all keys are computed again when it
@@ -52,28 +36,9 @@
 use super::block::Line;
 use super::factors::{Factors, Reserve};
 use super::float::{OCTAVE, brief_product, least, lesser, log, scaled, some};
-use super::queue::{BLOCKS, FIRM, SEQ};
+use super::queue::{BLOCKS, SEQ};
 use super::short::Short;
-use crate::hal::arithmetic;
 use crate::hal::ring::Index;
-
-// `arithmetic::passed_over` ends at a key with this bit.
-const _: () = assert!(FIRM == 1 << (Index::BITS - 1));
-
-/// Returns half the velocity that is lost while an acceleration limit builds up under a jerk limit: `A^2 / 2J`, 0
-/// without one. Cost: 650.
-pub fn kappa(accel: f32, jerk: f32) -> f32 {
-    if some(jerk) { 0.5 * accel * accel / jerk } else { 0.0 }
-}
-
-/// Returns the part of a key that does not depend on the place, for velocity `w`. Cost: 400.
-pub fn key(w: f32, kappa: f32) -> f32 {
-    if !some(kappa) {
-        return w * w;
-    }
-    let kept = if w < kappa + kappa { kappa } else { w - kappa };
-    kept * kept
-}
 
 impl Line {
     /// Returns the highest velocity at the start of the line, mm/s.
@@ -82,14 +47,8 @@ impl Line {
         Short::new(least(self.entry.get(), self.velocity(factors))).get()
     }
 
-    /// Returns the key of the line: the highest sum of potential and square of velocity before its start. Cost: 500,
-    /// 1,300 with a jerk limit.
+    /// Returns the key of the line: the highest sum of potential and square of velocity before its start. Cost: 400.
     pub fn key(&self, factors: &Factors) -> f32 {
-        self.start + key(self.entry(factors), kappa(self.accel.get(), self.jerk.get()))
-    }
-
-    /// Returns the key of the line for a block before it that has no jerk limit. Cost: 400.
-    pub fn sharp_key(&self, factors: &Factors) -> f32 {
         let entry = self.entry(factors);
         self.start + entry * entry
     }
@@ -105,7 +64,7 @@ impl Line {
 
     #[inline(never)]
     fn capped(&self, full: f32) -> f32 {
-        let speed = scaled(self.cruise, 1) + 2.0 * kappa(self.accel.get(), self.jerk.get());
+        let speed = scaled(self.cruise, 1);
         lesser(full, 2.0 * speed * speed)
     }
 }
@@ -133,9 +92,6 @@ pub struct SpeedConstraints {
     pub planned: Factors,
     /// Sequence numbers of blocks with rising keys: a ring.
     seqs: [Index; BLOCKS],
-    /// The velocity at which each of these blocks may be entered, with the factors that the keys are made for:
-    /// [`Short::bits`].
-    entries: [u16; BLOCKS],
 }
 
 impl SpeedConstraints {
@@ -146,7 +102,6 @@ impl SpeedConstraints {
         let (wanted, planned) = (none, none);
         Self {
             seqs: [0; BLOCKS],
-            entries: [0; BLOCKS],
             front: 0,
             len: 0,
             end: 0.0,
@@ -175,41 +130,11 @@ impl SpeedConstraints {
         self.len = self.len.saturating_sub(count);
     }
 
-    /// Returns the velocity of the `n`th key.
-    #[inline]
-    pub fn entry(&self, n: Index) -> Short {
-        Short::of_bits(self.entries[self.slot(n)])
-    }
-
-    /// Returns the number of the first key from the `n`th on that is slower than `velocity`, or firm; one more than
-    /// the last if there is none. Cost: 110, and 14 for each key that is passed over.
-    #[inline(never)]
-    pub fn slower(&self, n: Index, velocity: Short) -> Index {
-        let left = self.len.saturating_sub(n);
-        let slot = self.slot(n) as Index;
-        let before_end = left.min((BLOCKS as Index).saturating_sub(slot));
-        let passed = self.passed_over(slot, before_end, velocity);
-        if passed < before_end || before_end == left {
-            return n + passed;
-        }
-        // The list continues at the beginning of the ring.
-        n + passed + self.passed_over(0, left - before_end, velocity)
-    }
-
-    /// Returns how many of `count` keys from a slot on are passed over: until one is slower than `velocity`, or firm.
-    #[inline(always)]
-    fn passed_over(&self, slot: Index, count: Index, velocity: Short) -> Index {
-        let slots = usize::from(slot)..usize::from(slot) + usize::from(count);
-        let all = self.seqs.get(slots.clone()).zip(self.entries.get(slots));
-        all.map_or(0, |(seqs, entries)| arithmetic::passed_over(seqs, entries, velocity.bits()))
-    }
-
-    /// Adds the key of a block, which is above all other keys. The block may be entered at `entry`.
-    pub fn add(&mut self, seq: Index, entry: Short) {
+    /// Adds the key of a block, which is above all other keys.
+    pub fn add(&mut self, seq: Index) {
         if usize::from(self.len) < BLOCKS {
             let slot = self.slot(self.len);
             self.seqs[slot] = seq;
-            self.entries[slot] = entry.bits();
             self.len += 1;
         }
     }
@@ -269,7 +194,7 @@ impl SpeedConstraints {
 
     /// Replaces all keys. Cost: 1,500.
     pub fn replace(&mut self, keys: &Keys) {
-        (self.seqs, self.entries) = (keys.seqs, keys.entries);
+        self.seqs = keys.seqs;
         (self.front, self.len) = (keys.front, BLOCKS as Index - keys.front);
     }
 
@@ -300,21 +225,19 @@ impl SpeedConstraints {
 pub struct Keys {
     front: Index,
     seqs: [Index; BLOCKS],
-    entries: [u16; BLOCKS],
 }
 
 impl Keys {
     /// No keys.
     pub const fn none() -> Self {
-        Self { front: BLOCKS as Index, seqs: [0; BLOCKS], entries: [0; BLOCKS] }
+        Self { front: BLOCKS as Index, seqs: [0; BLOCKS] }
     }
 
     /// Adds the key of a block that comes before all other keys, if there is room.
-    pub fn add_before(&mut self, seq: Index, entry: Short) {
+    pub fn add_before(&mut self, seq: Index) {
         let front = usize::from(self.front.wrapping_sub(1));
-        if let (Some(to), Some(velocity)) = (self.seqs.get_mut(front), self.entries.get_mut(front))
-        {
-            (*to, *velocity) = (seq, entry.bits());
+        if let Some(to) = self.seqs.get_mut(front) {
+            *to = seq;
             self.front = front as Index;
         }
     }
@@ -339,38 +262,5 @@ impl Older {
 impl Default for SpeedConstraints {
     fn default() -> Self {
         Self::new()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    /// What `slower` is to return, found one key after the other.
-    fn expected(constraints: &SpeedConstraints, n: u8, velocity: Short) -> u8 {
-        let stops = |n: &u8| {
-            constraints.nth(*n).is_some_and(|seq| seq & FIRM != 0)
-                || constraints.entry(*n) < velocity
-        };
-        (n..constraints.len).find(stops).unwrap_or(constraints.len.max(n))
-    }
-
-    proptest! {
-        #[test]
-        fn a_slower_key_is_found_wherever_the_list_lies(
-            front in 0..BLOCKS as u8,
-            keys in prop::collection::vec((0u8..20, 0u8..30), 0..BLOCKS),
-            n in 0..BLOCKS as u8,
-            velocity in 0u8..21,
-        ) {
-            let mut constraints = SpeedConstraints { front, ..SpeedConstraints::new() };
-            for (entry, kind) in keys {
-                let firm = if kind == 0 { FIRM } else { 0 };
-                constraints.add(kind | firm, Short::new(entry.into()));
-            }
-            let (n, velocity) = (n.min(constraints.len), Short::new(velocity.into()));
-            prop_assert_eq!(constraints.slower(n, velocity), expected(&constraints, n, velocity));
-        }
     }
 }

@@ -38,10 +38,6 @@ use crate::tasks::{Never, hold, links, overrides, power, spindle};
 /// time.
 const PATIENCE: u8 = 6;
 
-/// After more than this many segments without a turn of thread mode, while an answer is due, a jerk-limited motion
-/// makes no scans that may wait.
-const PATIENCE_ASKED: u8 = 1;
-
 /// While motion has just begun, thread mode gets a turn after this many segments. To fill the ring from empty to the
 /// usual amount without a turn would take 6 ms.
 const FIRST_TURN: u8 = 2;
@@ -218,7 +214,7 @@ impl Runner<'_> {
         let line = out.line;
         let step = self.next_step(standstill, out, motors);
         if out.line != line {
-            self.finished.end(line);
+            self.finished.end(line, self.machine.lag());
         }
         match step {
             Step::Segment => self.finished.queue(),
@@ -351,17 +347,12 @@ impl Runner<'_> {
         let Self { waiting, segments, rests, .. } = self;
         health::moves(waiting.count);
         waiting.update(segments.used());
-        let has_jerk = self.machine.has_jerk();
-        waiting.fewest = if has_jerk { 2 } else { 1 };
         let short = waiting.is_short(*rests);
         let passed_over = event::pass_over();
-        // While an answer is due, a ramp in stretches of the usual length would delay it by 9 ms, and scans in
-        // successive segments by 14 ms.
+        // While an answer is due, a ramp in stretches of the usual length would delay it by 9 ms.
         let asked = event::is_asked();
         waiting.coarse = short || asked || passed_over > PATIENCE || waiting.is_busy();
-        let scans_too_long = asked && has_jerk && passed_over > PATIENCE_ASKED;
-        self.machine.set_coarse(waiting.coarse, short || scans_too_long);
-        self.machine.set_tight(has_jerk && waiting.is_tight());
+        self.machine.set_coarse(waiting.coarse, short);
         if !rested {
             health::look_for_starvation();
         }
@@ -447,8 +438,6 @@ struct Waiting {
     lengths: [u8; SEGMENTS],
     /// Segments queued, modulo 256.
     count: u8,
-    /// How many segments are to wait at least.
-    fewest: u8,
     /// Stretches are twice as long, if there is room for them.
     coarse: bool,
     /// How many segments wait, as of the last `update`; in `sum`, how long they take together.
@@ -506,15 +495,10 @@ const PRESSED_FOR: u8 = 100;
 /// With less than this waiting, exec is late, and makes longer stretches.
 const WAITING_SHORT: u16 = units(25);
 
-/// With less than this queued, an acceleration under a jerk limit that is about to end does end, without a further
-/// scan. The remainder of the running segment is included.
-const TIGHT: u16 = units(58);
-
 /// With less than this waiting, another segment may be queued in any case, unless the ring is full.
 const SOON: u16 = units(20);
 
-/// A segment that takes at least this long may wait alone, except under a jerk limit, where a ramp takes long to lay
-/// out.
+/// A segment that takes at least this long may wait alone.
 const LONG: u16 = units(30);
 
 /// The length of a usual stretch that is not cut short by the end of a block.
@@ -531,7 +515,6 @@ impl Waiting {
         Self {
             lengths: [0; SEGMENTS],
             count: 0,
-            fewest: 2,
             coarse: false,
             used: 0,
             sum: 0,
@@ -597,7 +580,7 @@ impl Waiting {
     fn is_short(&mut self, rests: bool) -> bool {
         self.moved = if rests { 0 } else { self.moved.saturating_add(1) };
         // After a long segment, the end of a block may wait alone for a moment.
-        let is_end = self.fewest == 1 && self.length(1) < USUAL_LENGTH && self.length(2) >= LONG;
+        let is_end = self.length(1) < USUAL_LENGTH && self.length(2) >= LONG;
         let short = usize::from(self.moved) > SEGMENTS && self.sum < WAITING_SHORT && !is_end;
         if short {
             self.pressed = PRESSED_FOR;
@@ -605,22 +588,12 @@ impl Waiting {
         short
     }
 
-    /// Whether too little is queued to outlast the end of an acceleration and a ramp after it. The remainder of the
-    /// running segment is included.
-    #[inline(always)]
-    fn is_tight(&self) -> bool {
-        let all = self.length(self.used + 1);
-        let left = stepper::left().saturating_add((1 << UNIT_LOG2) - 1) >> UNIT_LOG2;
-        let running = u16::try_from(left).map_or(all, |left| left.min(all));
-        running + self.sum < TIGHT
-    }
-
     /// Whether enough is queued for thread mode to get a turn. `passed_over` is how many segments it has had none for.
     #[inline(always)]
     fn is_enough(&self, passed_over: u8) -> bool {
         let has_just_begun = usize::from(self.moved) <= SEGMENTS && passed_over >= FIRST_TURN;
         let least = if has_just_begun { FIRST_LEAST } else { self.limits().least };
-        self.used >= self.fewest && (self.sum >= least || self.gives_way())
+        self.used > 0 && (self.sum >= least || self.gives_way())
     }
 
     /// Returns the room in the ring. The queued amount is limited because queued segments can be neither slowed down
@@ -630,12 +603,12 @@ impl Waiting {
         if self.used >= SEGMENTS as u8 - 1 {
             return Room::None;
         }
-        if self.used < self.fewest || self.sum < SOON {
+        if self.used == 0 || self.sum < SOON {
             return Room::Long;
         }
         let queued = self.length(self.used + 1) + self.sum;
         let fits = |next| queued + next <= self.limits().most && !self.gives_way();
-        if self.coarse && self.fewest == 1 {
+        if self.coarse {
             return match fits(COARSE) {
                 true => Room::Long,
                 // A usual segment costs as much CPU time as a long one, which thread mode then lacks. So it is made

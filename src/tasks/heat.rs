@@ -462,7 +462,7 @@ fn moves_filament(thread: Thread, settings: &Settings) -> bool {
     let motion = common::snapshot(thread);
     let mut motors = motion.steps.iter().enumerate();
     motion.running
-        && motion.left > 0.0
+        && (motion.left > 0.0 || motion.velocity > 0.0)
         && motors
             .any(|(motor, steps)| *steps != 0 && usize::from(moved_by(settings, motor)) == EXTRUDER)
 }

@@ -57,6 +57,7 @@ use crate::motion::dynamics::{Dynamics, MachineLimits};
 use crate::motion::line::{Builder, Built, Line};
 use crate::motion::pace::Drivers;
 use crate::motion::queue::{self, BlockQueue, CAPACITY};
+use crate::motion::smooth::Spans;
 use crate::status::Status;
 use crate::units::{AXES, Length, PerAxis};
 
@@ -86,6 +87,10 @@ pub struct Planner {
     dynamics: Dynamics,
     /// The demands of the drivers that exec has been told of.
     drivers: Drivers,
+    /// The means that exec has been told of.
+    spans: Spans,
+    /// The last move ends in an exact stop, at which the means are to be empty.
+    stops: bool,
     /// A heater or the fan has been switched on since the last end of a program.
     #[cfg(feature = "printer")]
     heats: bool,
@@ -118,10 +123,20 @@ enum Announcement {
     Position,
     /// The demands of the drivers may have changed.
     Drivers,
+    /// The means have changed.
+    Smooth,
     /// The extruder's lead may have changed.
     Lead,
     /// The origin may have changed, from the next line on: a chain that waits comes first.
     Origin,
+}
+
+impl Announcement {
+    /// Returns the announcement, or `other` if there is none.
+    #[inline(always)]
+    fn or(self, other: Self) -> Self {
+        if self == Self::None { other } else { self }
+    }
 }
 
 /// The result of a turn of the planner.
@@ -253,6 +268,8 @@ impl Planner {
             position: [Length::ZERO; AXES],
             line: 0,
             drivers: Drivers::USUAL,
+            spans: Spans::NONE,
+            stops: false,
             outputs: Outputs { on: 0, speed: 0.0 },
             has_surface: false,
             per_turn: false,
@@ -286,6 +303,9 @@ impl Planner {
             _ => return false,
         };
         if !commands.is_motion_alone() || !self.links.changes.is_empty() {
+            return false;
+        }
+        if self.stops || self.wanted_spans(&commands) != self.spans {
             return false;
         }
         if Capability::Lathe.is_built_in() && self.turns_otherwise(&commands.motion) {
@@ -330,8 +350,11 @@ impl Planner {
     fn begin(&mut self) {
         self.steps = Steps::default();
         self.take_up_changes();
-        if self.announcement == Announcement::None {
-            self.announcement = Announcement::Origin;
+        let commands = self.links.commands.borrow();
+        if commands.moves() && (self.stops || self.wanted_spans(&commands) != self.spans) {
+            self.announcement = self.announcement.or(Announcement::Smooth);
+        } else {
+            self.announcement = self.announcement.or(Announcement::Origin);
         }
     }
 
@@ -344,6 +367,7 @@ impl Planner {
             if self.wanted_lead() != self.lead {
                 self.announcement = Announcement::Lead;
             }
+            self.dynamics.rounds = self.spans.is_some();
         }
         self.outputs.on ^= self.links.changes.take_flipped();
         if self.links.changes.has(Changes::STEPS) {
@@ -548,6 +572,7 @@ impl Planner {
     fn moved(&mut self, commands: &Commands) {
         if commands.exact_stop {
             self.builder.stopped();
+            self.stops = true;
         }
     }
 
@@ -565,6 +590,15 @@ impl Planner {
             Announcement::Drivers => {
                 self.set_drivers();
                 self.links.changes.take(Changes::STEPS);
+                self.announcement = Announcement::Smooth;
+            }
+            Announcement::Smooth => {
+                let links = self.links;
+                let commands = links.commands.borrow();
+                // Other lines do not wait for exec; the next one that moves will.
+                if commands.moves() {
+                    self.smooth(self.wanted_spans(&commands));
+                }
                 self.announcement = Announcement::Lead;
             }
             _ => {
@@ -621,6 +655,24 @@ impl Planner {
         if drivers != self.drivers {
             self.drivers = drivers;
             self.push(Block::action(QueuedAction::Drivers(drivers), self.line));
+        }
+    }
+
+    /// Returns the means for a line: none for one that keeps to its path exactly.
+    #[inline(always)]
+    fn wanted_spans(&self, commands: &Commands) -> Spans {
+        if commands.is_exact_path() { Spans::NONE } else { self.dynamics.spans }
+    }
+
+    /// Tells exec the means, if they have changed or are to be empty. The machine stands still there.
+    #[inline(never)]
+    #[small]
+    fn smooth(&mut self, spans: Spans) {
+        let stops = core::mem::take(&mut self.stops);
+        if spans != self.spans || stops && spans.is_some() {
+            self.spans = spans;
+            self.dynamics.rounds = spans.is_some();
+            self.pause(QueuedAction::Smooth(spans));
         }
     }
 
@@ -704,12 +756,8 @@ impl Planner {
             self.relocate(&motion);
             // The lines behind that one have been dropped.
             self.line = motion.finished;
-            // The announcement of the lead may have been dropped.
-            self.announcement = if Capability::Printer.is_built_in() {
-                Announcement::Lead
-            } else {
-                Announcement::None
-            };
+            // The announcements of the means and of the lead may have been dropped.
+            self.announcement = Announcement::Smooth;
             let spindle = Spindle { turn: outputs::turn(motion.outputs), speed: motion.speed };
             let coolant = super::spindle::coolant(motion.outputs);
             links.changes.take_flipped();

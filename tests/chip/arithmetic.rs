@@ -12,10 +12,8 @@ mod image {
 
     kerf::link_libraries!();
 
-    /// Number of marks and values that [`arithmetic::passed_over`] may look at.
-    const PAIRS: usize = 8;
     /// Number of words in the results.
-    const WORDS: usize = 17;
+    const WORDS: usize = 16;
 
     // All shared data are bytes, the lowest first. LLVM 22 may load an atomic word into the registers that hold its
     // address (`ld r30, Z`, `ldd r31, Z+1`), so that the second byte comes from somewhere else.
@@ -25,13 +23,6 @@ mod image {
     /// Two operands: 64 bits and 32 bits.
     #[unsafe(no_mangle)]
     static OPERANDS: [AtomicU8; 12] = [const { AtomicU8::new(0) }; 12];
-    /// Number of marks and number of values.
-    #[unsafe(no_mangle)]
-    static COUNTS: [AtomicU8; 2] = [const { AtomicU8::new(0) }; 2];
-    #[unsafe(no_mangle)]
-    static MARKS: [AtomicU8; PAIRS] = [const { AtomicU8::new(0) }; PAIRS];
-    #[unsafe(no_mangle)]
-    static VALUES: [AtomicU8; 2 * PAIRS] = [const { AtomicU8::new(0) }; 2 * PAIRS];
     /// The results, in the order of [`results`].
     #[unsafe(no_mangle)]
     static RESULTS: [AtomicU8; 2 * WORDS] = [const { AtomicU8::new(0) }; 2 * WORDS];
@@ -60,12 +51,6 @@ mod image {
         let [times_low, times_high] = words(arithmetic::times(a, b as u8));
         let [ratio_low, ratio_high] = words(arithmetic::ratio(x, y).to_bits());
         let [whole_low, whole_high] = words(arithmetic::whole(x));
-        let (mut marks, mut values) = ([0; PAIRS], [0; PAIRS]);
-        for (n, (mark, value)) in marks.iter_mut().zip(&mut values).enumerate() {
-            (*mark, *value) = (byte(&MARKS, n), word(&VALUES, 2 * n));
-        }
-        let marks = marks.get(..byte(&COUNTS, 0).into()).unwrap_or(&marks);
-        let values = values.get(..byte(&COUNTS, 1).into()).unwrap_or(&values);
         [
             quotient,
             remainder,
@@ -81,7 +66,6 @@ mod image {
             ratio_high,
             whole_low,
             whole_high,
-            arithmetic::passed_over(marks, values, b as u16).into(),
             // The result of an inlined division, which uses other registers.
             arithmetic::divide(a, b as u16).0,
             arithmetic::inverse_root(a as u16),

@@ -3,8 +3,7 @@
 use kerf::motion::block::{Body, Line};
 use kerf::motion::exec::{SEGMENT_S, Step};
 use kerf::motion::factors::Factors;
-use kerf::motion::governor::{Ahead, Governor, Stretch};
-use kerf::motion::queue::{BlockSource, Constraint};
+use kerf::motion::governor::{Governor, Stretch};
 use kerf::units::{Length, PerAxis};
 use proptest::prelude::*;
 
@@ -131,17 +130,12 @@ pub struct Planned {
     /// The velocity that the corner at its start allows.
     pub corner: f64,
     pub accel: f64,
-    pub jerk: f64,
     pub stretch: Stretch,
     pub before: f64,
     pub after: f64,
     /// Time at the end of the stretch, and the distance along the path by then, both from the beginning of the job.
     pub clock: f64,
     pub place: f64,
-    /// Time and distance at which the velocity is `after`. They are later than the end of the stretch if a part of a
-    /// slice remains.
-    pub after_clock: f64,
-    pub after_place: f64,
 }
 
 /// Runs a job through queue and governor alone.
@@ -165,15 +159,13 @@ pub fn plan_changed(
     plan_with(job, held, change, |_| Pressed::default())
 }
 
-/// How little CPU time is left.
+/// How the governor is asked.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Pressed {
-    /// Slices are twice as long.
+    /// Stretches are twice as long, because CPU time is short.
     pub coarse: bool,
-    /// Slices are twice as long, and the governor skips scans that can wait.
-    pub hurry: bool,
-    /// Accelerations that are about to end do so without another scan.
-    pub tight: bool,
+    /// Stretches end where samples of this many stretches do, and blocks may end within.
+    pub sampled: u8,
 }
 
 /// Runs a job through queue and governor alone. `pressed` says before each stretch how little CPU time is left.
@@ -191,14 +183,14 @@ fn plan_with(
     let mut governor = Governor::new();
     let mut running: Option<(Line, u32, f32)> = None;
     let mut version = 0;
+    // What is left of the sample, s.
+    let mut room = 0.0;
     let mut planned: Vec<Planned> = Vec::new();
     let mut step = |rig: &mut Rig| -> bool {
         let Some(block) = rig.source.oldest() else {
             assert!(running.is_none());
             // The velocity that may change to zero at once.
-            let jump = |p: &Planned| {
-                if p.jerk > 0.0 { 2.0 * p.jerk as f32 * SEGMENT_S } else { p.accel as f32 }
-            };
+            let jump = |p: &Planned| p.accel as f32;
             let most = 1e-3 + planned.last().map_or(0.0, jump) * SEGMENT_S;
             let velocity = governor.velocity();
             assert!(velocity <= most, "the queue ends at {velocity}");
@@ -209,7 +201,7 @@ fn plan_with(
         let (_, number, left) = *running.get_or_insert_with(|| {
             rig.source.enter();
             version = rig.source.version().wrapping_sub(1);
-            governor.begin(line.accel.get(), line.jerk.get());
+            governor.begin(line.accel.get());
             (line, block.line(), line.extent.length())
         });
         change(planned.len(), rig);
@@ -218,52 +210,48 @@ fn plan_with(
             if rig.source.take_changed() {
                 governor.change_feed();
             }
-            governor.look_again();
-        }
-        struct QueueView<'a>(f32, &'a BlockSource);
-        impl Ahead for QueueView<'_> {
-            fn headroom(&self) -> f32 {
-                self.0
-            }
-            fn slower(&self, n: u8, velocity: kerf::motion::short::Short) -> (u8, Constraint) {
-                self.1.slower(n, velocity)
-            }
-            fn end(&self) -> f32 {
-                self.1.end_of_queue()
-            }
         }
         let cruise = rig.source.cruise();
-        let view = QueueView(rig.source.headroom(), &rig.source);
+        let headroom = rig.source.headroom();
         let before = governor.velocity().into();
         let mut hold = held(planned.len(), governor.is_at_rest());
         while hold && governor.is_at_rest() {
             hold = held(planned.len(), true);
         }
-        let Pressed { coarse, hurry, tight } = pressed(planned.len());
-        governor.set_hurry(hurry);
-        governor.set_tight(tight);
-        let nominal = if coarse || hurry { 2.0 * SEGMENT_S } else { SEGMENT_S };
-        let stretch = if hold {
-            governor.halt(left, &view, SEGMENT_S)
-        } else {
-            governor.stretch(left, cruise, &view, nominal)
+        let Pressed { coarse, sampled } = pressed(planned.len());
+        match (coarse, sampled) {
+            (_, 1..) => {
+                let full = f32::from(sampled) * SEGMENT_S;
+                if room < 1e-3 * SEGMENT_S {
+                    room = full;
+                }
+                room = room.min(full);
+                governor.take_exactly(room);
+            }
+            (true, _) if !hold => governor.take_long(2.0 * SEGMENT_S),
+            _ => governor.take(SEGMENT_S),
+        }
+        let stretch = match (hold, sampled) {
+            (true, _) => governor.halt(left, headroom),
+            (_, 0) => governor.stretch(left, cruise, headroom),
+            _ => governor.part(left, cruise, headroom),
         };
+        if sampled > 0 {
+            assert!(stretch.seconds <= room * 1.000_01, "{stretch:?} of {room}");
+            room -= stretch.seconds;
+        }
         let (clock, place) = planned.last().map_or((0.0, 0.0), |p| (p.clock, p.place));
         let clock = clock + f64::from(stretch.seconds);
         let place = place + f64::from(stretch.distance);
-        let (more, further) = governor.pending();
         planned.push(Planned {
             clock,
             place,
-            after_clock: clock + f64::from(more),
-            after_place: place + f64::from(further),
             line: number,
             length: line.extent.length().into(),
             cruise: cruise.into(),
             top: line.velocity(&Factors { feed: 2.0, traverse: 1.0 }).into(),
             corner: line.entry.get().into(),
             accel: line.accel.get().into(),
-            jerk: line.jerk.get().into(),
             stretch,
             before,
             after: governor.velocity().into(),

@@ -14,7 +14,11 @@ use crate::side::Side;
 /// Steps in a mm.
 const STEPS: f64 = 1_280.0;
 /// How far a report is ahead of the motors at most, ms: exec prepares segments that long before they run.
-const AHEAD: u64 = 13;
+const AHEAD: u64 = 17;
+
+/// How far X is at most from where a line ends on the path when the report has the state of the next line, mm: what the
+/// means are behind the path at 1,800 mm/min.
+const BEHIND: f64 = 30.0 * 0.05;
 /// The axes of which reports are compared.
 const AXES: usize = 3;
 /// The least difference of positions that counts, mm. Reports have three decimals.
@@ -453,18 +457,18 @@ impl<S: Side> Told<S> {
         let mut states = Vec::new();
         let mut last = before;
         // Whether the last line that moves ends at the place.
-        let mut is_here = (x - before.at[0]).abs() <= CLOSE;
+        let mut is_here = (-CLOSE - BEHIND..=CLOSE).contains(&(x - before.at[0]));
         if is_here {
             states.push(before);
         }
         for line in lines {
             let (from, to) = (last.at[0], line.after.at[0]);
-            let passes = line.moves && (from - CLOSE..=to + CLOSE).contains(&x);
+            let passes = line.moves && (from - CLOSE - BEHIND..=to + CLOSE).contains(&x);
             if passes || is_here {
                 states.push(&line.after);
             }
             if line.moves {
-                is_here = (x - to).abs() <= CLOSE;
+                is_here = (to - CLOSE - BEHIND..=to + CLOSE).contains(&x);
             }
             last = &line.after;
         }

@@ -22,7 +22,7 @@ group! {
             "Travel maximum: upper end of travel in machine coordinates, for soft limits (`sl`). It is also the position after homing to the upper switch. The default 0 of Z puts machine zero at the top of Z. -214748.3647 means no limit. If `tn` and `tm` are equal, the axis has no limit at either end.";
         JM "jm": fixed(3, 0, POSITIVE).with(UNIT | JERK), [20_000, 20_000, 20_000, 5_760_000, 20_000, 20_000],
             length(text!("jerk maximum"), JERK_UNIT),
-            "Maximum jerk. A value above 1000000 is divided by a million. A value of 6 times `ac` takes about 36 ms to reach `ac`. A value of 216 times `ac` or more reaches `ac` within 1 ms. Such a value has no effect: `ac` alone limits the ramps, and a message says so.";
+            "Maximum jerk. A value above 1000000 is divided by a million. A value of 6 times `ac` takes about 36 ms to reach `ac`. The axis for which that takes longest decides for all, so set all to the same ratio; it counts as 44 ms at most (60 on an RP2040). Where an axis reverses from `ac` to -`ac` at once, its jerk is twice the maximum. A value of 216 times `ac` or more reaches `ac` within 1 ms. Such a value has no effect: `ac` alone limits the ramps, and a message says so.";
         JH "jh": fixed(3, 0, POSITIVE).with(UNIT | JERK | HOMING), [40_000, 40_000, 40_000, 11_520_000, 0, 0],
             length(text!("jerk homing"), JERK_UNIT),
             "Maximum jerk while homing and probing. A value above 1000000 is divided by a million. `ac` applies while homing and probing, too.";

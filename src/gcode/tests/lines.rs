@@ -42,7 +42,7 @@ fn line_numbers_have_three_bytes() {
 fn lines_that_do_nothing() {
     for line in ["", "  ", "%", "(x)", "; x", "G0", "G80", "G40G49G54", "N5", "F0", "/X", "G2"] {
         let (_, out) = run(&[line]);
-        assert_eq!(Commands { line: 0, ..out }, Commands::default(), "{line}");
+        assert_eq!(Commands { line: 0, blend: 0, ..out }, Commands::default(), "{line}");
     }
     let info = Interpreter::new().interpret(b"/G0 X1", &Usual, &mut Commands::default()).unwrap();
     assert!(info.deleted);
@@ -90,11 +90,12 @@ fn the_tolerance_of_the_path_is_modal() {
     assert_eq!(blend(&["G64 P0.005", "G64", "G0 X1"]), 11);
     assert_eq!(blend(&["G64 P0.005", "M30", "G0 X1"]), 11);
     assert_eq!(blend(&["G64 P0.005", "G61", "G64", "G0 X1"]), 11);
-    // Moves are not merged with G61 and G61.1, and arcs are never merged.
+    // Corners are exact, and moves are not merged, with G61 and G61.1.
     for line in ["G61", "G61.1"] {
         assert_eq!(blend(&["G64 P0.005", line, "G0 X1"]), 0, "{line}");
     }
-    assert_eq!(blend(&["G2 F100 X2 I1"]), 0);
+    assert_eq!(blend(&["G2 F100 X2 I1"]), 11);
+    assert_eq!(blend(&["G61 G2 F100 X2 I1"]), 0);
     assert_eq!(refusal(&["G64 P-0.001"]), Status::PWordNegative);
 }
 

@@ -397,41 +397,6 @@ pub fn inverse_root(x: u16) -> u16 {
     root
 }
 
-/// Returns how many pairs of a mark and a value come before the first pair whose mark has its highest bit set or
-/// whose value is below `least`. If there is no such pair, returns the number of all pairs, at most 255. Cost: 14 for
-/// each pair, where the compiler's loop takes 25.
-#[inline(always)]
-pub fn passed_over(marks: &[u8], values: &[u16], least: u16) -> u8 {
-    let count = marks.len().min(values.len()).min(255) as u8;
-    let mut left = count;
-    if left > 0 {
-        // SAFETY: reads `count` marks and values at most, which both slices have.
-        unsafe {
-            core::arch::asm!(
-                "1:",
-                "ld   {byte}, X+",
-                "tst  {byte}",
-                "brmi 2f",
-                "ld   {byte}, Z+",
-                "cp   {byte}, {least:l}",
-                "ld   {byte}, Z+",
-                "cpc  {byte}, {least:h}",
-                "brcs 2f",
-                "dec  {left}",
-                "brne 1b",
-                "2:",
-                byte = out(reg) _,
-                left = inout(reg) left,
-                least = in(reg_pair) least,
-                inout("X") marks.as_ptr() => _,
-                inout("Z") values.as_ptr() => _,
-                options(pure, readonly, nostack),
-            );
-        }
-    }
-    count - left
-}
-
 /// `a / b`. Cost: 370, where the library takes 490.
 #[inline(never)]
 pub fn ratio(a: f32, b: f32) -> f32 {

@@ -1,9 +1,10 @@
 //! The functions of `avr/arithmetic.rs` in plain Rust.
 
-use avr_embassy::ring::Index;
-
 /// Returns `a / b` and `a % b` if the quotient fits 16 bits: `a >> 16 < b`. Otherwise the same result as on the chip.
 pub fn divide(a: u32, b: u16) -> (u16, u16) {
+    if a >> 16 < u32::from(b) {
+        return ((a / u32::from(b)) as u16, (a % u32::from(b)) as u16);
+    }
     let mut rest = (a >> 16) as u16;
     let mut low = a as u16;
     for _ in 0..16 {
@@ -74,13 +75,6 @@ pub fn inverse_root(x: u16) -> u16 {
     let [low, high] = more.to_le_bytes();
     let part = i16::from(high as i8) * i16::from(first) + i16::from(high_product(low, first));
     (u16::from(first) << 8).wrapping_add_signed(part)
-}
-
-/// Returns how many pairs of a mark and a value come before the first pair whose mark has its highest bit set or
-/// whose value is below `least`. If there is no such pair, returns the number of all pairs, at most [`Index::MAX`].
-pub fn passed_over(marks: &[Index], values: &[u16], least: u16) -> Index {
-    let passes = |(mark, value): &(&Index, &u16)| **mark <= Index::MAX >> 1 && **value >= least;
-    marks.iter().zip(values).take(Index::MAX.into()).take_while(passes).count() as Index
 }
 
 /// Returns `a / b`. Not inlined, because the compiler would otherwise compute the division even on paths that do not

@@ -24,6 +24,7 @@ impl Timing for Chip {
     /// Seven segments of this length in the ring cover the millisecond by which the feeder is ahead, and most of
     /// another one.
     const BLOCK_S_MIN: f32 = 0.000_25;
+    const SAMPLE_MS: u8 = 2;
     /// Exec is fast enough: 40 % of the CPU are busy with an arc on which a motor makes a million steps a second.
     const SHORT_SHARE: f32 = 1.0;
     const LOOK_AHEAD: usize = 1_024;

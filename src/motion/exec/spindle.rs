@@ -123,7 +123,6 @@ impl Exec {
         if stands != stood || !stands && !(-CHANGE..=CHANGE).contains(&off) {
             *before = share;
             self.governor.change_feed();
-            self.governor.look_again();
         }
     }
 
@@ -184,11 +183,13 @@ impl Exec {
             self.follows = Follows::Retreats(retreat);
             return Step::Leaves;
         }
-        let running = &self.running;
+        let (left, headroom) = (self.running.left, self.running.headroom);
+        let cruise = least(wanted, self.running.cruise);
+        self.governor.take(SEGMENT_S);
         let stretch = if breaks_off {
-            self.governor.halt_sharply(running.left, running.headroom, SEGMENT_S)
+            self.governor.halt(left, headroom)
         } else {
-            self.governor.sharply(running.left, least(wanted, running.cruise), running.headroom)
+            self.governor.stretch(left, cruise, headroom)
         };
         let before = self.running.left;
         let step = self.hand_out_coarsely(&stretch, blocks, out, segment);
@@ -246,7 +247,8 @@ impl Exec {
                 self.end(0, false, blocks, segment)
             } else {
                 let (left, headroom) = (self.running.left, self.running.headroom);
-                let stretch = self.governor.halt_sharply(left, headroom, SEGMENT_S);
+                self.governor.take(SEGMENT_S);
+                let stretch = self.governor.halt(left, headroom);
                 self.hand_out_coarsely(&stretch, blocks, out, segment)
             };
             if step != Step::Segment {

@@ -26,16 +26,16 @@ impl Prep {
             let mut whole = 0;
             let debt = self.debt[M];
             if way != 0 {
-                self.debt[M] = debt.wrapping_add(way << PART_LOG2);
-                let sum = way + i16::from(self.fraction[M]);
-                self.fraction[M] = sum as u8 & 15;
+                self.debt[M] = debt + (i32::from(way) << PART_LOG2);
+                let sum = way + i16::from(self.fraction(M));
+                self.place[M] = u16::from(sum as u8 & 15) << PART_LOG2;
                 whole = sum >> PARTS_LOG2;
                 target[M] = target[M].wrapping_add(whole.into());
             }
             steps[M] = whole;
             if !is_little(debt) {
                 // Adds the debt of the motor, in 1/16 steps.
-                way += parts_of(debt) >> PART_LOG2;
+                way += parts_of(debt);
             }
             if way != 0 {
                 self.take_up(M, 1 << M, way, line.way[M]);
@@ -72,8 +72,14 @@ impl Prep {
         self.left = product(self.most, STEP);
         self.lengthen();
         for (debt, way) in self.debt.iter_mut().zip(ways) {
-            *debt = debt.wrapping_add(way << STEP_LOG2);
+            *debt += i32::from(*way) << STEP_LOG2;
         }
+    }
+
+    /// How far the end of the block is past the point half a step before its rounded whole step, in 1/16 step.
+    #[inline(always)]
+    pub(super) fn fraction(&self, m: usize) -> u8 {
+        (self.place[m] >> 8) as u8 >> (PART_LOG2 - 8)
     }
 
     /// Takes in a motor that moves by `way` in the block; `own` is its distance in the line, without its debt.
@@ -97,7 +103,7 @@ impl Prep {
             self.full = bit;
             self.most = size;
             self.own = own;
-            let at = self.fraction[m];
+            let at = self.fraction(m);
             self.past = if way < 0 { !at } else { at };
         } else {
             self.minor |= bit;
@@ -114,8 +120,8 @@ impl Prep {
         for m in 0..MOTORS {
             if self.full & bit != 0 {
                 let debt = if self.backwards & bit != 0 { -self.debt[m] } else { self.debt[m] };
-                let due = *due.get_or_insert(parts_of(debt));
-                if (debt - due).unsigned_abs() > PART {
+                let due = *due.get_or_insert(i32::from(parts_of(debt)) << PART_LOG2);
+                if (debt - due).unsigned_abs() > u32::from(PART) {
                     // The motor's distance is equal, but its debt is different.
                     self.full &= !bit;
                     self.minor |= bit;
@@ -133,14 +139,14 @@ impl Prep {
             bit <<= 1;
         }
         let due = due.unwrap_or(0);
-        self.left = self.left.wrapping_add_signed(due.into());
+        self.left = self.left.wrapping_add_signed(due);
         // A longer distance of the dominant motor lengthens those of the other motors in proportion. Their own debts
         // replace that part.
         let mut bit = 1;
         for m in 0..MOTORS {
             let debt = if self.backwards & bit != 0 { -self.debt[m] } else { self.debt[m] };
             let way = self.minors[m].way;
-            self.minors[m].owed = times(debt, self.most) - times(due, way);
+            self.minors[m].owed = times(debt as i16, self.most) - times(due as i16, way);
             bit <<= 1;
         }
     }

@@ -9,7 +9,7 @@ use crate::dda::Segment;
 impl Prep {
     /// Returns the debt of the first of `motors`, phase units.
     #[small]
-    pub fn debt_of(&self, motors: u8) -> i16 {
+    pub fn debt_of(&self, motors: u8) -> i32 {
         let first = motors.trailing_zeros() as usize;
         self.debt.get(first).copied().unwrap_or_default()
     }

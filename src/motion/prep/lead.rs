@@ -3,9 +3,17 @@
 
 use super::super::advance::{Lead, pushed};
 use super::super::block::Line;
+use super::super::smooth::{CHANNELS, LEAD};
 use super::minor::Minor;
 use super::{ASIDE, ASIDE_LITTLE, Prep, TURNED};
 use crate::dda::Segment;
+
+/// Returns how far a line pushes filament while other motors than that of the extruder, `m`, travel: phase units.
+fn own_of(line: &Line, m: usize) -> u32 {
+    let own = line.way.get(m).copied().unwrap_or(0);
+    let travels = line.way.iter().enumerate().any(|(other, way)| other != m && *way != 0);
+    if travels { pushed(own, line) } else { 0 }
+}
 
 impl Prep {
     /// Whether there is a lead of the extruder, or may be one. Cost: 5.
@@ -31,9 +39,9 @@ impl Prep {
 
     /// Takes in the velocity at the end of a slice, mm/s: see [`Advance::aim`](super::super::advance::Advance::aim).
     #[inline(never)]
-    pub fn aim(&mut self, velocity: f32, seconds: f32, pending: f32) {
+    pub fn aim(&mut self, velocity: f32, seconds: f32) {
         if let Some(extruder) = self.extruder.first_mut() {
-            extruder.aim(velocity, seconds, pending);
+            extruder.aim(velocity, seconds);
         }
     }
 
@@ -45,9 +53,7 @@ impl Prep {
         let Some(extruder) = self.extruder.first_mut() else { return };
         let m = usize::from(extruder.motor);
         let bit = 1 << extruder.motor;
-        let own = line.way.get(m).copied().unwrap_or(0);
-        let travels = line.way.iter().enumerate().any(|(other, way)| other != m && *way != 0);
-        let way = if travels { pushed(own, line) } else { 0 };
+        let way = own_of(line, m);
         let leads = extruder.begin(way, line.extent.length()) && self.most != 0;
         if !leads {
             extruder.end();
@@ -67,6 +73,49 @@ impl Prep {
             // Only the extruder moves: its ticks are those of motors whose increments are not a step.
             self.others = 1;
         }
+    }
+
+    /// Begins the lead of a block whose distances are sampled.
+    #[small]
+    pub fn begin_sampled(&mut self, line: &Line) {
+        if self.has_advance()
+            && let Some(extruder) = self.extruder.first_mut()
+        {
+            extruder.begin_sampled(own_of(line, usize::from(extruder.motor)), line.extent.length());
+        }
+    }
+
+    /// Returns by how much the lead for this velocity along the path, mm/s, is above that of the last sample, phase
+    /// units.
+    #[inline(always)]
+    pub fn lead_more(&mut self, velocity: f32) -> i32 {
+        match self.extruder.first_mut() {
+            Some(extruder) if extruder.on => extruder.step_to(velocity),
+            _ => 0,
+        }
+    }
+
+    /// Takes in how far the lead is to go in a sample. The motors of the sample have been collected.
+    #[inline(never)]
+    #[small]
+    pub(super) fn aim_sampled(&mut self, distances: &[i32; CHANNELS]) {
+        let Some(extruder) = self.extruder.first_mut() else { return };
+        let more = distances.get(LEAD).copied().unwrap_or_default();
+        let bit = 1 << extruder.motor;
+        let backwards = self.backwards & bit != 0;
+        if !extruder.aim_by(more) {
+            // The next segment reverses the motor.
+            self.turned |= core::mem::take(&mut extruder.leads) && extruder.backwards != backwards;
+            return;
+        }
+        extruder.take_up(backwards);
+        let moving = self.full | self.minor;
+        (self.full, self.minor) = (0, moving | bit);
+        if moving & bit == 0 && moving != 0 {
+            self.others += 1;
+        }
+        // Its ticks are those of motors whose increments are not a step.
+        self.others = self.others.max(1);
     }
 
     /// Adds the extruder's lead to a segment that is complete except for its mode.

@@ -1,19 +1,19 @@
 //! Ticks of a stretch: their number, and the phase units of each, in integers.
 
-use super::{LIMIT_MAX, PART};
+use super::{LIMIT_MAX, PART, PART_LOG2};
 use crate::dda::STEP_LOG2;
 use crate::hal::arithmetic::product;
 
 /// Whether a debt is only rounding: at most half of 1/16 step.
 #[inline(always)]
-pub(super) fn is_little(debt: i16) -> bool {
-    (debt as u16).wrapping_add(PART / 2) < PART
+pub(super) fn is_little(debt: i32) -> bool {
+    debt.wrapping_add(i32::from(PART / 2)) as u32 >> PART_LOG2 == 0
 }
 
-/// Returns a debt rounded to 1/16 step, in phase units.
+/// Returns a debt, which is no more than some steps, in 1/16 step, rounded.
 #[inline(always)]
-pub(super) fn parts_of(debt: i16) -> i16 {
-    (debt + (PART / 2) as i16) & !(PART as i16 - 1)
+pub(super) fn parts_of(debt: i32) -> i16 {
+    (debt as i16).wrapping_add((PART / 2) as i16) >> PART_LOG2
 }
 
 #[inline(never)]

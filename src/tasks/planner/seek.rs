@@ -22,6 +22,7 @@ use crate::machine;
 use crate::motion::block::{Outputs, QueuedAction};
 use crate::motion::dynamics::{MachineLimits, PER_SECOND_CUBED, PER_SECOND_SQUARED};
 use crate::motion::queue;
+use crate::motion::smooth::Spans;
 use crate::motion::snapshot::Snapshot;
 use crate::tasks::common;
 use crate::tasks::links::Changes;
@@ -137,7 +138,8 @@ impl Planner {
         located
     }
 
-    /// Takes the jerk limit of homing and probing, until the line is done, for the axes that have both jerk limits.
+    /// Takes the jerk limit of homing and probing, until the line is done, for the axes that have both jerk limits. No
+    /// mean rounds corners, because the moves have none. The machine stands still, and nothing is queued.
     #[small]
     pub(super) fn brake_hard(&mut self) {
         let settings = self.links.settings.borrow();
@@ -148,6 +150,8 @@ impl Planner {
                 axis.limit_change(accel, hard * PER_SECOND_CUBED);
             }
         }
+        drop(settings);
+        self.smooth(Spans::alone(self.dynamics.build_up()));
         self.links.changes.note(Changes::SETTINGS);
     }
 }

@@ -416,6 +416,7 @@ impl Planner {
         }
         // The corner at a taper must not slow the path down: an axis that gets slower would not be in step.
         self.dynamics.junction = ANY_CORNER;
+        self.dynamics.rounds = false;
         // The limits of the settings are in force again for the next line.
         links.changes.note(Changes::SETTINGS);
         self.set_pass(Status::Ok);

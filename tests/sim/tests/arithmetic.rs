@@ -16,8 +16,6 @@ use crate::common::part;
 
 /// Number of random cases by default.
 const USUAL: u64 = 30_000;
-/// Pairs of marks and values.
-const PAIRS: usize = 8;
 /// Cycles between two checks for the results.
 const LOOK: u64 = 100;
 /// Longest wait for the results, cycles: far more than all of the arithmetic takes.
@@ -29,9 +27,6 @@ struct Case {
     /// The first operand. Functions with fewer bits take its lowest bits.
     a: u64,
     b: u32,
-    marks: [u8; PAIRS],
-    values: [u16; PAIRS],
-    counts: [u8; 2],
 }
 
 /// The results.
@@ -50,7 +45,6 @@ struct Results {
     /// The bits of the quotient of two floats, as returned by [`bits`].
     ratio: u32,
     whole: u32,
-    passed_over: u8,
 }
 
 /// Returns the bits of a quotient. All NaNs become one NaN. A subnormal quotient keeps only its sign, because the
@@ -64,9 +58,8 @@ fn bits(quotient: f32) -> u32 {
 }
 
 impl Case {
-    /// Operands, without marks.
     fn new(a: u64, b: u32) -> Self {
-        Case { a, b, ..Case::default() }
+        Case { a, b }
     }
 
     /// Whether a quotient of 32 bits by 16 fits.
@@ -82,8 +75,6 @@ impl Case {
     /// Returns the host's results.
     fn on_host(&self) -> Results {
         let (a, b) = (self.a as u32, self.b);
-        let [of_marks, of_values] = self.counts.map(usize::from);
-        let (marks, values) = (&self.marks[..of_marks], &self.values[..of_values]);
         Results {
             divide: self.fits().then(|| divide::quotient_remainder(a, b as u16)),
             inlined_quotient: self.fits().then(|| arithmetic::divide(a, b as u16).0),
@@ -95,7 +86,6 @@ impl Case {
             inverse_root: arithmetic::inverse_root(a as u16),
             ratio: bits(arithmetic::ratio(f32::from_bits(a), f32::from_bits(b))),
             whole: arithmetic::whole(f32::from_bits(a)),
-            passed_over: arithmetic::passed_over(marks, values, b as u16),
         }
     }
 }
@@ -105,9 +95,6 @@ struct Chip {
     machine: Machine,
     turn: u16,
     operands: u16,
-    counts: u16,
-    marks: u16,
-    values: u16,
     results: u16,
 }
 
@@ -115,16 +102,8 @@ impl Chip {
     fn new() -> Self {
         let machine = Machine::load(&part("arithmetic"), &MEGA2560_GRBL).unwrap();
         let at = |name: &str| machine.image().variable(name).expect("a static of the image");
-        Chip {
-            turn: at("TURN"),
-            operands: at("OPERANDS"),
-            counts: at("COUNTS"),
-            marks: at("MARKS"),
-            values: at("VALUES"),
-            results: at("RESULTS"),
-            machine,
-        }
-        .started()
+        Chip { turn: at("TURN"), operands: at("OPERANDS"), results: at("RESULTS"), machine }
+            .started()
     }
 
     /// Waits for the start-up, which clears the memory.
@@ -142,9 +121,6 @@ impl Chip {
     /// Returns the chip's results.
     fn results(&mut self, case: &Case) -> Results {
         self.put(self.operands, case.a.to_le_bytes().into_iter().chain(case.b.to_le_bytes()));
-        self.put(self.marks, case.marks);
-        self.put(self.values, case.values.into_iter().flat_map(u16::to_le_bytes));
-        self.put(self.counts, case.counts);
         self.put(self.turn, [1]);
         let end = self.machine.cycle() + PATIENCE;
         while self.machine.peek(self.turn) != 0 {
@@ -155,16 +131,15 @@ impl Chip {
         let two = |n: u16| u32::from(word(n + 1)) << 16 | u32::from(word(n));
         Results {
             divide: case.fits().then(|| (word(0), word(1))),
-            inlined_quotient: case.fits().then(|| word(15)),
+            inlined_quotient: case.fits().then(|| word(14)),
             wide_quotient: case.fits_wide().then(|| two(2)),
             product: two(4),
             times: two(6),
             high_product: word(8) as u8,
             root: word(9),
-            inverse_root: word(16),
+            inverse_root: word(15),
             ratio: bits(f32::from_bits(two(10))),
             whole: two(12),
-            passed_over: word(14) as u8,
         }
     }
 
@@ -202,10 +177,10 @@ fn number(random: &mut Random, most: u64) -> u64 {
     any >> (64 - most) >> random.below(most)
 }
 
-/// Returns operands of all kinds, and marks and values.
+/// Returns operands of all kinds.
 fn random_case(random: &mut Random) -> Case {
     let b = number(random, 32) as u32;
-    let mut case = match random.below(5) {
+    match random.below(5) {
         0 => Case::new(number(random, 64), b),
         // A quotient of 16 bits that is exact, or nearly, or leaves the largest remainder.
         1 => {
@@ -235,14 +210,7 @@ fn random_case(random: &mut Random) -> Case {
             };
             Case::new(near(random), near(random) as u32)
         }
-    };
-    for (mark, value) in case.marks.iter_mut().zip(&mut case.values) {
-        *mark = if random.below(8) == 0 { 0x80 } else { 0 } | random.below(128) as u8;
-        // A value is seldom below the least one.
-        *value = number(random, 16) as u16 | if random.below(8) == 0 { 0 } else { case.b as u16 };
     }
-    case.counts = [random.below(9) as u8, random.below(9) as u8];
-    case
 }
 
 fn wanted(name: &str) -> Option<u64> {

@@ -152,7 +152,14 @@ fn over_the_wire(kept: &[u8; 4096], text: &str) -> f64 {
 /// for temperatures is answered.
 #[test]
 fn a_print_from_a_card_is_as_fast_as_the_planner() {
-    let kept = settings(&["{mch:3}", "{xjm:100000}", "{yjm:100000}", "{ajm:100000}", "{he1k:6}"]);
+    let kept = settings(&[
+        "{mch:3}",
+        "{xjm:100000}",
+        "{yjm:100000}",
+        "{zjm:100000}",
+        "{ajm:100000}",
+        "{he1k:6}",
+    ]);
     let moves = 1_000;
     let wire = over_the_wire(&kept, &circle(moves));
     println!("over the wire {wire:.2} s");

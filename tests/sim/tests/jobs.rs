@@ -134,10 +134,9 @@ fn no_step_is_made_and_taken_back() {
         }
         let (want, got) = (commanded(&lines(run.job), &setup), report.motors.iter());
         let got: Vec<_> = got.map(|m| m.total).collect();
-        // A curve may reverse just behind a step, within the tolerance of G64. The step there and the step back are
-        // then left out.
+        // Where a curve reverses, within the tolerance of G64 and of the means, the steps there and back are left out.
         let is_right = |(got, want): (&u64, &u64)| {
-            got <= want && (want - got).is_multiple_of(2) && (want - got) * 10_000 <= *want
+            got <= want && (want - got).is_multiple_of(2) && (want - got) * 500 <= *want
         };
         let right = got.len() == want.len() && got.iter().zip(&want).all(is_right);
         ensure(right, || format!("{got:?} steps instead of {want:?}"))

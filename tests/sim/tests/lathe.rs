@@ -202,7 +202,7 @@ fn wait_for_rest(machine: &mut Machine, host: &mut Host, most_ms: u64) {
         waited += 50;
         assert!(waited < most_ms, "it does not come to rest: {:?}", host.stat());
     }
-    host.run_for_ms(machine, 300).unwrap();
+    host.run_for_ms(machine, 1_000).unwrap();
 }
 
 fn spread(phases: &[f64]) -> f64 {

@@ -172,7 +172,7 @@ fn a_contact_while_it_speeds_up_is_found_to_the_step() {
         bench.host.run_until(&mut bench.machine, wait).unwrap();
         let closed = bench.close();
         let rate = bench.rate(closed);
-        assert!((1_000.0..9_000.0).contains(&rate), "{rate}");
+        assert!((300.0..9_000.0).contains(&rate), "{rate}");
         worst = worst.max(bench.error(closed));
     }
     println!("speeding up: {worst} steps");

@@ -108,8 +108,8 @@ fn a_kill_in_a_comment_is_one_whatever_is_under_way() {
         let job =
             format!("{{posx:n,posy:n}}\ng91 g2 f3000 x0 i1 p2\ng91 g0 x0.1 y0.2\n{comment}\x04)\n");
         machine.send(job.as_bytes());
-        // The machine comes to rest within 55 ms.
-        machine.run_for_ms(80).unwrap();
+        // The machine comes to rest within 120 ms.
+        machine.run_for_ms(150).unwrap();
         machine.receive();
         machine.send(b"{stat:n}\n");
         machine.run_for_ms(10).unwrap();

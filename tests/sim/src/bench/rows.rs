@@ -376,9 +376,9 @@ pub const ROWS: [Row; 50] = [
         decimals: 0,
         better: Lower,
         peers: NONE,
-        target: Some(8_000.0),
-        // A third of this time goes into scans of the moves ahead.
-        floor: Some(8_000.0),
+        target: Some(16_000.0),
+        // With means a segment takes 4 ms, and holds the ends of up to five blocks. It took 8,000 for 2 ms before.
+        floor: Some(12_500.0),
         measure: costs::segment_jerk,
     },
     Row {
@@ -389,7 +389,7 @@ pub const ROWS: [Row; 50] = [
         better: Lower,
         peers: NONE,
         target: Some(24_000.0),
-        // The worst case is a scan of three constraints, and the layout of a ramp.
+        // The worst case is a sample that holds the ends of several blocks.
         floor: Some(24_000.0),
         measure: costs::segment_jerk_worst,
     },
@@ -467,7 +467,9 @@ pub const ROWS: [Row; 50] = [
         better: Lower,
         peers: NONE,
         target: Some(1.1),
-        floor: Some(1.1),
+        // The mean that rounds corners takes 16 ms, and that of the jerk is rounded up to samples of 4 ms. The optimum
+        // has neither, and jumps at corners.
+        floor: Some(1.25),
         measure: limits::lone_tenth,
     },
     Row {
@@ -478,7 +480,7 @@ pub const ROWS: [Row; 50] = [
         better: Lower,
         peers: NONE,
         target: Some(1.05),
-        floor: Some(1.05),
+        floor: Some(1.1),
         measure: limits::lone_one,
     },
     Row {
@@ -489,7 +491,7 @@ pub const ROWS: [Row; 50] = [
         better: Lower,
         peers: NONE,
         target: Some(1.02),
-        floor: Some(1.02),
+        floor: Some(1.04),
         measure: limits::lone_ten,
     },
     Row {
@@ -500,7 +502,7 @@ pub const ROWS: [Row; 50] = [
         better: Lower,
         peers: NONE,
         target: Some(1.01),
-        floor: Some(1.01),
+        floor: Some(1.015),
         measure: limits::lone_hundred,
     },
     Row {
@@ -511,8 +513,8 @@ pub const ROWS: [Row; 50] = [
         better: Lower,
         peers: NONE,
         target: Some(10.0),
-        // Three segments that wait, the one that runs, and the one that exec prepares.
-        floor: Some(10.0),
+        // A segment of 4 ms that waits, the one that runs, and the one that exec prepares.
+        floor: Some(12.5),
         measure: limits::hold_begins,
     },
     Row {
@@ -523,7 +525,8 @@ pub const ROWS: [Row; 50] = [
         better: Lower,
         peers: NONE,
         target: Some(1.05),
-        floor: Some(1.05),
+        // The stop, too, has the mean that rounds corners.
+        floor: Some(1.1),
         measure: limits::hold_stops,
     },
     Row {

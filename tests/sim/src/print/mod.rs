@@ -215,7 +215,7 @@ impl Run<'_> {
         let idle_at = moved.max(self.progress_at);
         let up: [bool; MOTORS] = std::array::from_fn(|m| !self.setup.motors[m].inverted);
         let log = self.machine.recorder().log();
-        let followed = path::follow(log, Place::default(), &self.ends(), up);
+        let followed = path::follow(log, Place::default(), &self.ends(), up, path::ROUNDED);
         let seconds = |cycle: u64| self.machine.seconds(cycle.saturating_sub(self.began));
         let (to_idle, to_answer) = (seconds(idle_at), seconds(self.progress_at));
         let mut report = Report::new(
