@@ -110,7 +110,7 @@ pub struct Dynamics {
     pub axes: PerAxis<Axis>,
     /// Junction acceleration, mm/s^2.
     pub junction: f32,
-    /// What each motor drives: an axis, or X and Y together ([`kinematics`](crate::kinematics)).
+    /// What each motor drives: an axis, or X and Y together ([`kinematics`]).
     pub drives: [u8; MOTORS],
     /// Highest step rate of each motor, steps/s, by the number of motors that move, less one.
     pub rates: [f32; MOTORS],

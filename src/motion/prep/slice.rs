@@ -11,7 +11,7 @@
 //!
 //! At the end of motion [`Prep::finish`] makes what is left in one tick.
 //!
-//! Cost on AVR: 1,200 cycles a segment, and 400 for each motor that moves.
+//! Cost on AVR: 1,800 cycles a segment, and 500 for each motor that moves.
 
 use super::super::divide::quotient;
 use super::super::smooth::{CHANNELS, SAMPLE_CYCLES};
