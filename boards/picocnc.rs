@@ -29,6 +29,7 @@ pub const PICOCNC: Board = Board {
         "corexy",
         "sd",
         "card-write",
+        "language",
     ],
     registers: Some(Registers {
         steps: ShiftRegister { data: gp(14), clock: gp(15), latch: gp(16), outputs: 8 },

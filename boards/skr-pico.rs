@@ -22,6 +22,7 @@ pub const SKR_PICO: Board = Board {
         "printer",
         "drivers",
         "bed-plane",
+        "language",
     ],
     dialect: 0,
     clock_hz: 128_000_000,

@@ -14,6 +14,7 @@ use heapless::Vec;
 use crate::config::{Setting, Settings};
 use crate::gcode::command::Commands;
 use crate::gcode::interpreter::Interpreter;
+use crate::gcode::language::{Language, Placed};
 use crate::hal::eeprom::Eeprom;
 use crate::hal::segments::Segments;
 use crate::hal::serial::{AUX, AllEnds, PORTS, Received, USB, hardware};
@@ -76,9 +77,21 @@ impl Links {
             report: RefCell::new(Memory::new()),
             // `recall` sets the defaults later, in place. Here they would need as much space again on the stack.
             settings: RefCell::new(Settings::blank()),
-            model: RefCell::new(Interpreter::with(storage)),
+            model: RefCell::new(Interpreter::with_language(storage, place_language())),
         }
     }
+}
+
+/// Returns the parameters of programs, in their static place.
+#[cfg(feature = "language")]
+fn place_language() -> Placed {
+    memory!(Language, Language::new())
+}
+
+#[cfg(not(feature = "language"))]
+#[inline(always)]
+fn place_language() -> Placed {
+    Language::new()
 }
 
 /// Creates the links in their static place. Not inlined, so that its stack space is free again when it returns.
@@ -204,12 +217,16 @@ fn connect(thread: Thread, rate: u32) -> Option<(&'static Links, Received, Optio
     let AllEnds { usb: (received, outgoing), aux } = uart::start(rate)?;
     let mut ports = Vec::<Port, PORTS>::new();
     ports
-        .push(Port::new(USB, line_bytes!(LINES_USB), Tx::new(thread, outgoing, USB, rate)))
+        .push(Port::new(
+            USB,
+            memory!([u8; LINES_USB], [0; LINES_USB]),
+            Tx::new(thread, outgoing, USB, rate),
+        ))
         .ok()?;
     let aux = match (aux, hardware(AUX)) {
         (Some((received, outgoing)), Some(board)) if PORTS > 1 => {
             let tx = Tx::new(thread, outgoing, AUX, board.rate);
-            ports.push(Port::new(AUX, line_bytes!(LINES_AUX), tx)).ok()?;
+            ports.push(Port::new(AUX, memory!([u8; LINES_AUX], [0; LINES_AUX]), tx)).ok()?;
             Some(received)
         }
         _ => None,

@@ -122,6 +122,20 @@ pub enum Status {
     WordRepeated,
     AxisConflict,
     WordConflict,
+    #[cfg(feature = "language")]
+    ParameterInvalid,
+    #[cfg(feature = "language")]
+    ParameterReadOnly,
+    #[cfg(feature = "language")]
+    ParameterUnknown,
+    #[cfg(feature = "language")]
+    ParametersFull,
+    #[cfg(feature = "language")]
+    ExpressionInvalid,
+    #[cfg(feature = "language")]
+    ExpressionTooDeep,
+    #[cfg(feature = "language")]
+    ValueUndefined,
     Alarmed,
     LimitHit,
     ShutDown,

@@ -85,6 +85,8 @@ fn the_machine_says_that_it_lacks_something() {
     let lacks = format!("\"f\":[1,{},", number(Status::NotBuiltIn));
     assert!(!Capability::Help.is_built_in() || Capability::Text.is_built_in());
     for (capability, line) in [
+        (Capability::Language, "#1=2"),
+        (Capability::Language, "g0x[1]"),
         (Capability::Cycles, "g81x1z-1r1f100"),
         (Capability::Boring, "m3s100g86x1z-1r1p1f100"),
         (Capability::Probing, "g38.3x1f100"),

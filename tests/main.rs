@@ -100,6 +100,7 @@ mod heat_lines;
 mod heat_patterns;
 mod hold;
 mod jogs;
+mod language;
 mod limits;
 mod line;
 mod machine;

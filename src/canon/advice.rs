@@ -368,6 +368,48 @@ const ADVICE: &[(Status, &str, &str)] = &[
         "Leave out G0 or G1 beside G28 and G30: they move by themselves. Else use two lines.",
     ),
     (WordConflict, "Two codes of the line use one word.", "Use two lines."),
+    #[cfg(feature = "language")]
+    (
+        ParameterInvalid,
+        "A parameter is numbered, and its number is no whole number from 1 to 5601.",
+        "Check the number, or the value that stands for it.",
+    ),
+    #[cfg(feature = "language")]
+    (
+        ParameterReadOnly,
+        "The line assigns a parameter that shows the state of the machine.",
+        "Use another parameter. Offsets and stored positions are set by G10, G92 and G28.1.",
+    ),
+    #[cfg(feature = "language")]
+    (
+        ParameterUnknown,
+        "The line reads a named parameter that no line has assigned.",
+        "Check its name. `EXISTS[#<name>]` says whether there is one.",
+    ),
+    #[cfg(feature = "language")]
+    (
+        ParametersFull,
+        "All places for parameters are in use: 400 numbers above 30 that are not 0, 64 names with 768 characters together.",
+        "Assign 0 to numbers that are no longer needed; use fewer or shorter names.",
+    ),
+    #[cfg(feature = "language")]
+    (
+        ExpressionInvalid,
+        "A bracket, an operator or a function is wrong or missing. Operators are allowed in brackets only: `X[#1+2]`.",
+        "Correct the expression.",
+    ),
+    #[cfg(feature = "language")]
+    (
+        ExpressionTooDeep,
+        "More than 16 brackets are open, or too many signs follow each other.",
+        "Split the expression: assign a part of it to a parameter.",
+    ),
+    #[cfg(feature = "language")]
+    (
+        ValueUndefined,
+        "A division by zero, a root or a logarithm of a number that has none, or a result that is not finite.",
+        "Check the values that the expression gets.",
+    ),
     (Alarmed, "An alarm is active.", "See alarms.md. Then `{clear:n}`."),
     (LimitHit, "A limit switch was hit.", "`{clear:n}`, move off the switch, home."),
     (

@@ -113,6 +113,16 @@ impl Block {
     #[inline(never)]
     #[small]
     pub fn read(&mut self, line: &[u8], deletes: bool) -> Result<(), Status> {
+        match self.begin(line, deletes)? {
+            Some(rest) => self.items(line, rest),
+            None => Ok(()),
+        }
+    }
+
+    /// Reads what stands before the items of a line. Returns the part of the line that is still to be read; `None` if
+    /// nothing is.
+    #[inline(always)]
+    pub fn begin<'a>(&mut self, line: &'a [u8], deletes: bool) -> Result<Option<&'a [u8]>, Status> {
         if line.len() > u8::MAX as usize {
             return Err(Status::InputTooLong);
         }
@@ -122,11 +132,11 @@ impl Block {
             self.slashed = mark == b'/';
             self.named = mark == b'%';
             if self.slashed && deletes {
-                return Ok(());
+                return Ok(None);
             }
             (rest, _) = lexer::blanks(after).map_err(status)?;
         }
-        self.items(line, rest)
+        Ok(Some(rest))
     }
 
     /// Reads the items of a line. `rest` is the part of the line that is still to be read.
@@ -145,7 +155,8 @@ impl Block {
         Ok(())
     }
 
-    fn word(&mut self, letter: u8, value: Decimal) -> Result<(), Status> {
+    /// Takes a word of the line.
+    pub fn word(&mut self, letter: u8, value: Decimal) -> Result<(), Status> {
         match letter {
             b'G' | b'M' => {
                 let is_g = letter == b'G';
@@ -212,7 +223,8 @@ impl Block {
         self.values.push((slot, value)).map_err(|_| Status::WordUnused)
     }
 
-    fn comment(&mut self, line: &[u8], text: &[u8]) {
+    /// Takes a comment of the line.
+    pub fn comment(&mut self, line: &[u8], text: &[u8]) {
         self.commented = true;
         if let Some(text) = lexer::message(text) {
             let start = line.offset(text);

@@ -12,10 +12,13 @@
 //! Cost on AVR: for a usual line see `fast_path`. For a typical G1 off the fast path, in millimetres or inches and
 //! with all its words and comments, at most 6,000 cycles (`tests/sim/tests/interpreter.rs`).
 
+use core::borrow::BorrowMut;
+
 use super::block::Block;
 use super::codes::NonModal;
 use super::command::{Commands, Spindle, Surface};
 use super::fast_path::Writer;
+use super::language::{self, Language};
 use super::modal::{Defaults, FeedMode, Modal, MotionMode, Plane, SpeedMode, Turn, Units, XMode};
 use super::printing::Kept;
 use super::setup::Setup;
@@ -43,9 +46,10 @@ pub struct Info {
 
 /// The state of the G-code interpreter, and the tables that outlast a program.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Interpreter<T = Ram> {
+pub struct Interpreter<T = Ram, L = Language> {
     pub(super) state: State,
-    tables: T,
+    pub(super) tables: T,
+    pub(super) language: L,
 }
 
 impl Interpreter {
@@ -58,11 +62,18 @@ impl Interpreter {
 impl<T> Interpreter<T> {
     /// Returns an interpreter at power-up whose tables are kept by `tables`.
     pub const fn with(tables: T) -> Self {
-        Self { state: State::new(&Defaults::USUAL), tables }
+        Self::with_language(tables, Language::new())
     }
 }
 
-impl<T: Tables> Interpreter<T> {
+impl<T, L> Interpreter<T, L> {
+    /// Returns an interpreter at power-up, as [`Self::with`] does, whose parameters are kept by `language`.
+    pub const fn with_language(tables: T, language: L) -> Self {
+        Self { state: State::new(&Defaults::USUAL), tables, language }
+    }
+}
+
+impl<T: Tables, L: BorrowMut<Language>> Interpreter<T, L> {
     /// Puts the default modes of the machine in force.
     pub fn start(&mut self, setup: &impl Setup) {
         self.state.modal = Modal::new(&setup.defaults());
@@ -150,16 +161,35 @@ impl<T: Tables> Interpreter<T> {
         out: &mut Commands,
     ) -> Result<Info, Status> {
         out.clear();
+        if Capability::Language.is_built_in() && language::is_needed(line) {
+            return self.computed(line, setup, out);
+        }
         let mut block = Block::new();
         let deletes = setup.deletes_blocks();
         let read = block.read(line, deletes);
         if let Err(status) = read.and_then(|()| block.check(self.state.modal.motion)) {
-            return if block.named { Ok(Info::default()) } else { Err(status) };
+            return if block.named {
+                Ok(Info::default())
+            } else {
+                Err(language::refusal(line, status))
+            };
         }
-        self.halve(&mut block);
-        self.execute_or_undo(&block, setup, out)?;
-        let lacks_length = self.state.lacks_length(&block);
-        let Block { message, slashed, commented, .. } = block;
+        self.finish(&mut block, deletes, setup, out)
+    }
+
+    /// Executes a block that has been read and checked.
+    #[inline(always)]
+    pub(super) fn finish(
+        &mut self,
+        block: &mut Block,
+        deletes: bool,
+        setup: &impl Setup,
+        out: &mut Commands,
+    ) -> Result<Info, Status> {
+        self.halve(block);
+        self.execute_or_undo(block, setup, out)?;
+        let lacks_length = self.state.lacks_length(block);
+        let Block { message, slashed, commented, .. } = *block;
         Ok(Info { message, deleted: slashed && deletes, commented, lacks_length })
     }
 
@@ -388,7 +418,7 @@ pub struct Offsets {
 }
 
 #[small]
-impl<T: Tables> Interpreter<T> {
+impl<T: Tables, L: BorrowMut<Language>> Interpreter<T, L> {
     /// Returns what lines in check mode may change. [`Self::give_back`] restores it afterwards.
     #[inline(never)]
     pub fn keep(&self) -> (Modes, Offsets) {
@@ -424,7 +454,7 @@ impl<T: Tables> Interpreter<T> {
 }
 
 /// Getters for reports, and setters for what the machine itself changes.
-impl<T> Interpreter<T> {
+impl<T, L> Interpreter<T, L> {
     /// Returns the modes in force.
     pub fn modal(&self) -> &Modal {
         &self.state.modal

@@ -21,6 +21,11 @@ mod digits;
 pub mod fast_path;
 pub mod heating;
 pub mod interpreter;
+#[cfg(feature = "language")]
+pub mod language;
+#[cfg(not(feature = "language"))]
+#[path = "language/absent.rs"]
+pub mod language;
 mod lexer;
 pub mod limits;
 pub mod modal;

@@ -278,7 +278,7 @@ impl State {
 }
 
 #[cfg(feature = "dialect-reprap")]
-impl<T> Interpreter<T> {
+impl<T, L> Interpreter<T, L> {
     /// Makes the words of the extruder relative or absolute (M83, M82), independently of the other axes. This lasts
     /// until G90 or G91.
     pub fn set_relative(&mut self, relative: bool) {
@@ -366,7 +366,7 @@ impl<T> Interpreter<T> {
     }
 }
 
-impl<T> Interpreter<T> {
+impl<T, L> Interpreter<T, L> {
     /// Returns the flow: the distance of the extruder in thousandths of what its words say.
     pub fn flow(&self) -> u16 {
         self.state.printing.flow()

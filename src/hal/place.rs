@@ -1,17 +1,18 @@
 //! Storage for values that live for ever, and for tasks. On the chip, which is one machine, they are statics. On the
 //! host they are on the heap, and each machine that a test makes gets its own.
 
-/// Returns memory for lines. An image has it once; on the host each machine gets its own.
-macro_rules! line_bytes {
-    ($len:expr) => {{
+/// Returns memory that begins as a constant, and is never moved. An image has it once; on the host each machine gets its
+/// own.
+macro_rules! memory {
+    ($type:ty, $value:expr) => {{
         #[cfg(target_os = "none")]
         {
-            static BYTES: static_cell::ConstStaticCell<[u8; $len]> =
-                static_cell::ConstStaticCell::new([0; $len]);
-            BYTES.take()
+            static MEMORY: static_cell::ConstStaticCell<$type> =
+                static_cell::ConstStaticCell::new($value);
+            MEMORY.take()
         }
         #[cfg(not(target_os = "none"))]
-        std::boxed::Box::leak(std::boxed::Box::new([0; $len]))
+        std::boxed::Box::leak(std::boxed::Box::new($value))
     }};
 }
 

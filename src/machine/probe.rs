@@ -48,6 +48,11 @@ impl Probe {
         self.at.get().get(usize::from(axis)).copied()
     }
 
+    /// Returns the position that [`Self::at`] returns, on all axes.
+    pub fn place(&self) -> PerAxis<Length> {
+        self.at.get()
+    }
+
     /// Records that a probing move begins.
     pub fn begin(&self) {
         self.state.set(ProbeState::Waiting);

@@ -271,6 +271,16 @@ pub trait Machine {
     /// Resumes what is held, or stopped by a program.
     fn go_on(&mut self) {}
 
+    /// Returns a byte of the text that the last line of G-code tells; `None` past its end, and in an image without
+    /// [`Capability::Language`](crate::capability::Capability).
+    fn said(&mut self, at: u8) -> Option<u8> {
+        let _ = at;
+        None
+    }
+
+    /// Forgets that text, when it has been told.
+    fn hush(&mut self) {}
+
     /// Whether lengths are in inches.
     #[inline(never)]
     #[small]

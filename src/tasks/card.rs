@@ -141,6 +141,7 @@ impl Feed {
     #[inline(never)]
     fn run(&mut self, links: &'static Links) -> bool {
         let (status, _) = run_block(links, links.told(), &self.line, false, false);
+        links.hush();
         if status == Status::Again {
             self.waits = true;
             return false;

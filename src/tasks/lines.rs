@@ -19,6 +19,7 @@ use entries::{Entries, Entry};
 use kerf_macros::small;
 
 use crate::gcode::comment::Aside;
+use crate::gcode::language;
 use crate::hal::LINES;
 use crate::hal::ring::Window;
 use crate::hal::serial::TAKEN_RETURN;
@@ -451,6 +452,17 @@ impl LinePool {
     fn keep_percent(&mut self) {
         self.keep_byte(b'%');
         self.besides = self.besides.wrapping_sub(1);
+    }
+
+    /// Adds a byte to the comment that is coming in, if the comment tells values. The sender does not count the byte with
+    /// the line.
+    #[inline(always)]
+    pub fn keep_aside(&mut self, byte: u8) {
+        let text = self.slice(self.end.into(), self.partial);
+        if self.fault.is_none() && language::is_telling(text) {
+            self.keep_byte(byte);
+            self.besides = self.besides.wrapping_sub(1);
+        }
     }
 
     /// Ends the line that is coming in if it is a question mark and `next` begins another line. Returns whether it

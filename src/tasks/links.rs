@@ -38,6 +38,7 @@ use crate::boards::outputs;
 use crate::config::Settings;
 use crate::gcode::command::Commands;
 use crate::gcode::interpreter::Interpreter;
+use crate::gcode::language::Placed;
 use crate::hal::Thread;
 use crate::hal::byte::SharedByte;
 use crate::hal::serial::PORTS;
@@ -103,7 +104,7 @@ pub struct Links {
     /// The commands for the planner; valid while `commands_taken`.
     pub commands: RefCell<Commands>,
     /// The G-code model. The parser advances it; reports read it.
-    pub model: RefCell<Interpreter<&'static Storage>>,
+    pub model: RefCell<Interpreter<&'static Storage, Placed>>,
     /// Settings in force.
     pub settings: RefCell<Settings>,
 }

@@ -21,7 +21,7 @@ use crate::units::Length;
 /// Returns the origin that the lines read so far have left.
 #[inline(never)]
 #[small]
-pub fn read<T>(settings: &Settings, model: &Interpreter<T>) -> Origin {
+pub fn read<T, L>(settings: &Settings, model: &Interpreter<T, L>) -> Origin {
     let mut offset = [Length::ZERO; MOTORS];
     for (motor, offset) in offset.iter_mut().enumerate() {
         let axis = axis_of(settings, motor);
@@ -42,11 +42,11 @@ fn axis_of(settings: &Settings, motor: usize) -> usize {
 /// the interpreter's.
 #[inline(never)]
 #[small]
-pub fn offset<T>(
+pub fn offset<T, L>(
     axis: usize,
     origin: &Origin,
     settings: &Settings,
-    model: &Interpreter<T>,
+    model: &Interpreter<T, L>,
 ) -> Length {
     let motor = (0..MOTORS).find(|motor| axis_of(settings, *motor) == axis);
     match motor.and_then(|motor| origin.offset.get(motor)) {
@@ -58,6 +58,6 @@ pub fn offset<T>(
 /// Returns how far the flow of lines read so far has moved the origin of an axis. It moves with each line, so no queued
 /// origin contains it.
 #[small]
-fn flowed<T>(axis: usize, model: &Interpreter<T>) -> i32 {
+fn flowed<T, L>(axis: usize, model: &Interpreter<T, L>) -> i32 {
     if axis == EXTRUDER { model.flowed() } else { 0 }
 }

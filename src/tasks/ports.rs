@@ -17,6 +17,7 @@ use super::lines::{Class, LineId, LinePool};
 use super::links::Links;
 use super::tx::Tx;
 use super::view::{Seen, View};
+use crate::capability::Capability;
 use crate::card;
 use crate::config::Settings;
 use crate::hal::event::{is_unheard, set_eager};
@@ -300,6 +301,22 @@ impl Links {
     #[small]
     pub fn set_position(&self, position: &PerAxis<Length>) {
         self.model.borrow_mut().set_position(position);
+    }
+
+    /// Tells the model where the last probing has ended, and whether by a contact.
+    #[inline(always)]
+    pub fn note_probe(&self, contact: bool) {
+        if Capability::Language.is_built_in() {
+            self.model.borrow_mut().note_probe(&self.probe.place(), contact);
+        }
+    }
+
+    /// Forgets what the last line of G-code tells: it has no answer.
+    #[inline(always)]
+    pub fn hush(&self) {
+        if Capability::Language.is_built_in() {
+            self.model.borrow_mut().hush();
+        }
     }
 
     /// Returns the port that gets unsolicited reports.

@@ -206,7 +206,12 @@ impl Intake {
             self.scan.pass(1);
             let is_line = match byte {
                 CUT | GO if cuts => false,
-                CUT | GO if pool.aside() != Aside::NONE => return Left::Aside,
+                CUT | GO if pool.aside() != Aside::NONE => {
+                    if byte == CUT {
+                        pool.keep_aside(b'%');
+                    }
+                    return Left::Aside;
+                }
                 CUT | GO => return Left::Placed(byte),
                 ..MARKS => self.loss(pool, byte, links),
                 // A line stood here that has overtaken. It has been counted already.

@@ -604,6 +604,16 @@ impl Machine for View<'_> {
         Status::Ok
     }
 
+    #[cfg(feature = "language")]
+    fn said(&mut self, at: u8) -> Option<u8> {
+        self.links.model.borrow().said().get(usize::from(at)).copied()
+    }
+
+    #[cfg(feature = "language")]
+    fn hush(&mut self) {
+        self.links.model.borrow_mut().hush();
+    }
+
     fn energize(&mut self, motor: Option<u8>, on: bool) -> Status {
         // Without power a motor that moves would lose its position.
         if !on && (self.has_work() || machine::is_checking()) {

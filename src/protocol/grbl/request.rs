@@ -9,6 +9,8 @@ use super::card;
 use super::command::{self, ALL, Command};
 use super::report::{LOWERED, Report, SLEEPS};
 use super::status::{BAD_JOG, BUSY, LOCKED, TOO_LONG, UNSUPPORTED, error_number};
+#[cfg(feature = "language")]
+use super::write::close;
 use super::write::{fixed, int, line_end, message, text};
 use super::{lists, settings};
 use crate::capability::Capability;
@@ -33,6 +35,9 @@ pub struct Request {
     begun: bool,
     /// The status report that comes before the rest of the answer.
     report: Option<Report>,
+    /// How much has been written of what the G-code tells.
+    #[cfg(feature = "language")]
+    said: u8,
 }
 
 /// The position after the last part of a list.
@@ -41,6 +46,9 @@ const END: u8 = u8::MAX;
 const DROPPED: u8 = 2;
 /// The line could not be kept.
 const REFUSED: u8 = 1;
+/// How much of what G-code tells is written in a step.
+#[cfg(feature = "language")]
+const SAID: u8 = 40;
 /// A setting, or all settings, are being written to memory.
 const STORES: u8 = 1;
 
@@ -63,25 +71,31 @@ impl Request {
         let command = command::of(line);
         let is_gcode = command == Command::Gcode;
         let block = is_gcode.then_some(Span { start: 0, end: line.len() as u8 });
-        Self { command, at: 0, status: Status::Ok, block, begun: false, report: None }
+        Self { block, ..Self::of(command) }
     }
 
     /// Starts to answer a line that could not be kept.
     pub(super) fn refused(status: Status) -> Self {
-        Self {
-            command: Command::Gcode,
-            at: REFUSED,
-            status,
-            block: None,
-            begun: false,
-            report: None,
-        }
+        Self { at: REFUSED, status, ..Self::of(Command::Gcode) }
     }
 
     /// Starts to answer a single `?`.
     pub(super) fn question() -> Self {
-        let (command, report) = (Command::Question, Some(Report::default()));
-        Self { command, at: 0, status: Status::Ok, block: None, begun: false, report }
+        Self { report: Some(Report::default()), ..Self::of(Command::Question) }
+    }
+
+    #[inline(always)]
+    fn of(command: Command) -> Self {
+        Self {
+            command,
+            at: 0,
+            status: Status::Ok,
+            block: None,
+            begun: false,
+            report: None,
+            #[cfg(feature = "language")]
+            said: 0,
+        }
     }
 }
 
@@ -109,6 +123,10 @@ impl Answers for Request {
         }
         if let Some(Span { start, end }) = self.block {
             return Next::Gcode { start, end };
+        }
+        #[cfg(feature = "language")]
+        if self.command == Command::Gcode && self.tell(machine, out) {
+            return Next::More;
         }
         match self.part(line, machine, out) {
             Step::At(at) => {
@@ -170,6 +188,32 @@ impl Answers for Request {
 
     fn is_list(&self) -> bool {
         matches!(self.command, Command::Settings | Command::Offsets)
+    }
+}
+
+#[cfg(feature = "language")]
+impl Request {
+    /// Writes a part of what the G-code tells. Returns false if there is none.
+    fn tell(&mut self, machine: &mut impl Machine, out: &mut impl Out) -> bool {
+        if self.status != Status::Ok || machine.said(0).is_none() {
+            return false;
+        }
+        if self.said == 0 {
+            text(out, text!("[MSG:"));
+            self.begun = true;
+        }
+        for _ in 0..SAID {
+            match machine.said(self.said) {
+                Some(byte) => out.put(if matches!(byte, b' '..=b'~') { byte } else { b'?' }),
+                None => {
+                    close(out);
+                    machine.hush();
+                    break;
+                }
+            }
+            self.said += 1;
+        }
+        true
     }
 }
 

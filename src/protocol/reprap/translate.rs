@@ -17,6 +17,7 @@
 //! G28 and other G10 are not translated: [`host`](super::host) performs them.
 
 use super::command;
+use crate::capability::Capability;
 use crate::protocol::Rewritten;
 use crate::status::Status;
 
@@ -39,7 +40,21 @@ pub fn block<'a>(block: &[u8], out: &'a mut Rewritten) -> Result<&'a [u8], Statu
         Some((b'G', 10)) => temperature(block, out)?,
         _ => copy(block, b"", false, out)?,
     }
-    Ok(out)
+    // Words of printing hosts have numbers alone: in an expression an E would be no extruder.
+    if Capability::Language.is_built_in() { only_numbers(out) } else { Ok(out) }
+}
+
+/// Refuses a block with a parameter, an expression or a second sign.
+fn only_numbers(block: &[u8]) -> Result<&[u8], Status> {
+    let mut before = 0;
+    for byte in command::Bytes::of(block) {
+        match (before, byte) {
+            (_, b'#' | b'[') => return Err(Status::NotBuiltIn),
+            (b'-' | b'+', b'-' | b'+') => return Err(Status::BadNumber),
+            _ => before = byte,
+        }
+    }
+    Ok(block)
 }
 
 /// Writes a code with the words of another block, but for those `without` which it goes.

@@ -136,6 +136,10 @@ impl Request {
 
     pub(super) fn message<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
         self.phase = Phase::Number;
+        #[cfg(feature = "language")]
+        if self.begin_said(c) {
+            return;
+        }
         let Some(start) = message_start(c.line, self.block.start, self.block.end) else {
             return;
         };
@@ -147,6 +151,44 @@ impl Request {
             let mut writer = Writer::message(c.out, &mut self.format);
             writer.key_text(text!("msg"));
             writer.byte(b'"');
+        }
+    }
+
+    /// Begins to write what the block tells. Returns false if it tells nothing.
+    #[cfg(feature = "language")]
+    fn begin_said<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) -> bool {
+        let tells = self.status == Status::Ok && c.machine.said(0).is_some();
+        if tells {
+            (self.item, self.phase) = (0, Phase::Said);
+            if !self.format.is_plain() {
+                let mut writer = Writer::message(c.out, &mut self.format);
+                writer.key_text(text!("msg"));
+                writer.byte(b'"');
+            }
+        }
+        tells
+    }
+
+    /// Writes what the block tells.
+    #[cfg(feature = "language")]
+    pub(super) fn said<M: Machine, O: Out>(&mut self, c: &mut Context<'_, M, O>) {
+        let plain = self.format.is_plain();
+        for _ in 0..super::CHUNK / 2 {
+            let byte = c.machine.said(self.item);
+            let mut writer = Writer::message(c.out, &mut self.format);
+            match byte {
+                Some(byte) if plain => writer.printable(byte),
+                Some(byte) => writer.escaped(byte),
+                None => {
+                    if !plain {
+                        writer.byte(b'"');
+                    }
+                    c.machine.hush();
+                    self.phase = Phase::Number;
+                    return;
+                }
+            }
+            self.item += 1;
         }
     }
 

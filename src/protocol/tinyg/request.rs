@@ -54,6 +54,9 @@ pub(super) enum Phase {
     BlockText,
     Message,
     MessageText,
+    /// Writes what the block tells.
+    #[cfg(feature = "language")]
+    Said,
     Number,
     /// All pairs are done, or one has failed: what remains to be reported.
     Warning,
@@ -313,6 +316,8 @@ impl Answers for Request {
             Phase::BlockText => self.block_text(context),
             Phase::Message => self.message(context),
             Phase::MessageText => self.message_text(context),
+            #[cfg(feature = "language")]
+            Phase::Said => self.said(context),
             Phase::Number => self.number(context),
             Phase::Warning => self.warning(context),
             Phase::Advice => self.advice(context),

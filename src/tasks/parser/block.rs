@@ -69,6 +69,7 @@ pub(super) fn job_line(links: &Links) {
             }
         }
     }
+    links.hush();
     links.job.set(job);
     links.reporter_wake.signal();
 }

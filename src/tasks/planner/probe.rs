@@ -106,6 +106,7 @@ impl Planner {
         if !self.is_flushed() {
             self.links.set_position(&self.position);
         }
+        self.links.note_probe(true);
         self.links.probe.tell(ProbeState::Touched);
     }
 
@@ -113,6 +114,7 @@ impl Planner {
     fn probe_failed(&self) {
         let links = self.links;
         links.probe.found(&self.position);
+        links.note_probe(false);
         links.probe.tell(ProbeState::Failed);
         let loudly = match &links.commands.borrow().motion {
             Motion::Probe { mode, .. } => {

@@ -1,5 +1,7 @@
 //! The rules that apply to every line.
 
+#[cfg(feature = "language")]
+use super::language;
 use super::{On, Rule, no, no_on};
 use crate::status::Status::{
     AxisConflict, AxisNotAllowed, BadNumber, GcodeUnsupported, InputTooLong, MalformedCommand,
@@ -22,12 +24,12 @@ in comments. `%` and `~` act anywhere except in comments. None of these bytes is
 that is no G-code is a name, as in `%prog1`, and has no effect either; G-code behind it runs. O and a number, as in \
 `O0001 (PART)`, have no effect. O words with a keyword, such as `O100 SUB`, are refused. In a hold `%` discards the \
 queue, and what follows is a line of its own.",
-        refusals: &[no(BadNumber, &["O100 SUB"]), no(MalformedCommand, &["G0 X1 #1=2"])],
+        refusals: &[no(BadNumber, &["O100 SUB"])],
     },
     Rule {
         title: "Words",
-        text: "A word is a letter and a decimal number, such as `X-1.5`. Exponents, expressions and parameters are not \
-supported. Lengths are exact to 0.0001 mm or degree.",
+        text: "A word is a letter and a decimal number, such as `X-1.5`, without an exponent. With the capability `language` a \
+parameter or an expression may stand in place of the number, except after N. Lengths are exact to 0.0001 mm or degree.",
         refusals: &[
             no(MalformedCommand, &["G0 X1.2.3"]),
             no(BadNumber, &["G0 X"]),
@@ -36,6 +38,12 @@ supported. Lengths are exact to 0.0001 mm or degree.",
             no(WordRepeated, &["G0 X1 X2"]),
         ],
     },
+    #[cfg(feature = "language")]
+    language::PARAMETERS,
+    #[cfg(feature = "language")]
+    language::LIVE,
+    #[cfg(feature = "language")]
+    language::EXPRESSIONS,
     Rule {
         title: "Codes",
         text: "A line may have one code of each modal group. A modal code stays active until another code of its group comes. \
@@ -97,6 +105,8 @@ behind a comment within it, because that text may be words. If a comment begins 
 the text after it.",
         refusals: &[no(MalformedCommand, &["G0 X1)"]), no(MalformedCommand, &["G0 X1 (a (b) Y1"])],
     },
+    #[cfg(feature = "language")]
+    language::TELLING,
     Rule {
         title: "Block delete",
         text: "A line that begins with `/` is skipped without a check and answered with status 3. With `{bd:0}` the slash has \

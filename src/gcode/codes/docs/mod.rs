@@ -4,6 +4,8 @@
 mod bores;
 mod cycles;
 mod heating;
+#[cfg(feature = "language")]
+mod language;
 mod lines;
 mod machine;
 mod markdown;
