@@ -136,6 +136,16 @@ pub enum Status {
     ExpressionTooDeep,
     #[cfg(feature = "language")]
     ValueUndefined,
+    #[cfg(feature = "language")]
+    OWordInvalid,
+    #[cfg(feature = "language")]
+    SubUnknown,
+    #[cfg(feature = "language")]
+    RecordFull,
+    #[cfg(feature = "language")]
+    FlowTooDeep,
+    #[cfg(feature = "language")]
+    FlowBroken,
     Alarmed,
     LimitHit,
     ShutDown,

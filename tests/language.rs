@@ -3,6 +3,7 @@
 
 use kerf::gcode::Interpreter;
 use kerf::gcode::command::Commands;
+use kerf::gcode::fast_path::Writer;
 use kerf::gcode::setup::Usual;
 use kerf::hal::imp::Machine;
 use kerf::status::Status;
@@ -356,6 +357,204 @@ fn random_text_gives_a_result() {
         }
         Ok(())
     });
+}
+
+/// A part of a random program. Each print counts, and conditions depend on the count.
+enum Part {
+    Print,
+    /// A condition: the label, the divisor and the remainder of the count, both branches.
+    If(u32, u64, u64, Vec<Part>, Vec<Part>),
+    /// A loop: the label, the passes, the body.
+    Repeat(u32, u64, Vec<Part>),
+    While(u32, u64, Vec<Part>),
+    Do(u32, u64, Vec<Part>),
+    Call(usize),
+    /// Leaves the loop of a label, or goes on with its next pass.
+    Leave(u32, bool),
+    Return,
+}
+
+/// How a body has ended in the model.
+#[derive(Clone, Copy, PartialEq)]
+enum End {
+    Usual,
+    Leave(u32, bool),
+    Return,
+    /// There is too much to run.
+    Late,
+}
+
+struct Maker {
+    random: Random,
+    label: u32,
+    subs: usize,
+    in_sub: bool,
+}
+
+impl Maker {
+    fn body(&mut self, depth: u8, loops: &mut Vec<u32>) -> Vec<Part> {
+        (0..1 + self.random.below(3)).map(|_| self.part(depth, loops)).collect()
+    }
+
+    fn part(&mut self, depth: u8, loops: &mut Vec<u32>) -> Part {
+        self.label += 1;
+        let (label, count) = (self.label, self.random.below(4));
+        match self.random.below(12) {
+            _ if depth == 0 => Part::Print,
+            0..3 => {
+                let (by, rest) = (2 + self.random.below(3), self.random.below(2));
+                Part::If(label, by, rest, self.body(depth - 1, loops), self.body(depth - 1, loops))
+            }
+            3 => Part::Repeat(label, count, self.body(depth - 1, loops)),
+            4..6 => {
+                loops.push(label);
+                let body = self.body(depth - 1, loops);
+                loops.pop();
+                if count % 2 == 0 { Part::While(label, 3, body) } else { Part::Do(label, 2, body) }
+            }
+            6 if self.subs > 0 => Part::Call(self.random.below(self.subs as u64) as usize),
+            7 if !loops.is_empty() && depth < 3 => {
+                let of = loops[self.random.below(loops.len() as u64) as usize];
+                Part::Leave(of, count > 1)
+            }
+            8 if self.in_sub && depth < 3 => Part::Return,
+            _ => Part::Print,
+        }
+    }
+}
+
+/// Writes the lines of a body.
+fn write(body: &[Part], out: &mut Vec<String>) {
+    for part in body {
+        match part {
+            Part::Print => out.push("#50 = [#50 + 1] (print,%d#50)".into()),
+            Part::If(label, by, rest, yes, no) => {
+                out.push(format!("o{label} if [#50 MOD {by} EQ {rest}] (note)"));
+                write(yes, out);
+                out.push(format!("O{label} ELSE"));
+                write(no, out);
+                out.push(format!("o{label} endif"));
+            }
+            Part::Repeat(label, count, body) => {
+                out.push(format!("o{label} repeat [{count}]"));
+                write(body, out);
+                out.push(format!("o{label} endrepeat"));
+            }
+            Part::While(label, passes, body) => {
+                out.push(format!("#<c{label}>=0"));
+                out.push(format!("o<{label}> while [#<c{label}> LT {passes}]"));
+                out.push(format!("#<c{label}>=[#<c{label}>+1]"));
+                write(body, out);
+                out.push(format!("o<{label}> endwhile"));
+            }
+            Part::Do(label, passes, body) => {
+                out.push(format!("#<c{label}>=0"));
+                out.push(format!("o<{label}> do"));
+                out.push(format!("#<c{label}>=[#<c{label}>+1]"));
+                write(body, out);
+                out.push(format!("o<{label}> while [#<c{label}> LT {passes}]"));
+            }
+            Part::Call(sub) => out.push(format!("o<sub{sub}> call")),
+            Part::Leave(label, true) => out.push(format!("o<{label}> break")),
+            Part::Leave(label, false) => out.push(format!("o<{label}> continue")),
+            Part::Return => out.push("o<sub> return".into()),
+        }
+    }
+}
+
+/// Runs a body in the model. `count` is the number of prints.
+fn run(body: &[Part], subs: &[Vec<Part>], count: &mut u64) -> End {
+    for part in body {
+        let end = match part {
+            _ if *count > 150 => End::Late,
+            Part::Print => {
+                *count += 1;
+                End::Usual
+            }
+            Part::If(_, by, rest, yes, no) => {
+                run(if *count % by == *rest { yes } else { no }, subs, count)
+            }
+            Part::Repeat(_, passes, body) => {
+                let ends = (0..*passes).map(|_| run(body, subs, count));
+                ends.into_iter().find(|end| *end != End::Usual).unwrap_or(End::Usual)
+            }
+            Part::While(label, passes, body) | Part::Do(label, passes, body) => {
+                let mut ended = End::Usual;
+                for _ in 0..*passes {
+                    match run(body, subs, count) {
+                        End::Leave(of, true) if of == *label => break,
+                        End::Leave(of, false) if of == *label => {}
+                        End::Usual => {}
+                        end => {
+                            ended = end;
+                            break;
+                        }
+                    }
+                }
+                ended
+            }
+            Part::Call(sub) => match run(&subs[*sub], subs, count) {
+                End::Late => End::Late,
+                _ => End::Usual,
+            },
+            Part::Leave(label, leaves) => End::Leave(*label, *leaves),
+            Part::Return => End::Return,
+        };
+        if end != End::Usual {
+            return end;
+        }
+    }
+    End::Usual
+}
+
+/// Compares a random program with the model.
+fn compare_program(seed: u64) -> Result<(), String> {
+    let mut maker = Maker { random: Random::new(seed), label: 0, subs: 0, in_sub: true };
+    let mut subs = Vec::new();
+    for _ in 0..maker.random.below(4) {
+        subs.push(maker.body(2, &mut Vec::new()));
+        maker.subs += 1;
+    }
+    maker.in_sub = false;
+    let main: Vec<_> = (0..4).map(|_| maker.part(3, &mut Vec::new())).collect();
+    let (mut lines, mut expected) = (vec![String::from("#50=0")], 0);
+    for (n, body) in subs.iter().enumerate() {
+        lines.push(format!("o<sub{n}> sub"));
+        write(body, &mut lines);
+        lines.push(format!("o<sub{n}> endsub"));
+    }
+    write(&main, &mut lines);
+    if run(&main, &subs, &mut expected) == End::Late || lines.concat().len() > 4_000 {
+        return Ok(());
+    }
+    let (mut interpreter, mut out, mut heard) = (Interpreter::new(), Commands::default(), 0);
+    for line in &lines {
+        loop {
+            if let Err(status) = interpreter.interpret(line.as_bytes(), &Usual, &mut out) {
+                return Err(format!("{line}: {status:?} in\n{}", lines.join("\n")));
+            }
+            if !interpreter.said().is_empty() {
+                heard += 1;
+                if interpreter.said() != format!("{heard}").as_bytes() {
+                    return Err(format!("{line}: another count in\n{}", lines.join("\n")));
+                }
+                interpreter.hush();
+            }
+            if !interpreter.is_replay() {
+                break;
+            }
+        }
+    }
+    let rests = interpreter.fast_path(b"G0X1", Writer::Numbers, &Usual, &mut out);
+    match heard == expected && rests {
+        true => Ok(()),
+        false => Err(format!("{heard} and not {expected}, {rests}, in\n{}", lines.join("\n"))),
+    }
+}
+
+#[test]
+fn random_programs_run_as_a_model_says() {
+    try_all(2_000, compare_program);
 }
 
 /// The firmware, with lines that are to take as much room and time as lines can.

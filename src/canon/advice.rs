@@ -389,7 +389,7 @@ const ADVICE: &[(Status, &str, &str)] = &[
     #[cfg(feature = "language")]
     (
         ParametersFull,
-        "All places for parameters are in use: 400 numbers above 30 that are not 0, 64 names with 768 characters together.",
+        "All places for parameters are in use: 256 numbers above 30 that are not 0, 64 names with 768 characters together.",
         "Assign 0 to numbers that are no longer needed; use fewer or shorter names.",
     ),
     #[cfg(feature = "language")]
@@ -409,6 +409,36 @@ const ADVICE: &[(Status, &str, &str)] = &[
         ValueUndefined,
         "A division by zero, a root or a logarithm of a number that has none, or a result that is not finite.",
         "Check the values that the expression gets.",
+    ),
+    #[cfg(feature = "language")]
+    (
+        OWordInvalid,
+        "The keyword is unknown or lacks something, or no block of its label is open. BREAK and CONTINUE are for WHILE and DO; no SUB may be within a block.",
+        "Check the labels, and that each block has its end.",
+    ),
+    #[cfg(feature = "language")]
+    (
+        SubUnknown,
+        "The line calls a subroutine that has not come since the last M2 or M30.",
+        "Send the subroutine before its call.",
+    ),
+    #[cfg(feature = "language")]
+    (
+        RecordFull,
+        "A loop or a subroutine has more lines than there is room for (4,096 characters), or there are more than 24 subroutines. All is refused up to its end.",
+        "Make the loop shorter, or have the CAM program write the moves out. M2 forgets all subroutines.",
+    ),
+    #[cfg(feature = "language")]
+    (
+        FlowTooDeep,
+        "More than 9 calls or 20 blocks are within each other, or the calls have too many arguments.",
+        "Check that a subroutine that calls itself ends.",
+    ),
+    #[cfg(feature = "language")]
+    (
+        FlowBroken,
+        "A line before this one was refused, so that the loop or subroutine is not complete. All its lines are refused.",
+        "Correct the refused line and send the program again. M2 or the end of the loop ends the refusal.",
     ),
     (Alarmed, "An alarm is active.", "See alarms.md. Then `{clear:n}`."),
     (LimitHit, "A limit switch was hit.", "`{clear:n}`, move off the switch, home."),

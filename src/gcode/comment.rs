@@ -6,6 +6,8 @@
 
 use kerf_macros::small;
 
+use crate::capability::Capability;
+
 /// Whether a place in a line is in a comment.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Aside(u8);
@@ -45,6 +47,34 @@ pub fn length(text: &[u8]) -> usize {
     text.iter().position(ends).unwrap_or(text.len())
 }
 
+/// What a comment tells the sender.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Kind {
+    /// `(PRINT,..)`.
+    Print,
+    /// `(DEBUG,..)`, which can be switched off.
+    Debug,
+}
+
+/// Returns what a comment does that tells values, and its text. `None` for any other comment.
+pub fn kind(comment: &[u8]) -> Option<(Kind, &[u8])> {
+    let comment = comment.trim_ascii_start();
+    let begins = |word: &[u8]| {
+        let (start, rest) = comment.split_at_checked(word.len())?;
+        start.eq_ignore_ascii_case(word).then_some(rest)
+    };
+    let print = begins(b"PRINT,").map(|rest| (Kind::Print, rest));
+    print.or_else(|| begins(b"DEBUG,").map(|rest| (Kind::Debug, rest)))
+}
+
+/// Whether the last comment of a text tells values. Never in an image without the language.
+#[inline(always)]
+pub fn is_telling(text: &[u8]) -> bool {
+    let begin = || text.iter().rposition(|byte| *byte == b'(');
+    Capability::Language.is_built_in()
+        && begin().and_then(|at| text.get(at + 1..)).is_some_and(|text| kind(text).is_some())
+}
+
 /// Returns a line without the byte order mark of UTF-8 that editors put in front of a file.
 #[inline(never)]
 #[small]
@@ -82,5 +112,13 @@ mod tests {
             let aside = text.bytes().fold(Aside::NONE, Aside::after);
             assert_eq!(aside, Aside::NONE, "{depth}");
         }
+    }
+
+    #[test]
+    fn kinds_of_comments() {
+        assert_eq!(kind(b"  print,a"), Some((Kind::Print, &b"a"[..])));
+        assert_eq!(kind(b"DEBUG, a"), Some((Kind::Debug, &b" a"[..])));
+        assert_eq!(kind(b"print a"), None);
+        assert_eq!(kind(b"MSG,a"), None);
     }
 }

@@ -148,6 +148,9 @@ impl<T: Tables, L: BorrowMut<Language>> Interpreter<T, L> {
         setup: &impl Setup,
         out: &mut Commands,
     ) -> bool {
+        if Capability::Language.is_built_in() && self.takes_all() {
+            return false;
+        }
         self.state.fast_path(line, writer, setup, out)
     }
 
@@ -161,7 +164,7 @@ impl<T: Tables, L: BorrowMut<Language>> Interpreter<T, L> {
         out: &mut Commands,
     ) -> Result<Info, Status> {
         out.clear();
-        if Capability::Language.is_built_in() && language::is_needed(line) {
+        if Capability::Language.is_built_in() && (self.has_flow() || language::is_needed(line)) {
             return self.computed(line, setup, out);
         }
         let mut block = Block::new();

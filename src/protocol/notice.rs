@@ -1,5 +1,7 @@
 //! What the machine reports without being asked.
 
+#[cfg(feature = "language")]
+use crate::protocol::{Machine, Out};
 use crate::status::Status;
 
 /// Something to report.
@@ -18,6 +20,9 @@ pub enum Notice {
     /// A line of a file of the SD card has been refused: its number, and why.
     #[cfg(feature = "sd")]
     FileLine(u32, Status),
+    /// A line of G-code that is replayed tells something.
+    #[cfg(feature = "language")]
+    Said,
     /// A status report.
     Status,
     /// A jog has ended, the queue has been flushed, or both.
@@ -46,4 +51,18 @@ pub enum Occasion {
     Defaults,
     /// The machine is ready.
     Ready,
+}
+
+/// Writes what a line of G-code tells, in characters that need no escape.
+#[cfg(feature = "language")]
+pub fn put_said(machine: &mut impl Machine, out: &mut impl Out) {
+    let mut at = 0;
+    while let Some(byte) = machine.said(at) {
+        out.put(match byte {
+            b'"' | b'\\' => b'\'',
+            b' '..=b'~' => byte,
+            _ => b'?',
+        });
+        at += 1;
+    }
 }

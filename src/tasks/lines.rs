@@ -18,8 +18,7 @@ mod entries;
 use entries::{Entries, Entry};
 use kerf_macros::small;
 
-use crate::gcode::comment::Aside;
-use crate::gcode::language;
+use crate::gcode::comment::{Aside, is_telling};
 use crate::hal::LINES;
 use crate::hal::ring::Window;
 use crate::hal::serial::TAKEN_RETURN;
@@ -459,7 +458,7 @@ impl LinePool {
     #[inline(always)]
     pub fn keep_aside(&mut self, byte: u8) {
         let text = self.slice(self.end.into(), self.partial);
-        if self.fault.is_none() && language::is_telling(text) {
+        if self.fault.is_none() && is_telling(text) {
             self.keep_byte(byte);
             self.besides = self.besides.wrapping_sub(1);
         }

@@ -164,6 +164,10 @@ impl Parser {
             false
         };
         self.lacking = 0;
+        #[cfg(feature = "language")]
+        if links.is_telling() && tell_at_once(links, links.feeder(), Notice::Said) {
+            links.hush();
+        }
         if self.has_work() && self.go_on() {
             return Turn::More;
         }
@@ -171,7 +175,13 @@ impl Parser {
             return Turn::More;
         }
         match self.next_line(data) {
-            Some(chosen) => self.take(chosen, declined),
+            Some(chosen) => {
+                self.take(chosen, declined);
+                // Lines of a replay that move nothing leave the CPU to others until the next millisecond.
+                if links.is_replay() && is_free(links) {
+                    return Turn::Nothing;
+                }
+            }
             None if free && runs_job && !links.job.get().is_over() && !waits_for_jog(links) => {
                 if !has_room_for_startup(links) {
                     self.lacking |= 1 << links.told().number;
@@ -429,7 +439,7 @@ impl Parser {
             state |= 1;
             let woken = links.parser_wake.poll(cx);
             let mut ready = woken.is_ready();
-            if self.deferred != Deferred::No || jogs {
+            if self.deferred != Deferred::No || jogs || links.is_replay() {
                 ready |= waited;
                 wake_after(links.thread, Event::Tick, cx.waker());
             }

@@ -724,6 +724,9 @@ impl Planner {
         #[cfg(feature = "sd")]
         links.card.borrow_mut().interrupt();
         let (cycle, killed) = machine::dropped();
+        if cycle != Cycle::Jog {
+            links.end_flow();
+        }
         match cycle {
             Cycle::Jog => links.notices.jogged.set(true),
             Cycle::Homing => {

@@ -311,6 +311,26 @@ impl Links {
         }
     }
 
+    /// Ends loops and calls of G-code, and forgets subroutines.
+    #[inline(always)]
+    pub fn end_flow(&self) {
+        if Capability::Language.is_built_in() {
+            self.model.borrow_mut().end_flow();
+        }
+    }
+
+    /// Whether the next line of G-code comes from a record.
+    #[inline(always)]
+    pub fn is_replay(&self) -> bool {
+        Capability::Language.is_built_in() && self.model.borrow().is_replay()
+    }
+
+    /// Whether a line of a replay tells something. The next one waits until that has been told.
+    #[inline(always)]
+    pub fn is_telling(&self) -> bool {
+        Capability::Language.is_built_in() && self.model.borrow().is_telling()
+    }
+
     /// Forgets what the last line of G-code tells: it has no answer.
     #[inline(always)]
     pub fn hush(&self) {

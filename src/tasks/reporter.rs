@@ -413,6 +413,8 @@ pub fn tell_at_once(links: &Links, port: &Port, notice: Notice) -> bool {
         Notice::Exception(status) => status != Status::BufferFull,
         #[cfg(feature = "sd")]
         Notice::FileLine(..) => true,
+        #[cfg(feature = "language")]
+        Notice::Said => true,
         _ => matches!(notice, Notice::Greeting(_)),
     };
     let fits = if is_long { tx.is_empty() } else { tx.has_room() };

@@ -33,12 +33,6 @@ pub fn is_needed(_line: &[u8]) -> bool {
     false
 }
 
-/// Whether a text ends in a comment that tells values: no.
-#[inline(always)]
-pub fn is_telling(_text: &[u8]) -> bool {
-    false
-}
-
 /// Returns the status with which a line is refused that is no valid one.
 #[inline(never)]
 #[small]
@@ -56,6 +50,34 @@ impl<T, L> Interpreter<T, L> {
     /// Does nothing.
     #[inline(always)]
     pub fn hush(&mut self) {}
+
+    /// Returns no.
+    #[inline(always)]
+    pub(super) fn has_flow(&self) -> bool {
+        false
+    }
+
+    /// Returns no.
+    #[inline(always)]
+    pub(super) fn takes_all(&self) -> bool {
+        false
+    }
+
+    /// Returns no.
+    #[inline(always)]
+    pub fn is_replay(&self) -> bool {
+        false
+    }
+
+    /// Returns no.
+    #[inline(always)]
+    pub fn is_telling(&self) -> bool {
+        false
+    }
+
+    /// Does nothing.
+    #[inline(always)]
+    pub fn end_flow(&mut self) {}
 
     /// Never called.
     #[inline(always)]

@@ -6,16 +6,16 @@
 use heapless::Vec;
 
 use super::super::block::Block;
+use super::super::comment::{self, Kind};
 use super::super::lexer::{self, Fault, Item};
 use super::super::number::decimal;
 use super::super::tables::Tables;
+use super::Language;
 use super::expression::{Scope, parameter, value};
 use super::live::{Live, is_read_only};
 use super::number;
 use super::parameters::NUMBER_MAX;
-use super::said::{self, Kind};
 use super::text::{Name, Text};
-use super::{Language, live};
 use crate::status::Status;
 
 /// The most assignments of a line.
@@ -32,10 +32,8 @@ pub enum Target<'a> {
 
 /// A line that is being read.
 pub struct Line<'a, 'm, T> {
-    /// The parameters.
-    pub language: &'m Language,
-    /// The state of the machine.
-    pub live: Live<'m, T>,
+    /// The parameters before it.
+    pub known: Known<'m, T>,
     /// What the line assigns, in its order.
     pub assigned: Vec<(Target<'a>, f64), ASSIGNED>,
     /// What the last comment tells.
@@ -78,7 +76,10 @@ impl<'a, T: Tables> Line<'a, '_, T> {
         let value = value(&mut text, self)?;
         let read_only = match target {
             Target::Number(number) => is_read_only(number),
-            Target::Name(name) => self.live.named(name).is_some(),
+            Target::Name(name) => {
+                let known = &self.known;
+                known.live.named(name).or_else(|| known.language.called(name)).is_some()
+            }
         };
         if read_only {
             return Err(Status::ParameterReadOnly);
@@ -98,7 +99,7 @@ impl<'a, T: Tables> Line<'a, '_, T> {
         if let Item::Comment(text) = item {
             block.comment(line, text);
             // Text behind a semicolon tells nothing.
-            self.said = said::kind(text).filter(|_| rest.first() == Some(&b'('));
+            self.said = comment::kind(text).filter(|_| rest.first() == Some(&b'('));
         }
         Ok(after)
     }
@@ -120,7 +121,7 @@ impl<'a, T: Tables> Line<'a, '_, T> {
 
     /// Checks that there is room for what the line assigns.
     pub fn check_room(&self) -> Result<(), Status> {
-        let (numbered, named) = (&self.language.numbered, &self.language.named);
+        let (numbered, named) = (&self.known.language.numbered, &self.known.language.named);
         let numbers = self.assigned.iter().filter(|(target, value)| match target {
             Target::Number(number) => *value != 0.0 && numbered.lacks(*number),
             Target::Name(_) => false,
@@ -135,7 +136,15 @@ impl<'a, T: Tables> Line<'a, '_, T> {
     }
 }
 
-impl<T: Tables> Scope for Line<'_, '_, T> {
+/// The parameters as they are.
+pub struct Known<'a, T> {
+    /// The parameters.
+    pub language: &'a Language,
+    /// The state of the machine.
+    pub live: Live<'a, T>,
+}
+
+impl<T: Tables> Scope for Known<'_, T> {
     fn numbered(&self, number: u16) -> Result<f64, Status> {
         match number {
             0 | NUMBER_MAX.. if number != NUMBER_MAX => Err(Status::ParameterInvalid),
@@ -145,11 +154,8 @@ impl<T: Tables> Scope for Line<'_, '_, T> {
     }
 
     fn named(&self, name: Name) -> Option<f64> {
-        let known = self.live.named(name).or_else(|| self.language.named.get(name));
-        // A name that the line itself is going to assign is 0 before that.
-        let is_assigned =
-            |target: &Target| matches!(target, Target::Name(other) if name.is(*other));
-        known.or_else(|| self.assigned.iter().any(|(target, _)| is_assigned(target)).then_some(0.0))
+        let live = self.live.named(name).or_else(|| self.language.called(name));
+        live.or_else(|| self.language.named.get(name))
     }
 
     fn has(&self, number: f64) -> bool {
@@ -157,28 +163,21 @@ impl<T: Tables> Scope for Line<'_, '_, T> {
     }
 }
 
-/// The parameters when a line has been carried out: its comment tells of them.
-pub struct After<'a, T> {
-    /// The parameters.
-    pub language: &'a Language,
-    /// The state of the machine before the line.
-    pub live: live::Live<'a, T>,
-}
-
-impl<T: Tables> Scope for After<'_, T> {
+impl<T: Tables> Scope for Line<'_, '_, T> {
     fn numbered(&self, number: u16) -> Result<f64, Status> {
-        Ok(match is_read_only(number) {
-            true => self.live.numbered(number),
-            false => self.language.get(number),
-        })
+        self.known.numbered(number)
     }
 
     fn named(&self, name: Name) -> Option<f64> {
-        self.live.named(name).or_else(|| self.language.named.get(name))
+        // A name that the line itself is going to assign is 0 before that.
+        let is_assigned =
+            |target: &Target| matches!(target, Target::Name(other) if name.is(*other));
+        let assigned = || self.assigned.iter().any(|(target, _)| is_assigned(target));
+        self.known.named(name).or_else(|| assigned().then_some(0.0))
     }
 
-    fn has(&self, _number: f64) -> bool {
-        false
+    fn has(&self, number: f64) -> bool {
+        self.known.has(number)
     }
 }
 

@@ -14,7 +14,7 @@ pub const NUMBER_MAX: u16 = 5_601;
 /// The numbers up to this one have a place of their own. They are the arguments of subroutines.
 pub const ARGUMENTS: usize = 30;
 /// How many parameters with higher numbers may be other than 0.
-pub const NUMBERED: usize = 400;
+pub const NUMBERED: usize = 256;
 /// Places that are kept free for those that a probing sets.
 const RESERVED: usize = 10;
 const PLACES: usize = NUMBERED + RESERVED;
@@ -49,6 +49,11 @@ impl Numbered {
     /// Returns how many more parameters lines may make other than 0.
     pub fn room(&self) -> usize {
         NUMBERED.saturating_sub(self.count.into())
+    }
+
+    /// Returns the arguments.
+    fn arguments(&mut self) -> &mut [f64; ARGUMENTS] {
+        &mut self.arguments
     }
 
     /// Whether a parameter has no place yet.
@@ -97,13 +102,73 @@ impl Numbered {
     }
 }
 
+/// How many arguments of callers that are not 0 may be kept.
+const SAVED: usize = 96;
+
+/// The arguments of callers, those that are not 0.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Saved {
+    /// The level of calls, and the place of the argument.
+    of: [(u8, u8); SAVED],
+    values: [f64; SAVED],
+    count: u8,
+}
+
+impl Saved {
+    /// No arguments.
+    pub const NONE: Self = Self { of: [(0, 0); SAVED], values: [0.0; SAVED], count: 0 };
+
+    /// Checks that there is room for the arguments.
+    pub fn check_room(&self, numbered: &Numbered) -> Result<(), Status> {
+        let more = numbered.arguments.iter().filter(|value| **value != 0.0).count();
+        if usize::from(self.count) + more > SAVED { Err(Status::FlowTooDeep) } else { Ok(()) }
+    }
+
+    /// Takes the arguments, so that all are 0. The caller has [checked](Self::check_room) the room. `level` is that of
+    /// the call.
+    pub fn save(&mut self, numbered: &mut Numbered, level: u8) {
+        for (at, value) in numbered.arguments().iter_mut().enumerate() {
+            let count = usize::from(self.count);
+            if *value != 0.0
+                && let (Some(of), Some(kept)) = (self.of.get_mut(count), self.values.get_mut(count))
+            {
+                (*of, *kept) = ((level, at as u8), *value);
+                self.count += 1;
+            }
+            *value = 0.0;
+        }
+    }
+
+    /// Gives the arguments back that a call of this level has taken.
+    pub fn restore(&mut self, numbered: &mut Numbered, level: u8) {
+        *numbered.arguments() = [0.0; ARGUMENTS];
+        while let Some(last) = usize::from(self.count).checked_sub(1)
+            && let (Some(of), Some(kept)) = (self.of.get_mut(last), self.values.get_mut(last))
+            && of.0 == level
+        {
+            if let Some(value) = numbered.arguments().get_mut(usize::from(of.1)) {
+                *value = *kept;
+            }
+            (*of, *kept) = ((0, 0), 0.0);
+            self.count -= 1;
+        }
+    }
+}
+
 /// A named parameter.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct Entry {
     /// Where in the text of all names its name begins.
     start: u16,
     length: u8,
+    /// The level of calls that knows it. Globals are of level 0.
+    level: u8,
     value: f64,
+}
+
+impl Entry {
+    /// In places that are not in use.
+    const NONE: Self = Self { start: 0, length: 0, level: 0, value: 0.0 };
 }
 
 /// The parameters with names.
@@ -113,16 +178,14 @@ pub struct Named {
     count: u8,
     text: [u8; NAMES],
     used: u16,
+    /// The level of calls.
+    level: u8,
 }
 
 impl Named {
     /// No parameters.
-    pub const NONE: Self = Self {
-        entries: [Entry { start: 0, length: 0, value: 0.0 }; NAMED],
-        count: 0,
-        text: [0; NAMES],
-        used: 0,
-    };
+    pub const NONE: Self =
+        Self { entries: [Entry::NONE; NAMED], count: 0, text: [0; NAMES], used: 0, level: 0 };
 
     /// Returns the value of a parameter.
     pub fn get(&self, name: Name) -> Option<f64> {
@@ -148,7 +211,46 @@ impl Named {
 
     fn find(&self, name: Name) -> Option<usize> {
         let entries = self.entries.get(..self.count.into()).unwrap_or_default();
-        entries.iter().position(|entry| name.bytes().eq(self.text_of(entry).iter().copied()))
+        let level = self.level_of(name);
+        let is = |entry: &Entry| {
+            entry.level == level && name.bytes().eq(self.text_of(entry).iter().copied())
+        };
+        entries.iter().position(is)
+    }
+
+    fn level_of(&self, name: Name) -> u8 {
+        if name.is_global() { 0 } else { self.level }
+    }
+
+    /// Begins a call, which knows no local parameters yet.
+    pub fn enter(&mut self) {
+        self.level += 1;
+    }
+
+    /// Ends a call: its local parameters go.
+    pub fn leave(&mut self) {
+        let Self { entries, count, text, used, level } = self;
+        let mut at = 0;
+        while let Some(entry) = entries.get(at).copied().filter(|_| at < usize::from(*count)) {
+            if entry.level != *level {
+                at += 1;
+                continue;
+            }
+            let (start, length) = (usize::from(entry.start), usize::from(entry.length));
+            text.copy_within(start + length..usize::from(*used), start);
+            *used -= u16::from(entry.length);
+            if let Some(free) = text.get_mut(usize::from(*used)..usize::from(*used) + length) {
+                free.fill(0);
+            }
+            entries.copy_within(at + 1..usize::from(*count), at);
+            *count -= 1;
+            if let Some(last) = entries.get_mut(usize::from(*count)) {
+                *last = Entry::NONE;
+            }
+            let behind = entries.iter_mut().take(usize::from(*count)).skip(at);
+            behind.for_each(|entry| entry.start -= length as u16);
+        }
+        *level = level.saturating_sub(1);
     }
 
     fn text_of(&self, entry: &Entry) -> &[u8] {
@@ -165,7 +267,8 @@ impl Named {
             end += 1;
         }
         let length = u8::try_from(end - start).ok()?;
-        *self.entries.get_mut(at)? = Entry { start, length, value: 0.0 };
+        *self.entries.get_mut(at)? =
+            Entry { start, length, level: self.level_of(name), value: 0.0 };
         (self.count, self.used) = (self.count + 1, end);
         Some(at)
     }
@@ -184,7 +287,7 @@ mod tests {
         for n in 0..5_000u32 {
             number = number * 1_103 % 5_601;
             let value = if n % 3 == 0 { 0.0 } else { f64::from(n) };
-            let at = number as u16 % 400 + 1;
+            let at = number as u16 % 256 + 1;
             numbered.set(at, value);
             model.insert(at, value);
         }
@@ -205,9 +308,9 @@ mod tests {
         }
         assert_eq!(numbered.room(), 0);
         numbered.set(5_000, 1.0);
-        assert_eq!((numbered.get(5_000), numbered.get(440)), (0.0, 1.0));
-        numbered.set(430, 2.0);
-        assert_eq!(numbered.get(430), 2.0);
+        assert_eq!((numbered.get(5_000), numbered.get(296)), (0.0, 1.0));
+        numbered.set(290, 2.0);
+        assert_eq!(numbered.get(290), 2.0);
     }
 
     #[test]

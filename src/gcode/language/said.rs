@@ -8,10 +8,10 @@ use heapless::Vec;
 
 use super::expression::Scope;
 use super::parameters::NUMBER_MAX;
-use super::text::{Name, Text};
+use super::text::Name;
 
 /// The longest text.
-pub const LONGEST: usize = 120;
+pub const LONGEST: usize = 100;
 /// What is written in place of a value that does not exist.
 const NONE: &[u8] = b"######";
 /// Decimals, unless a format says otherwise.
@@ -20,27 +20,6 @@ const DECIMALS: usize = 6;
 const DIGITS: usize = 20;
 /// Values nearer to 0 are written as 0.
 const NOTHING: f64 = 1e-6;
-
-/// What a comment does.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Kind {
-    /// `(PRINT,..)`.
-    Print,
-    /// `(DEBUG,..)`, which can be switched off.
-    Debug,
-}
-
-/// Returns what a comment does, and its text. `None` for a comment that does nothing.
-pub fn kind(comment: &[u8]) -> Option<(Kind, &[u8])> {
-    let mut text = Text::new(comment);
-    text.peek();
-    let begins = |word: &[u8]| {
-        let (start, rest) = text.rest().split_at_checked(word.len())?;
-        start.eq_ignore_ascii_case(word).then_some(rest)
-    };
-    let print = begins(b"PRINT,").map(|rest| (Kind::Print, rest));
-    print.or_else(|| begins(b"DEBUG,").map(|rest| (Kind::Debug, rest)))
-}
 
 /// What the last line has told.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -220,15 +199,7 @@ mod tests {
 
     #[test]
     fn long_texts_are_cut() {
-        let text = "x".repeat(118);
+        let text = "x".repeat(98);
         assert_eq!(said(&[&text, "#1y"].concat()), [&text, "##"].concat());
-    }
-
-    #[test]
-    fn kinds_of_comments() {
-        assert_eq!(kind(b"  print,a"), Some((Kind::Print, &b"a"[..])));
-        assert_eq!(kind(b"DEBUG, a"), Some((Kind::Debug, &b" a"[..])));
-        assert_eq!(kind(b"print a"), None);
-        assert_eq!(kind(b"MSG,a"), None);
     }
 }

@@ -87,6 +87,11 @@ impl<'a> Name<'a> {
         self.0.iter().filter(|byte| !is_blank(**byte)).map(u8::to_ascii_lowercase)
     }
 
+    /// Whether the parameter is known at each level of calls.
+    pub fn is_global(self) -> bool {
+        self.bytes().next() == Some(b'_')
+    }
+
     /// Whether two names are the same.
     pub fn is(self, other: Name) -> bool {
         self.bytes().eq(other.bytes())

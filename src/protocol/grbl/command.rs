@@ -66,7 +66,7 @@ pub fn of(line: &[u8]) -> Command {
     let line = trim(line);
     match line {
         b"h" | b"H" | b"help" if cfg!(feature = "dialect-tinyg") => Command::Hint,
-        line if is_empty(line) => Command::Nothing,
+        line if is_empty(line) && !comment::is_telling(line) => Command::Nothing,
         [b'$', rest @ ..] => system(rest),
         _ => Command::Gcode,
     }

@@ -198,6 +198,16 @@ rows! {
     ExpressionTooDeep = 74;
     #[cfg(feature = "language")]
     ValueUndefined = 75;
+    #[cfg(feature = "language")]
+    OWordInvalid = 70;
+    #[cfg(feature = "language")]
+    SubUnknown = 70;
+    #[cfg(feature = "language")]
+    RecordFull = 79;
+    #[cfg(feature = "language")]
+    FlowTooDeep = 70;
+    #[cfg(feature = "language")]
+    FlowBroken = 9;
     Alarmed = 9;
     LimitHit = 9;
     ShutDown = 9;

@@ -11,6 +11,8 @@ use crate::capability::Capability;
 use crate::gcode::modal::MotionMode;
 use crate::machine::Doing;
 use crate::plain;
+#[cfg(feature = "language")]
+use crate::protocol::notice::put_said;
 use crate::protocol::{Machine, Notice, Occasion, Out, Tells, Value};
 use crate::status::Status;
 use crate::text;
@@ -32,6 +34,9 @@ pub enum Telling {
     FileLine(u32, Status),
     /// `[Se:]`.
     SyncError,
+    /// `[MSG:]` with what G-code tells.
+    #[cfg(feature = "language")]
+    Said,
 }
 
 #[small]
@@ -49,6 +54,8 @@ impl Telling {
             #[cfg(feature = "sd")]
             Notice::FileLine(line, status) => Self::FileLine(line, status),
             Notice::Probing => Self::Probing(lists::PROBING),
+            #[cfg(feature = "language")]
+            Notice::Said => Self::Said,
             Notice::SyncError if Capability::Lathe.is_built_in() => Self::SyncError,
             _ => Self::Nothing,
         }
@@ -96,6 +103,13 @@ impl Tells for Telling {
                 }
                 None => false,
             },
+            #[cfg(feature = "language")]
+            Self::Said => {
+                text(out, text!("[MSG:"));
+                put_said(machine, out);
+                close(out);
+                false
+            }
             Self::SyncError => {
                 if Capability::Lathe.is_built_in() {
                     text(out, text!("[Se:"));

@@ -161,6 +161,16 @@ rows! {
     ExpressionTooDeep = 191, "Expression is too deep";
     #[cfg(feature = "language")]
     ValueUndefined = 192, "Expression has no value";
+    #[cfg(feature = "language")]
+    OWordInvalid = 193, "O word cannot be read or is out of place";
+    #[cfg(feature = "language")]
+    SubUnknown = 194, "No subroutine of this label";
+    #[cfg(feature = "language")]
+    RecordFull = 195, "No room to record the line";
+    #[cfg(feature = "language")]
+    FlowTooDeep = 196, "Too many blocks or calls within each other";
+    #[cfg(feature = "language")]
+    FlowBroken = 197, "A line of this loop or subroutine was refused";
     Alarmed = 203, "Machine is alarmed - Command not processed";
     LimitHit = 204, "Limit switch hit - Shutdown occurred";
     ShutDown = 205, "Shut down [$clear to reset]";

@@ -5,6 +5,10 @@ use super::notice::{Banner, Exception, Probing, acknowledge, jog_ended};
 use super::prompt::put_ready_prompt;
 use super::report::{Report, queue_report, receive_report, sync_report};
 use crate::capability::Capability;
+#[cfg(feature = "language")]
+use crate::plain;
+#[cfg(feature = "language")]
+use crate::protocol::notice::put_said;
 use crate::protocol::{Machine, Notice, Occasion, Out, Tells, Value};
 
 /// A notice that is being sent, and the mode of the port.
@@ -25,6 +29,8 @@ enum Part {
         flushed: bool,
     },
     SyncError,
+    #[cfg(feature = "language")]
+    Said,
     /// The queue report, with the number of free blocks that it has told.
     Queue(usize),
 }
@@ -46,6 +52,8 @@ impl Telling {
                 Part::Exception(Exception::of_line(line, status, settings))
             }
             Notice::Probing => Part::Probing(Probing::begin(settings)),
+            #[cfg(feature = "language")]
+            Notice::Said => Part::Said,
             // This dialect has neither start-up lines nor these reports.
             Notice::Startup(..) | Notice::Busy | Notice::Temperatures | Notice::Tuning => {
                 Part::Status(None)
@@ -94,6 +102,13 @@ impl Tells for Telling {
                 if Capability::Lathe.is_built_in() {
                     sync_report(mode, machine, out);
                 }
+                false
+            }
+            #[cfg(feature = "language")]
+            Part::Said => {
+                out.put_plain(plain!("{\"msg\":\""));
+                put_said(machine, out);
+                out.put_plain(plain!("\"}\n"));
                 false
             }
             Part::Queue(free) => {

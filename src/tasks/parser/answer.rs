@@ -254,6 +254,7 @@ fn echo(links: &Links, port: &Port, id: LineId, at: &mut u8, tx: &mut Tx) -> boo
 #[inline(never)]
 fn ran(links: &Links, port: &Port, id: LineId, block: Span, request: &mut Request) -> bool {
     if machine::is_flushing() {
+        links.end_flow();
         request.ran(hold::dropped(), false);
         return true;
     }
@@ -261,6 +262,7 @@ fn ran(links: &Links, port: &Port, id: LineId, block: Span, request: &mut Reques
     let class = lines.class(id);
     if let Class::Fault(status) = class {
         // The line has been dropped since its answer was begun.
+        links.end_flow();
         request.ran(status, false);
         return true;
     }

@@ -3,6 +3,7 @@
 use heapless::Vec;
 
 use super::answer::has_room;
+use crate::capability::Capability;
 #[cfg(feature = "card-write")]
 use crate::card;
 use crate::gcode::command::Stop;
@@ -145,6 +146,7 @@ fn move_back(links: &Links) -> Status {
 
 /// Ends a program that has been killed or reset, as M2 does. The planner is free.
 pub fn end_program(links: &Links, resets: bool) {
+    links.end_flow();
     // M2 is never refused, not even in an alarm, and changes no table.
     let _ = carry_out(links, b"M2", false);
     if resets {
@@ -159,6 +161,7 @@ pub fn end_program(links: &Links, resets: bool) {
 fn interpret(links: &Links, block: &[u8], declined: bool) -> (Status, bool) {
     let alarm = machine::alarm();
     if alarm != Alarm::None {
+        links.end_flow();
         if !(alarm.ends_with_program() && is_program_end(block)) {
             return (alarm.status(), true);
         }
@@ -187,10 +190,13 @@ fn enter(jogs: bool) {
     machine::carry_out(if jogs { machine::Event::Jog } else { machine::Event::Done });
 }
 
-/// Interprets a block and hands its commands to the planner, except in check mode. Returns also whether the block may
-/// have a comment. Returns [`Status::Again`] while a jog is under way, unless the block is another jog.
+/// Interprets a block and hands its commands to the planner, except in check mode. During a replay it does so with the
+/// next lines of the record, and returns [`Status::Again`]. Returns also whether the block may have a comment. Returns [`Status::Again`] while a jog is under way, unless the block is another jog.
 #[inline(never)]
 fn carry_out(links: &Links, block: &[u8], declined: bool) -> (Status, bool) {
+    if links.is_telling() {
+        return (Status::Again, true);
+    }
     let words = jog(block);
     let jogs = machine::cycle() == Cycle::Jog;
     if words.is_some()
@@ -230,7 +236,9 @@ fn carry_out(links: &Links, block: &[u8], declined: bool) -> (Status, bool) {
             if info.lacks_length {
                 links.except(Status::NoToolLength);
             }
-            (Status::Ok, info.commented)
+            // The line has begun a replay: its answer waits, and the next lines come from the record.
+            let goes_on = Capability::Language.is_built_in() && model.is_replay();
+            (if goes_on { Status::Again } else { Status::Ok }, info.commented)
         }
         Err(status) => {
             if status.names_axis() {

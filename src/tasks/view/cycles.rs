@@ -31,6 +31,8 @@ pub(super) fn start_job(view: &mut View<'_>, number: u8) -> Status {
     if number == STORED && !program::is_whole(&Eeprom::take()) {
         return Status::Error;
     }
+    // Lines of the job are no part of a loop that a sender has begun.
+    view.links.end_flow();
     view.links.job.set(job);
     view.links.parser_wake.signal();
     Status::Ok

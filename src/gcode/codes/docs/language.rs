@@ -3,7 +3,8 @@
 use super::{Rule, no};
 use crate::status::Status::{
     BadNumber, ExpressionInvalid, ExpressionTooDeep, GcodeUnsupported, MalformedCommand,
-    ParameterInvalid, ParameterReadOnly, ParameterUnknown, ValueUndefined,
+    OWordInvalid, ParameterInvalid, ParameterReadOnly, ParameterUnknown, SubUnknown,
+    ValueUndefined,
 };
 
 pub const PARAMETERS: Rule = Rule {
@@ -13,7 +14,7 @@ one. `#5=2` and `#<name>=2` assign. A number that was never assigned is 0; a nam
 Case and blanks in names do not count. `##5` and `#[#5+1]` are parameters whose number is a value. All values of a line are \
 read before anything is assigned: `#1=2 X#1` moves to the old value. What a line assigns twice has the last value. A \
 refused line assigns nothing. Parameters last until power-off: no reset and no end of a program changes them. There is \
-room for 400 numbers above 30 that are not 0, and for 64 names of together 768 characters. A whole number may be off \
+room for 256 numbers above 30 that are not 0, and for 64 names of together 768 characters. A whole number may be off \
 by 0.0001.",
     refusals: &[
         no(ParameterInvalid, &["#5602=1"]),
@@ -35,7 +36,7 @@ one. Names: `_x` to `_c`, `_abs_x` to `_abs_c`, `_feed`, `_rpm`, `_current_tool`
 `_coord_system`, `_metric`, `_imperial`, `_absolute`, `_incremental`, `_inverse_time`, `_units_per_minute`, `_units_per_rev`, \
 `_retract_old_z` (G98), `_retract_r_plane` (G99), `_ijk_absolute_mode`, `_lathe_diameter_mode`, `_lathe_radius_mode`, \
 `_spindle_on`, `_spindle_cw`, `_spindle_rpm_mode`, `_spindle_css_mode`, `_mist`, `_flood`, `_tool_offset`, `_ccomp`, `_task`, \
-`_metric_machine`.",
+`_metric_machine`; in a call `_value`, `_value_returned`, `_call_level`.",
     refusals: &[no(ParameterReadOnly, &["#5221=10"]), no(ParameterReadOnly, &["#<_x>=1"])],
 };
 
@@ -59,12 +60,33 @@ brackets may be open. Words take eight decimals of a value; codes, and T, H, L a
     ],
 };
 
+pub const FLOW: Rule = Rule {
+    title: "O words",
+    text: "With the capability `language`, O words make conditions, loops and subroutines: `O1 IF [#1 GT 2]`, `O1 ELSEIF [..]`, \
+`O1 ELSE`, `O1 ENDIF`; `O1 WHILE [..]` to `O1 ENDWHILE`; `O1 DO` to `O1 WHILE [..]`; `O1 REPEAT [3]` to `O1 ENDREPEAT`; \
+`O1 BREAK` and `O1 CONTINUE` in WHILE and DO; `O1 SUB` to `O1 ENDSUB`, `O1 CALL [1] [2]`, `O1 RETURN`. A label is a number, a \
+value (`O[#1+2]`) or a name (`O<hole>`). A subroutine must come before its call. Its arguments are `#1` to `#30`, those that are \
+missing 0; the caller has its own back at the return, and names without a leading `_` are known in one call only. \
+`O1 ENDSUB [..]` and `O1 RETURN [..]` set `#<_value>`. Lines that do not run need not be valid. A subroutine is recorded, and so \
+is a loop while its first pass runs: the response to its last line comes when all passes are over. Records have room for 4,096 \
+characters without blanks and plain comments, and for 24 subroutines; 20 blocks and 9 calls may be within each other. If a line \
+of a loop or a subroutine is refused, all others up to its end are. If a line of a later pass or of a call is refused, \
+all loops and calls end, and the line that has begun them has its status. M2, M30, a queue flush, `^d`, `^x`, an alarm and a \
+built-in job end all loops and calls, and forget subroutines.",
+    refusals: &[
+        no(SubUnknown, &["O1 CALL"]),
+        no(OWordInvalid, &["O1 ENDIF"]),
+        no(OWordInvalid, &["O1 IF #1"]),
+        no(OWordInvalid, &["O1 IF [1]", "O1 IF [1]"]),
+    ],
+};
+
 pub const TELLING: Rule = Rule {
     title: "Comments that tell values",
     text: "With the capability `language`, the response to a line whose last comment is `(PRINT,text)` or `(DEBUG,text)` has the \
-text, up to 120 characters, with the values of `#5` and `#<name>` in it. `%d`, `%f` and `%.2f` choose no decimals, four or two \
+text, up to 100 characters, with the values of `#5` and `#<name>` in it. `%d`, `%f` and `%.2f` choose no decimals, four or two \
 for the values behind them; without they have six. A value that does not exist is `######`. `#5599=0` switches `(DEBUG,)` off. \
 Values are those after the assignments of the line and before its moves. In grbl's dialect the text comes before `ok` as \
-`[MSG:text]`. Built-in jobs and files of an SD card tell nothing. Lines of printing hosts have neither parameters nor expressions.",
+`[MSG:text]`. A line of a later pass or of a call tells at once, as `{\"msg\":\"text\"}` or `[MSG:text]`. Built-in jobs and files of an SD card tell nothing. Lines of printing hosts have neither parameters nor expressions.",
     refusals: &[],
 };

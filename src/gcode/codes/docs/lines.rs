@@ -22,9 +22,9 @@ in comments. `%` and `~` act anywhere except in comments. None of these bytes is
         title: "Program names",
         text: "`%` at the beginning of a line marks the beginning or the end of a program and has no effect. Text behind it \
 that is no G-code is a name, as in `%prog1`, and has no effect either; G-code behind it runs. O and a number, as in \
-`O0001 (PART)`, have no effect. O words with a keyword, such as `O100 SUB`, are refused. In a hold `%` discards the \
+`O0001 (PART)`, have no effect. O words with a keyword, such as `O100 SUB`, need the capability `language`. In a hold `%` discards the \
 queue, and what follows is a line of its own.",
-        refusals: &[no(BadNumber, &["O100 SUB"])],
+        refusals: &[no(MalformedCommand, &["G0 X1 %"])],
     },
     Rule {
         title: "Words",
@@ -105,6 +105,8 @@ behind a comment within it, because that text may be words. If a comment begins 
 the text after it.",
         refusals: &[no(MalformedCommand, &["G0 X1)"]), no(MalformedCommand, &["G0 X1 (a (b) Y1"])],
     },
+    #[cfg(feature = "language")]
+    language::FLOW,
     #[cfg(feature = "language")]
     language::TELLING,
     Rule {

@@ -34,7 +34,8 @@ Differences from some other controllers:
 - With G7 R of a canned cycle along X is a diameter, as X is; in LinuxCNC R is a radius.
 - G0 or G1 beside G28, G30, G10 or G92 is refused if both could use the axis words: leave G0 out.
 - Axis words behind G80, homing or probing need a G0 or G1; no motion code comes back by itself.
-- Comments may contain comments; LinuxCNC refuses them. O words are numbers of programs, never control flow.
+- Comments may contain comments; LinuxCNC refuses them.
+- A label may be used again; in LinuxCNC it names one block.
 - G88 retracts by itself after its stop.
 - G95 uses the programmed S. With an encoder, feeds are slower while the spindle is slower than S.
 - M48 to M51 act after the moves before them, without a stop; override requests (`mfo`) act at once.
