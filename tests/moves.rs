@@ -25,8 +25,8 @@ fn lone(mm: f64, velocity: f32, accel: f32, jerk: f32) -> (f64, f64) {
 
 const LENGTHS: [f64; 11] = [0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 200.0, 300.0];
 
-/// With means a move takes as long as they cover more than its trapezoid: two thirds of a sample more at most, and what
-/// the length of samples costs. This is within a sixth of the optimum under the jerk limit, and the means.
+/// With means a move takes longer than its trapezoid, by what the means cover (14 samples at most) and by what the length
+/// of samples costs.
 #[test]
 fn moves_with_means_take_little_longer_than_the_optimum() {
     let limits = [(0.0, 1e5), (0.0, 1e6), (500.0, 2e4), (500.0, 1e5), (3000.0, 1e6)];

@@ -587,23 +587,11 @@ impl Exec {
         if Capability::Lathe.is_built_in() && matches!(self.follows, Follows::Angle(_)) {
             return self.follow(blocks, out, segment);
         }
-        running.look_ahead(blocks, &mut self.governor);
-        let (mut cruise, mut holds) = (running.cruise, self.hold);
-        if Capability::Lathe.is_built_in()
-            && let Follows::Speed(share) = self.follows
-            && !blocks.is_traverse()
-        {
-            // The spindle stands still.
-            let stands = share <= 0.0;
-            holds |= stands;
-            if !stands {
-                cruise *= share;
-            }
-            if self.governor.is_at_rest() && holds && !self.hold {
-                self.follows = Follows::Speed(share - PAUSE_S);
-                return self.await_spindle(out, segment);
-            }
-        }
+        let (cruise, holds) = match self.limit(blocks) {
+            Ok(limit) => limit,
+            Err(share) => return self.await_speed(share, out, segment),
+        };
+        let running = &self.running;
         let (left, headroom) = (running.left, running.headroom);
         let stretch = if holds {
             self.governor.take(SEGMENT_S);

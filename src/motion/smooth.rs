@@ -26,6 +26,7 @@ use kerf_macros::small;
 
 use super::advance::EXTRUDERS;
 use super::divide::quotient_remainder;
+use super::float::whole;
 use crate::boards::MOTORS;
 use crate::hal::{SAMPLE_MS, TIMER_HZ};
 
@@ -85,7 +86,7 @@ impl Spans {
     #[inline(never)]
     #[small]
     pub fn alone(seconds: f32) -> Self {
-        let samples = crate::motion::float::whole(seconds * (1.0 / SAMPLE_S) + 0.98);
+        let samples = whole(seconds * (1.0 / SAMPLE_S) + 0.98);
         Self { corner: 1, jerk: samples.clamp(1, JERK_MOST.into()) as u8 }
     }
 

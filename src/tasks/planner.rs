@@ -131,14 +131,6 @@ enum Announcement {
     Origin,
 }
 
-impl Announcement {
-    /// Returns the announcement, or `other` if there is none.
-    #[inline(always)]
-    fn or(self, other: Self) -> Self {
-        if self == Self::None { other } else { self }
-    }
-}
-
 /// The result of a turn of the planner.
 #[derive(Clone, Copy, PartialEq)]
 enum Turn {
@@ -351,10 +343,13 @@ impl Planner {
         self.steps = Steps::default();
         self.take_up_changes();
         let commands = self.links.commands.borrow();
-        if commands.moves() && (self.stops || self.wanted_spans(&commands) != self.spans) {
-            self.announcement = self.announcement.or(Announcement::Smooth);
-        } else {
-            self.announcement = self.announcement.or(Announcement::Origin);
+        let smooths = self.stops || self.wanted_spans(&commands) != self.spans;
+        match self.announcement {
+            // That of the means follows.
+            Announcement::Position | Announcement::Drivers | Announcement::Smooth => {}
+            _ if smooths && commands.moves() => self.announcement = Announcement::Smooth,
+            Announcement::None => self.announcement = Announcement::Origin,
+            Announcement::Lead | Announcement::Origin => {}
         }
     }
 

@@ -33,7 +33,7 @@ impl Exec {
     pub(super) fn begin_sampled(&mut self, line: &Line, out: &mut Snapshot) {
         self.sampler.begin(line);
         self.prep.begin_sampled(line);
-        // The target is where the samples end, so nothing is left to it.
+        // The target is where the samples end, so nothing is left to it. The distances only say which motors move.
         out.left = 0.0;
         out.steps = line.way;
     }
@@ -62,24 +62,6 @@ impl Exec {
             }
         }
         Step::Again
-    }
-
-    /// Returns the velocity limit of the running line, mm/s, and whether the machine is to come to a standstill. Fails
-    /// with the spindle's share of its planned speed if the line waits for a spindle that stands still.
-    #[inline(always)]
-    fn limit(&mut self, blocks: &mut BlockSource) -> Result<(f32, bool), f32> {
-        let running = &mut self.running;
-        running.look_ahead(blocks, &mut self.governor);
-        let (cruise, holds) = (running.cruise, self.hold);
-        let Follows::Speed(share) = self.follows else { return Ok((cruise, holds)) };
-        if !Capability::Lathe.is_built_in() || blocks.is_traverse() {
-            return Ok((cruise, holds));
-        }
-        match share > 0.0 {
-            true => Ok((cruise * share, holds)),
-            false if self.governor.is_at_rest() && !holds => Err(share),
-            false => Ok((cruise, true)),
-        }
     }
 
     /// Adds the next stretch of the running line to the sample.
@@ -139,18 +121,5 @@ impl Exec {
             return true;
         }
         self.prep.finish(segment)
-    }
-
-    /// Prepares a pause in which a feed waits for a spindle that stands still, when the means are empty.
-    #[inline(never)]
-    #[small]
-    fn await_speed(&mut self, share: f32, out: &mut Snapshot, segment: &mut Segment) -> Step {
-        if self.empties(out, segment) {
-            return Step::Segment;
-        }
-        self.follows = Follows::Speed(share - super::PAUSE_S);
-        let step = self.await_spindle(out, segment);
-        out.left = 0.0;
-        step
     }
 }

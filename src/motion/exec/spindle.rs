@@ -1,6 +1,6 @@
 //! Lines that follow the spindle: in step with its angle, at a feed per turn, and the retreat out of the cut.
 
-use super::{Exec, PAUSE, SEGMENT_S, Step};
+use super::{Exec, PAUSE, PAUSE_S, SEGMENT_S, Step};
 use crate::boards::outputs;
 use crate::capability::Capability;
 use crate::dda::Segment;
@@ -196,6 +196,44 @@ impl Exec {
         let left = if self.running.done { 0.0 } else { self.running.left };
         if let Follows::Angle(thread) = &mut self.follows {
             thread.handed(before - left);
+        }
+        step
+    }
+
+    /// Returns the velocity limit of the running line, mm/s, and whether the machine is to come to a standstill. Fails
+    /// with the spindle's share of its planned speed if the line waits for a spindle that stands still.
+    #[inline(always)]
+    pub(super) fn limit(&mut self, blocks: &mut BlockSource) -> Result<(f32, bool), f32> {
+        self.running.look_ahead(blocks, &mut self.governor);
+        let (cruise, holds) = (self.running.cruise, self.hold);
+        let Follows::Speed(share) = self.follows else { return Ok((cruise, holds)) };
+        if !Capability::Lathe.is_built_in() || blocks.is_traverse() {
+            return Ok((cruise, holds));
+        }
+        match share > 0.0 {
+            true => Ok((cruise * share, holds)),
+            false if self.governor.is_at_rest() && !holds => Err(share),
+            false => Ok((cruise, true)),
+        }
+    }
+
+    /// Prepares a pause in which a feed waits for a spindle that stands still, when the means are empty.
+    #[inline(never)]
+    #[small]
+    pub(super) fn await_speed(
+        &mut self,
+        share: f32,
+        out: &mut Snapshot,
+        segment: &mut Segment,
+    ) -> Step {
+        let is_sampled = self.is_sampled();
+        if is_sampled && self.empties(out, segment) {
+            return Step::Segment;
+        }
+        self.follows = Follows::Speed(share - PAUSE_S);
+        let step = self.await_spindle(out, segment);
+        if is_sampled {
+            out.left = 0.0;
         }
         step
     }

@@ -37,7 +37,7 @@ impl Prep {
         }
     }
 
-    /// Takes in the velocity at the end of a slice, mm/s: see [`Advance::aim`](super::super::advance::Advance::aim).
+    /// Takes in the velocity at the end of a stretch, mm/s: see [`Advance::aim`](super::super::advance::Advance::aim).
     #[inline(never)]
     pub fn aim(&mut self, velocity: f32, seconds: f32) {
         if let Some(extruder) = self.extruder.first_mut() {

@@ -38,8 +38,8 @@ at power-up and after M2, unless `gun` selects inches.",
         g(
             610,
             "Exact path",
-            "Follows the path exactly, without a stop where none is needed. Moves are not merged, and no corner is rounded: \
-acceleration and junction deviation limit the speed, the jerk limit does not apply. The machine stops where G61 begins and ends.",
+            "Follows the path exactly: merges no moves and rounds no corners. The machine stops only where it has to, and where G61 \
+begins and ends. The acceleration and the junction deviation limit the speed. The jerk limit does not apply.",
             &[],
         ),
         g(
@@ -51,8 +51,8 @@ acceleration and junction deviation limit the speed, the jerk limit does not app
         g(
             640,
             "Continuous path",
-            "Follows the path without a stop where none is needed. With a jerk limit corners are rounded, within the \
-acceleration of each axis: by up to 0.05 mm at 500 mm/s^2, more at higher accelerations. Short feed moves of linear axes are merged if they lie on \
+            "Follows the path. The machine stops only where it has to. With a jerk limit it rounds corners, so that the \
+velocity of no axis jumps. The tool is then up to 0.05 mm off the path at 500 mm/s^2, and more at higher accelerations. Short feed moves of linear axes are merged if they lie on \
 a straight line within P. A merged move takes at most 12 ms and has at most 3.2 mm. P is 0.001 mm by default and \
 0.0254 mm at most; with P0 only exactly collinear moves are merged. On a curve where no moves can be merged, \
 only every eighth move is tested, later every 32nd. Active at power-up and after M2, unless `gpa` selects \

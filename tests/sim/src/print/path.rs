@@ -15,7 +15,8 @@ use crate::recorder::Step;
 /// Motors that do not lead are up to two steps behind or ahead where short lines join.
 #[cfg(test)]
 const EXACT: f64 = 2.5;
-/// The same where means round corners, steps: 0.1 mm of X and Y of a printer, 0.17 mm of its extruder.
+/// How far a motor may be off a line where corners are rounded, steps. This is 0.2 mm of X and Y of the printer, and
+/// 0.17 mm of its extruder, whose acceleration is the highest.
 pub const ROUNDED: f64 = 16.0;
 /// Number of lines within which the motors' position is searched: a line shorter than a step may be left out.
 const AHEAD: usize = 12;
