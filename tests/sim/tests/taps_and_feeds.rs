@@ -144,8 +144,8 @@ fn a_feed_a_turn_ends_with_the_spindle_and_waits_six_seconds() {
             lathe.run_for_ms(2_000);
             assert_eq!(lathe.motors()[Z] != 0, turns);
             lathe.machine.tamper(|mechanics, now| mechanics.force_spindle(0.0, now));
-            // Two pulses are 20 ms, exec checks every 20 ms, and 1 mm/s stops in 2 ms.
-            lathe.run_for_ms(80);
+            // Two pulses are 20 ms, exec checks every 20 ms, 1 mm/s stops in 2 ms, and the means are empty 60 ms later.
+            lathe.run_for_ms(120);
             let stands = lathe.motors();
             lathe.run_for_ms(3_000);
             assert_eq!(lathe.status().state, "Run");

@@ -117,7 +117,8 @@ async fn with_either_polarity(kerf: &mut Kerf<'_, '_, impl Board>) -> Checked {
         kerf.ask(NO_SWITCH).await?;
         kerf.ask(NO_POWER).await?;
         kerf.ask(&format!("{{1po:{polarity}}}")).await?;
-        for line in ["g21", "g94", "g91", "g1 f800 x0.1"] {
+        // On the exact path X turns at the corner, and not before it.
+        for line in ["g21", "g94", "g91", "g61", "g1 f800 x0.1"] {
             kerf.ask(line).await?;
         }
         kerf.rest().await?;
