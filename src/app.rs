@@ -19,7 +19,8 @@ use crate::hal::segments::Segments;
 use crate::hal::serial::{AUX, AllEnds, PORTS, Received, USB, hardware};
 use crate::hal::{LINE_BYTES, stepper, uart, watchdog};
 use crate::machine::{Notices, Probe, Signs};
-use crate::motion::queue::{self, BlockQueue, BlockSource};
+use crate::motion::blend::Blend;
+use crate::motion::queue::{self, BlockQueue, BlockSource, Stage};
 use crate::protocol::{Memory, Occasion, Remembers, Speech};
 use crate::status::Status;
 use crate::store::kept;
@@ -115,6 +116,13 @@ fn place_card() -> &'static RefCell<crate::card::Card> {
     place!(RefCell<crate::card::Card>, RefCell::new(crate::card::Card::new()))
 }
 
+/// Creates the stage in its static place, if this chip blends.
+#[inline(never)]
+#[small]
+fn place_stage() -> Stage {
+    core::array::from_fn(|_| place!(Blend, Blend::new()))
+}
+
 /// Creates the planner in its static place. The planner task and the parser share it.
 #[inline(never)]
 #[small]
@@ -130,7 +138,7 @@ fn place_planner(links: &'static Links, queue: BlockQueue) -> &'static planner::
 #[small]
 pub fn start(main: Spawner, thread: Thread, rate: u32) -> Option<()> {
     let segments = stepper::start()?;
-    let queue = queue::store().queue(thread)?;
+    let queue = queue::store().queue(thread, place_stage())?;
     let (links, received, aux) = connect(thread, rate)?;
     links.report.borrow_mut().restore();
     let occasion = recall(&mut links.settings.borrow_mut(), links.storage);

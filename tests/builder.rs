@@ -30,7 +30,8 @@ fn built(
     ends: [PerAxis<Length>; 2],
     feed: Option<Feed>,
 ) -> (Move, f32) {
-    let line = Line { from: &ends[0], to: &ends[1], feed, curve: None, may_merge: false };
+    let line =
+        Line { from: &ends[0], to: &ends[1], feed, curve: None, may_merge: false, blends: false };
     let mut block = Move::default();
     match builder.line(&line, &Dynamics::new(config), config, &mut block) {
         Built::Line(entry) => (block, entry),
@@ -156,7 +157,7 @@ proptest! {
         let dynamics = Dynamics::new(&wide);
         let (from, to) = (at([0.0]), at([x, y]));
         let asked_for = Some(Feed::PerMinute(feed));
-        let line = Line { from: &from, to: &to, feed: asked_for, curve: None, may_merge: false };
+        let line = Line { from: &from, to: &to, feed: asked_for, curve: None, may_merge: false, blends: false };
         let mut block = Move::default();
         let Built::Line(_) = Builder::default().line(&line, &dynamics, &wide, &mut block) else {
             return Ok(());
@@ -189,7 +190,7 @@ proptest! {
         let (mut motors, mut places) = ([0i64; MOTORS], [0i64; MOTORS]);
         let mut began = false;
         for (to, feed) in moves {
-            let line = Line { from: &from, to: &to, feed, curve: None, may_merge };
+            let line = Line { from: &from, to: &to, feed, curve: None, may_merge, blends: false };
             let mut block = Move::default();
             match builder.line(&line, &dynamics, &config, &mut block) {
                 Built::Nothing => prop_assert_eq!(from, to),

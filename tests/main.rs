@@ -75,6 +75,7 @@ mod advance;
 mod alarm_packets;
 mod arc_props;
 mod bed;
+mod blend;
 mod builder;
 mod cam_files;
 mod canon_props;

@@ -7,7 +7,7 @@
 
 use std::thread;
 
-use kerf::hal::imp::Machine;
+use kerf::hal::imp::{self, Machine};
 
 use crate::seeds;
 use crate::stream::dialogue::Dialogue;
@@ -30,7 +30,15 @@ fn live(setup: &Setup, ops: &[Op]) -> Result<(), String> {
 
 /// Plays a conversation, with a machine in a thread of its own.
 fn play((setup, ops): (Setup, Vec<Op>)) -> Result<(), String> {
-    let lived = thread::scope(|scope| scope.spawn(|| live(&setup, &ops)).join());
+    // Half of the machines blend.
+    let blends = ops.len() % 2 == 1;
+    let lived = thread::scope(|scope| {
+        let live = || {
+            imp::set_blends(blends);
+            live(&setup, &ops)
+        };
+        scope.spawn(live).join()
+    });
     lived.map_err(|_| "the firmware panics".to_string())?
 }
 

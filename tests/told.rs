@@ -1,12 +1,14 @@
 //! Reports tell what the machine does, not what it has read: random programs on the host (`tests/support/told.rs`).
 
-use kerf::hal::imp::Machine;
+use kerf::hal::imp::{self, Machine};
 
 use crate::apart::apart;
 use crate::seeds::try_all;
 use crate::told_session::{Told, Tongue};
 
 fn play(tongue: Tongue, seed: u64) -> Result<(), String> {
+    // Half of the machines blend.
+    imp::set_blends(seed % 4 >= 2);
     let machine = Machine::boot(115_200).expect("one machine for each thread");
     let mut told = Told::new(machine, tongue, seed);
     // Only in this dialect the lines that a flush drops are known.

@@ -183,10 +183,16 @@ pub enum PathMode {
     Continuous = 2,
 }
 
-/// The tolerance of G64 without P: 1 um, in units of [`Length`](crate::units::Length).
-pub const TOLERANCE: u8 = 10;
-/// The greatest tolerance that G64 can set.
-pub const TOLERANCE_MAX: u8 = 254;
+/// G64 without P, as a tolerance.
+pub const USUAL: u16 = u16::MAX;
+/// The greatest tolerance that G64 can set: 1 mm, in units of [`Length`](crate::units::Length).
+pub const TOLERANCE_MAX: u16 = 10_000;
+/// How far merged moves may deviate from the path with G64 without P: 1 um.
+const MERGED: u8 = 10;
+/// The greatest deviation of merged moves.
+const MERGED_MAX: u8 = 254;
+/// How far rounded corners may deviate from the path with G64 without P: 0.05 mm.
+const ROUNDED: u16 = 500;
 
 /// Group 7 of the M codes: how the spindle turns.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -248,8 +254,8 @@ pub struct Modal {
     pub system: u8,
     /// Group 13: the path mode.
     pub path: PathMode,
-    /// G64 P: how far merged moves may deviate from the path, in units of [`Length`](crate::units::Length).
-    pub tolerance: u8,
+    /// G64 P: how far the tool may be off the path, in units of [`Length`](crate::units::Length); [`USUAL`] without P.
+    pub tolerance: u16,
     /// Group 7 of the M codes: the spindle.
     pub spindle: Turn,
     /// The coolants that run, bits of [`Coolant`].
@@ -286,7 +292,18 @@ impl Modal {
     /// Returns the value for [`Commands::blend`](super::command::Commands::blend).
     #[inline(always)]
     pub fn blend(&self) -> u8 {
-        if self.path == PathMode::Continuous { self.tolerance + 1 } else { 0 }
+        match self.path {
+            PathMode::Continuous if self.tolerance == USUAL => MERGED + 1,
+            PathMode::Continuous => {
+                u8::try_from(self.tolerance).map_or(MERGED_MAX, |t| t.min(MERGED_MAX)) + 1
+            }
+            _ => 0,
+        }
+    }
+
+    /// Returns how far the tool may be off the path, in units of [`Length`](crate::units::Length).
+    pub fn deviation(&self) -> u16 {
+        if self.tolerance == USUAL { ROUNDED } else { self.tolerance }
     }
 
     /// Returns the modes at power-up: the defaults, and G8 G80 G91.1 G94 G97 G98 M5 M9.
@@ -304,7 +321,7 @@ impl Modal {
             x_mode: XMode::Radius,
             system,
             path,
-            tolerance: TOLERANCE,
+            tolerance: USUAL,
             spindle: Turn::Off,
             coolant: 0,
         }

@@ -8,7 +8,7 @@ use super::codes::{NonModal, OverrideCode, StopCode, Switch};
 use super::command::{Commands, N_MAX, Spindle, Stop};
 use super::limits;
 use super::modal::{
-    Coolant, Defaults, FeedMode, Modal, MotionMode, PathMode, TOLERANCE, TOLERANCE_MAX, Turn, Units,
+    Coolant, Defaults, FeedMode, Modal, MotionMode, PathMode, TOLERANCE_MAX, Turn, USUAL, Units,
 };
 use super::overrides::{Change, Override};
 use super::printing::Printing;
@@ -377,14 +377,14 @@ fn override_one(block: &Block, which: Override, how: Switch) -> Result<Change, S
 /// Returns the tolerance of G64 P in units of [`Length`], at most [`TOLERANCE_MAX`].
 #[inline(never)]
 #[small]
-fn tolerance(block: &Block, units: Units) -> Result<u8, Status> {
-    let Some(word) = block.get(P) else { return Ok(TOLERANCE) };
+fn tolerance(block: &Block, units: Units) -> Result<u16, Status> {
+    let Some(word) = block.get(P) else { return Ok(USUAL) };
     let exact = if units == Units::Inch { word.inch() } else { word.mm() };
     let far = exact.map_err(|_| Status::PWordInvalid)?.units.0;
     if far < 0 {
         return Err(Status::PWordNegative);
     }
-    Ok(u8::try_from(far).map_or(TOLERANCE_MAX, |far| far.min(TOLERANCE_MAX)))
+    Ok(u16::try_from(far).map_or(TOLERANCE_MAX, |far| far.min(TOLERANCE_MAX)))
 }
 
 fn set<T>(mode: &mut T, new: Option<T>) {

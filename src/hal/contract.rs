@@ -303,6 +303,8 @@ contract! {
         /// Tells whether the machine rests. Only then a computer may restart it by a request of USB. Thread mode, every
         /// 20 ms.
         fn set_rests(rests: bool);
+        /// Whether a chip that [can](Timing::STAGE) blends. On the host tests choose. Thread mode.
+        fn blends() -> bool;
     }
 }
 
@@ -322,6 +324,9 @@ pub trait Timing {
     /// The share of the step rate that chords and short blocks may use, because exec has much more to do there than in a
     /// long line: five eighths, or 1.
     const SHORT_SHARE: f32 = 0.625;
+    /// Blocks that can wait to be [blended](crate::motion::blend) before they are queued: a power of two, or 0 for a chip
+    /// that does not blend.
+    const STAGE: usize = if cfg!(feature = "std") { 32 } else { 0 };
     /// Blocks that can wait at once, limited by RAM.
     const LOOK_AHEAD: usize = if cfg!(feature = "sd") && !cfg!(feature = "std") { 38 } else { 61 };
     /// Lines that can wait on a port. At most 9, because brief answers report with one digit how many more may come.
@@ -340,6 +345,8 @@ pub const BLOCK_S_MIN: f32 = <imp::Chip as Timing>::BLOCK_S_MIN;
 pub const SAMPLE_MS: u8 = <imp::Chip as Timing>::SAMPLE_MS;
 /// [`Timing::SHORT_SHARE`] of the chip of this image.
 pub const SHORT_SHARE: f32 = <imp::Chip as Timing>::SHORT_SHARE;
+/// [`Timing::STAGE`] of the chip of this image.
+pub const STAGE: usize = <imp::Chip as Timing>::STAGE;
 /// [`Timing::LOOK_AHEAD`] of the chip of this image.
 pub const LOOK_AHEAD: usize = <imp::Chip as Timing>::LOOK_AHEAD;
 /// [`Timing::LINES`] of the chip of this image.

@@ -347,6 +347,16 @@ pub(super) fn pushed(way: i16, line: &Line) -> u32 {
     (far as u32) << if line.extent.has_whole_steps() { LOG2 } else { LOG2 - PARTS_LOG2 }
 }
 
+/// Divides what [`refine`] has stored between the two parts of a line, the first of which has this share of it.
+pub(super) fn cut_push(line: &Line, head: &mut Line, tail: &mut Line, share: f32, motor: usize) {
+    let way = |line: &Line| line.way.get(motor).copied().map_or(0, in_parts);
+    let all = way(line) + i32::from(line.extent.more());
+    let first = (all as f32 * share) as i32;
+    let (in_head, in_tail) = (way(head), way(tail));
+    head.extent.refine(first.wrapping_sub(in_head) as i8);
+    tail.extent.refine((all - first).wrapping_sub(in_tail) as i8);
+}
+
 /// Returns a distance in the parts of a step of [`refine`].
 fn in_parts(way: i16) -> i32 {
     i32::from(way) << MORE_LOG2

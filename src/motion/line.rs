@@ -11,6 +11,7 @@
 //!
 //! A ramp may go over many blocks. Each block has its own acceleration limit: what its axes allow in its direction.
 
+use super::blend::BLENDS;
 use super::block::{Block, Extent, Line as Move, QueuedAction};
 use super::curve::{Bend, Curve};
 use super::dynamics::Dynamics;
@@ -51,6 +52,8 @@ pub struct Line<'a> {
     pub curve: Option<&'a Curve>,
     /// Whether the move may be merged with the next one.
     pub may_merge: bool,
+    /// Whether the move is [blended](super::blend): its corners are limited there.
+    pub blends: bool,
 }
 
 /// The result of building a move.
@@ -122,12 +125,13 @@ impl Builder {
         path.limit_change(dynamics);
         // The chords of an arc have its limits, and no corners between them.
         let goes_on = matches!(line.curve, Some(curve) if curve.goes_on);
+        let blends = BLENDS && line.blends;
         let turned = match line.curve {
             Some(curve) => {
                 self.bend.chord(&mut path, curve);
                 if goes_on { 0 } else { junction::turn(&self.heading.unit, &path.heading.unit) }
             }
-            None if some(self.top) => self.bend.line(&self.heading, &mut path, dynamics),
+            None if some(self.top) && !blends => self.bend.line(&self.heading, &mut path, dynamics),
             None => {
                 self.bend = Bend::default();
                 0
@@ -135,7 +139,7 @@ impl Builder {
         };
         path.limit_steps(&dynamics.rates, line.curve.is_some());
         let mut entry = least(path.top, self.top);
-        if some(entry) && !goes_on {
+        if some(entry) && !goes_on && !blends {
             let deviations = (self.heading.deviation, path.heading.deviation);
             let velocities = Velocities { cruise: path.cruise, top: entry };
             entry = junction::limit(turned, deviations, dynamics.junction, &velocities);
@@ -215,6 +219,11 @@ impl Builder {
                 _ => {}
             }
         }
+    }
+
+    /// The direction of the last move.
+    pub fn unit(&self) -> &PerAxis<i16> {
+        &self.heading.unit
     }
 
     /// Notes that the next move starts from rest.

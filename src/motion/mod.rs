@@ -7,6 +7,7 @@
 //! ```
 
 pub mod advance;
+pub mod blend;
 pub mod block;
 pub mod chain;
 pub mod curve;

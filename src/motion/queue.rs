@@ -6,7 +6,8 @@
 
 use avr_embassy::{InterruptEnd, Shared};
 
-use super::block::{Block, Body, Line};
+use super::blend::{Blend, Ready, SPARE, STAGES};
+use super::block::{Block, Body, Line, QueuedAction};
 use super::factors::Factors;
 use super::float::{OCTAVE, below, log, some};
 pub use super::source::BlockSource;
@@ -15,6 +16,7 @@ use super::tail::Tail;
 use crate::hal::exec;
 use crate::hal::ring::{Index, Prefilled, Ring};
 use crate::hal::{Ceiling, Interrupt, LOOK_AHEAD, Thread};
+use crate::units::PerAxis;
 
 /// Blocks the planner can queue, plus one slot that stays empty. Sequence numbers have one bit less than an
 /// [`Index`].
@@ -45,8 +47,8 @@ impl BlockStore {
         Self { ring: Ring::new(), constraints: Shared::new(SpeedConstraints::new()) }
     }
 
-    /// Returns the planner's end; `None` after the first time.
-    pub fn queue(&'static self, thread: Thread) -> Option<BlockQueue> {
+    /// Returns the planner's end, with the stage; `None` after the first time.
+    pub fn queue(&'static self, thread: Thread, stage: Stage) -> Option<BlockQueue> {
         let ring = self.ring.producer()?;
         exec::lock(thread, |ceiling| self.constraints.with(ceiling, SpeedConstraints::begin));
         Some(BlockQueue {
@@ -55,6 +57,7 @@ impl BlockStore {
             constraints: &self.constraints,
             newest: SEQ,
             tail: Tail { last: None, factors: Factors::ONE },
+            stage,
         })
     }
 
@@ -142,6 +145,9 @@ fn refined(
     end(thread, constraints)
 }
 
+/// Where blocks wait to be blended, on a chip that blends.
+pub type Stage = [&'static mut Blend; STAGES];
+
 /// The planner's end of the queue.
 pub struct BlockQueue {
     pub(super) thread: Thread,
@@ -151,29 +157,136 @@ pub struct BlockQueue {
     pub(super) newest: Index,
     /// The state at the end of the queue, which the next line follows.
     pub(super) tail: Tail,
+    stage: Stage,
 }
 
 impl BlockQueue {
-    /// The number of free blocks.
+    /// The number of free blocks. Those that wait to be blended are not free.
     pub fn free(&self) -> usize {
-        self.ring.free()
+        match self.stage.first() {
+            Some(stage) if stage.is_on() => self.ring.free().saturating_sub(stage.len() + SPARE),
+            _ => self.ring.free(),
+        }
+    }
+
+    /// Whether lines wait besides the one that runs.
+    #[inline(always)]
+    pub fn is_busy(&self) -> bool {
+        self.ring.free() < CAPACITY - 1
     }
 
     /// Notes that exec has dropped all blocks: the next block begins at a standstill.
     pub fn restart(&mut self) {
         self.tail.last = None;
+        if let Some(stage) = self.stage.first_mut() {
+            stage.clear();
+        }
     }
 
     /// Queues a block at whose start the machine stands still. Returns false, with nothing done, when there is no
     /// room.
     pub fn push(&mut self, block: Block) -> bool {
+        self.flush(true);
+        if let Some(stage) = self.stage.first_mut() {
+            match block.body {
+                Body::QueuedAction(QueuedAction::Thread(_)) => stage.follow(true),
+                Body::QueuedAction(QueuedAction::EndThread) => stage.follow(false),
+                _ => {}
+            }
+        }
         self.tail.last = None;
         self.put(|slot| *slot = block, None, |_| {})
     }
 
     /// Queues a block at which the machine does not stop. Returns false, with nothing done, when there is no room.
     pub fn push_aside(&mut self, block: Block) -> bool {
-        self.put(|slot| *slot = block, None, |_| {})
+        match self.stage.first_mut() {
+            Some(stage) if !stage.is_empty() => {
+                stage.pass(block);
+                self.forward();
+                true
+            }
+            _ => self.put(|slot| *slot = block, None, |_| {}),
+        }
+    }
+
+    /// Sets how lines are blended from here on. None waits.
+    #[inline(always)]
+    pub fn stage(&mut self) -> Option<&mut Blend> {
+        self.stage.first_mut().map(|stage| &mut **stage)
+    }
+
+    /// Whether lines are blended.
+    #[inline(always)]
+    pub fn blends(&self) -> bool {
+        self.stage.first().is_some_and(|stage| stage.is_on())
+    }
+
+    /// Whether blocks wait to be blended.
+    #[inline(always)]
+    pub fn has_staged(&self) -> bool {
+        self.stage.first().is_some_and(|stage| !stage.is_empty())
+    }
+
+    /// Queues the blocks that wait to be blended. `stops` says whether the machine stops there.
+    #[inline(always)]
+    pub fn flush(&mut self, stops: bool) {
+        if let Some(stage) = self.stage.first_mut() {
+            stage.flush(stops);
+            self.forward();
+        }
+    }
+
+    /// Takes the move in [`BlockQueue::next_line`], with this direction, to be blended and queued. There is room. If it
+    /// `begins` at a standstill, all moves before it are queued first.
+    pub fn blend(&mut self, unit: &PerAxis<i16>, number: u32, begins: bool) {
+        let Some(line) = self.next_line().copied() else { return };
+        if begins {
+            self.flush(true);
+            self.tail.last = None;
+        }
+        if let Some(stage) = self.stage.first_mut() {
+            stage.add(Block::new(Body::Line(line), number), unit);
+            self.forward();
+        }
+    }
+
+    /// Drops the moves that wait to be blended. What else waits is queued: exec carries it out as it drops its blocks.
+    #[inline(always)]
+    pub fn drop_staged(&mut self) {
+        if self.has_staged() {
+            self.flush_actions();
+        }
+    }
+
+    #[inline(never)]
+    #[small]
+    fn flush_actions(&mut self) {
+        if let Some(stage) = self.stage.first_mut() {
+            stage.flush(true);
+        }
+        while let Some(Ready { block, .. }) = self.stage().and_then(Blend::take) {
+            if let Body::QueuedAction(_) = block.body {
+                self.put(|slot| *slot = block, None, |_| {});
+            }
+        }
+    }
+
+    /// Queues the blocks that are ready.
+    fn forward(&mut self) {
+        while let Some(Ready { block, entry }) = self.stage().and_then(Blend::take) {
+            match block.body {
+                Body::Line(line) => {
+                    if let Some(slot) = self.next_line() {
+                        *slot = line;
+                        self.push_line(entry, block.line());
+                    }
+                }
+                Body::QueuedAction(_) => {
+                    self.put(|slot| *slot = block, None, |_| {});
+                }
+            }
+        }
     }
 
     /// Returns the slot in which to build the next move for [`BlockQueue::push_line`], because copying a block takes

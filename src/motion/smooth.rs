@@ -96,6 +96,17 @@ impl Spans {
         self.corner > 1 || self.jerk > 1
     }
 
+    /// Whether a mean rounds corners.
+    #[inline(always)]
+    pub fn rounds(self) -> bool {
+        self.corner > 1
+    }
+
+    /// How many samples each mean covers.
+    pub fn samples(self) -> (u8, u8) {
+        (self.corner, self.jerk)
+    }
+
     /// For how many samples a distance goes on to come out, after the sample in which it went in.
     #[inline(always)]
     pub fn lag(self) -> u8 {

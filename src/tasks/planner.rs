@@ -47,6 +47,7 @@ use crate::gcode::modal::FeedMode;
 use crate::gcode::overrides::Change;
 use crate::gcode::steps::{Step, Steps};
 use crate::hal::event::{Event, is_asked, wait};
+use crate::hal::time::millis;
 use crate::jobs::Job;
 use crate::machine::{self, Cycle};
 #[cfg(feature = "printer")]
@@ -164,8 +165,8 @@ pub type Shared = Mutex<NoopRawMutex, Planner>;
 pub fn run(links: &'static Links, shared: &'static Shared) -> impl Future<Output = Never> {
     async move {
         loop {
-            let has_chain = shared.lock().await.has_chain();
-            match has_chain {
+            let waits = shared.lock().await.has_waiting();
+            match waits {
                 false => links.planner_wake.wait().await,
                 true => {
                     select(links.planner_wake.wait(), nothing_follows(links, shared)).await;
@@ -206,6 +207,7 @@ pub fn run(links: &'static Links, shared: &'static Shared) -> impl Future<Output
             }
             links.commands_taken.set(false);
             if planner.is_flushed() {
+                planner.queue.drop_staged();
                 seek::drop_blocks(links.thread).await;
                 if planner.restart() {
                     let resets = links.is_resetting();
@@ -228,21 +230,24 @@ pub fn take_at_once(planner: &mut Planner) -> bool {
     if planner.is_flushed() || planner.owes_answers() {
         return false;
     }
-    let had_chain = planner.has_chain();
+    let waited = planner.has_waiting();
     let done = planner.carry_out_at_once();
-    if planner.has_chain() {
+    if planner.has_waiting() {
         planner.links.chain_waits.set(true);
         if queue::used_here() <= 1 {
             // Exec may have finished a block of which the planner's task has not been told yet.
             planner.make_up();
         }
-        if !had_chain {
-            // The task limits the time for which the chain waits.
+        if !waited {
+            // The task limits the time for which lines wait.
             planner.links.planner_wake.signal();
         }
     }
     done
 }
+
+/// The share of P that is for merged moves where corners are rounded within P.
+const MERGED: f32 = 0.25;
 
 /// With this many blocks queued, answers come before another block.
 const ENOUGH: usize = CAPACITY / 2;
@@ -303,8 +308,9 @@ impl Planner {
         if Capability::Lathe.is_built_in() && self.turns_otherwise(&commands.motion) {
             return false;
         }
+        let tolerance = self.merged(&commands);
         if let Begun::Chain(chain) = &mut self.begun
-            && chain.go_on(&self.position, target, feed, commands.blend)
+            && chain.go_on(&self.position, target, feed, tolerance)
         {
             self.alone = 0;
             self.wait_for_more(commands.line);
@@ -316,7 +322,7 @@ impl Planner {
             return false;
         }
         let free = self.queue.free();
-        let may_merge = !commands.exact_stop && free < CAPACITY - 1 && self.dynamics.merges;
+        let may_merge = !commands.exact_stop && self.queue.is_busy() && self.dynamics.merges;
         if may_merge && self.is_worth_a_chain() && self.begin_chain(target, feed, &commands) {
             return true;
         }
@@ -363,6 +369,8 @@ impl Planner {
                 self.announcement = Announcement::Lead;
             }
             self.dynamics.rounds = self.spans.is_some();
+            self.queue.flush(false);
+            self.set_blend();
         }
         self.outputs.on ^= self.links.changes.take_flipped();
         if self.links.changes.has(Changes::STEPS) {
@@ -549,7 +557,8 @@ impl Planner {
         let (from, to) = lifted.as_ref().map_or((&self.position, target), |(from, to)| (from, to));
         #[cfg(feature = "bed-plane")]
         let may_merge = may_merge && (lifted.is_none() || bed::is_near(&self.position, target));
-        let line = Line { from, to, feed, curve, may_merge };
+        let blends = self.queue.blends();
+        let line = Line { from, to, feed, curve, may_merge, blends };
         let Some(block) = self.queue.next_line() else { return Built::Nothing };
         let built = self.builder.line(&line, &self.dynamics, &*settings, block);
         if let Built::Line(entry) = built {
@@ -558,7 +567,13 @@ impl Planner {
             if let Ongoing::Arc(arc) = &mut self.walk {
                 arc.curve.go_on();
             }
-            self.queue.push_line(entry, self.line);
+            if blends {
+                self.keep_to_deviation();
+                self.waits_since = millis() as u16;
+                self.queue.blend(self.builder.unit(), self.line, entry <= 0.0);
+            } else {
+                self.queue.push_line(entry, self.line);
+            }
         }
         built
     }
@@ -617,7 +632,7 @@ impl Planner {
     fn set_origin(&mut self) -> bool {
         let links = self.links;
         let origin = origin::read(&links.settings.borrow(), &links.model.borrow());
-        let runs = queue::used() > 0;
+        let runs = queue::used() > 0 || self.queue.has_staged();
         let runs = common::with(links.thread, move |common| {
             let runs = runs || common.motion.running;
             if !runs {
@@ -668,6 +683,34 @@ impl Planner {
             self.spans = spans;
             self.dynamics.rounds = spans.is_some();
             self.pause(QueuedAction::Smooth(spans));
+            self.set_blend();
+        }
+    }
+
+    /// Sets how far corners may be off the path from this line on. The G-code model has interpreted this line and no
+    /// later one.
+    #[inline(never)]
+    #[small]
+    fn keep_to_deviation(&mut self) {
+        let deviation = self.links.model.borrow().modal().deviation();
+        // A part of it is for moves that are merged.
+        let deviation = f32::from(deviation) * (1e-4 * (1.0 - MERGED));
+        if let Some(stage) = self.queue.stage()
+            && stage.deviation().to_bits() != deviation.to_bits()
+        {
+            self.queue.flush(false);
+            if let Some(stage) = self.queue.stage() {
+                stage.set_deviation(deviation);
+            }
+        }
+    }
+
+    /// Sets how lines are blended from here on. None waits.
+    #[inline(always)]
+    fn set_blend(&mut self) {
+        let (spans, dynamics) = (self.spans, &self.dynamics);
+        if let Some(stage) = self.queue.stage() {
+            stage.set(spans, dynamics);
         }
     }
 

@@ -9,6 +9,7 @@ use kerf::gcode::overrides::Change;
 use kerf::hal::ring::{Consumer, Producer, Ring};
 use kerf::kinematics::{self, DIFFERENCE, SUM};
 use kerf::motion::advance;
+use kerf::motion::blend::Blend;
 use kerf::motion::block::{Block, QueuedAction};
 use kerf::motion::dynamics::{Dynamics, MachineLimits};
 use kerf::motion::exec::{Exec, Step, take_heat, take_override};
@@ -164,6 +165,7 @@ pub struct Rig {
     pub segments: u64,
     /// A motor that may be ahead of its line. It is not checked.
     pub leads: Option<usize>,
+    blends: bool,
     /// How far the segments have moved each motor, phase units.
     travel: [i64; MOTORS],
 }
@@ -172,7 +174,8 @@ impl Rig {
     pub fn new(config: Config) -> Self {
         let blocks: &'static BlockStore = Box::leak(Box::new(BlockStore::new()));
         let runtime = Runtime::new();
-        let queue = blocks.queue(runtime.thread()).expect("first");
+        let stage = std::array::from_fn(|_| Box::leak(Box::new(Blend::new())));
+        let queue = blocks.queue(runtime.thread(), stage).expect("first");
         let source = blocks.source(runtime.interrupt()).expect("first");
         let segments: &'static Ring<Segment, SEGMENTS> = Box::leak(Box::new(Ring::new()));
         let (fill, drain) = segments.split().expect("first");
@@ -196,11 +199,26 @@ impl Rig {
             change: None,
             segments: 0,
             leads: None,
+            blends: false,
             travel: [0; MOTORS],
         };
         rig.push(Block::action(smooth, 0));
         rig.turn();
         rig
+    }
+
+    /// Blends lines from here on, within this deviation, mm.
+    pub fn blend(&mut self, deviation: f32) {
+        self.blends = true;
+        kerf::hal::imp::set_blends(true);
+        let stage = self.queue.stage().expect("the host blends");
+        stage.set(self.dynamics.spans, &self.dynamics);
+        stage.set_deviation(deviation);
+    }
+
+    /// Queues the lines that wait to be blended.
+    pub fn flush(&mut self, stops: bool) {
+        self.queue.flush(stops);
     }
 
     pub fn free(&self) -> usize {
@@ -218,7 +236,9 @@ impl Rig {
     }
 
     fn go(&mut self, to: PerAxis<Length>, feed: Option<Feed>, number: u32) {
-        let line = Line { from: &self.position, to: &to, feed, curve: None, may_merge: false };
+        let blends = self.blends;
+        let line =
+            Line { from: &self.position, to: &to, feed, curve: None, may_merge: false, blends };
         let block = self.queue.next_line().expect("room");
         match self.builder.line(&line, &self.dynamics, &self.config, block) {
             Built::Nothing => {}
@@ -230,7 +250,11 @@ impl Rig {
                     let travel = to[axis].0 - self.position[axis].0;
                     advance::refine(block, motor, self.config.ratio[motor], travel);
                 }
-                assert!(self.queue.push_line(entry, number));
+                if blends {
+                    self.queue.blend(self.builder.unit(), number, entry <= 0.0);
+                } else {
+                    assert!(self.queue.push_line(entry, number));
+                }
             }
         }
         self.position = to;

@@ -76,6 +76,7 @@ fn the_tolerance_of_the_path_is_modal() {
     let blend = |lines: &[&str]| run(lines).1.blend;
     for (line, tolerance) in [
         ("G64", 10),
+        ("G64 P0.001", 10),
         ("G64 P0", 0),
         ("G64 P0.005", 50),
         ("G20 G64 P0.0001", 25),

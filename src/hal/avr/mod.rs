@@ -48,7 +48,7 @@ pub struct Chip;
 
 /// Functions of [`System`](super::contract::System).
 pub mod system {
-    pub use super::{boot, reset, set_rests};
+    pub use super::{blends, boot, reset, set_rests};
 }
 
 /// Functions of [`Text`](super::primitives::Text).
@@ -106,6 +106,11 @@ pub fn boot() -> ! {
 
 /// Does nothing: this chip has no USB.
 pub fn set_rests(_: bool) {}
+
+/// Whether lines are blended: this chip has no room for it.
+pub fn blends() -> bool {
+    false
+}
 
 /// Whether the boot section, from 0x3E000 on, holds a program.
 fn has_boot_loader() -> bool {

@@ -38,7 +38,7 @@ pub struct Chip;
 
 /// Functions of [`System`](super::contract::System).
 pub mod system {
-    pub use super::{boot, reset, set_rests};
+    pub use super::{blends, boot, reset, set_rests};
 }
 
 /// Functions of [`Text`](super::primitives::Text).
@@ -66,6 +66,7 @@ impl<T: Copy> Local<T> {
 
 machine_static! {
     fn resets() -> Local<bool> = Local::new(false);
+    fn blending() -> Local<bool> = Local::new(false);
     fn clock() -> Local<u64> = Local::new(0);
 }
 
@@ -86,6 +87,16 @@ pub fn boot() {
 
 /// Does nothing: there is no USB.
 pub fn set_rests(_: bool) {}
+
+/// Whether lines are blended.
+pub fn blends() -> bool {
+    blending().get()
+}
+
+/// Sets whether lines are blended: without it the host is like a small chip.
+pub fn set_blends(blends: bool) {
+    blending().set(blends);
+}
 
 /// Whether the firmware has asked for a reset.
 pub fn was_reset() -> bool {

@@ -65,8 +65,14 @@ pub use crate::hal::{exec, flags};
 /// This chip, for the [contract](super::contract).
 pub struct Chip;
 
+/// Whether lines are blended.
+pub fn blends() -> bool {
+    true
+}
+
 /// Functions of [`System`](super::contract::System).
 pub mod system {
+    pub use super::blends;
     pub use super::usb::set_rests;
     pub use super::watchdog::{boot, reset};
 }

@@ -76,14 +76,18 @@ impl Planner {
         let lead = self.wanted_lead();
         if lead != self.lead {
             self.lead = lead;
+            if let Some(stage) = self.queue.stage() {
+                stage.set_extruder(lead.motor);
+            }
             let _ = self.queue.push_aside(Block::action(QueuedAction::Advance(lead), self.line));
             self.announce();
         }
     }
 
     /// Waits until the heaters of the line have reached their targets, or until the wait is ended.
-    pub(super) async fn await_heat(&self) {
+    pub(super) async fn await_heat(&mut self) {
         let links = self.links;
+        self.queue.flush(true);
         wait(links.thread, Event::BlockDone, || {
             (queue::used() == 0 || self.is_flushed()).then_some(())
         })

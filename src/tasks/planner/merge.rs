@@ -45,6 +45,12 @@ impl Planner {
         matches!(self.begun, Begun::Chain(_))
     }
 
+    /// Whether lines wait for the next one: a chain, or lines to be blended.
+    #[inline(always)]
+    pub(super) fn has_waiting(&self) -> bool {
+        self.has_chain() || self.queue.has_staged()
+    }
+
     /// Whether a begun line or chain is still to be completed.
     pub(super) fn has_begun(&self) -> bool {
         !matches!(self.begun, Begun::Nothing)
@@ -59,6 +65,18 @@ impl Planner {
         self.alone <= ALONE || self.alone & (each - 1) == 0
     }
 
+    /// Returns how far merged moves may be off the path, as [`Commands::blend`]: less where corners are rounded within P.
+    #[inline(always)]
+    pub(super) fn merged(&self, commands: &Commands) -> u8 {
+        match commands.blend {
+            wide if wide > 4 && self.queue.blends() => {
+                let deviation = self.links.model.borrow().modal().deviation();
+                wide.min((deviation / 4 + 1).min(u8::MAX.into()) as u8)
+            }
+            other => other,
+        }
+    }
+
     /// Begins a chain with a line. Returns false if the line cannot be merged with lines that follow.
     #[inline(always)]
     pub(super) fn begin_chain(
@@ -67,11 +85,12 @@ impl Planner {
         feed: Option<&Feed>,
         commands: &Commands,
     ) -> bool {
+        let tolerance = self.merged(commands);
         if !self.has_chain() {
             self.begun = Begun::Chain(Chain::default());
         }
         if let Begun::Chain(chain) = &mut self.begun
-            && chain.begin(&self.position, target, feed, commands.blend)
+            && chain.begin(&self.position, target, feed, tolerance)
         {
             self.wait_for_more(commands.line);
             return true;
@@ -143,17 +162,36 @@ impl Planner {
                 self.tell();
             }
             self.build_chain(false);
+            if self.stage_is_due() {
+                self.queue.flush(false);
+                self.announce();
+            }
         }
-        self.links.chain_waits.set(self.has_chain());
+        self.links.chain_waits.set(self.has_waiting());
     }
 
-    /// Whether the chain is not to wait any longer, and there is room for it and for the blocks of changed settings.
+    /// Whether what waits is not to wait any longer, and there is room for it and for the blocks of changed settings.
     fn is_due(&self) -> bool {
-        let Begun::Chain(chain) = &self.begun else { return false };
-        let is_stale =
-            || !chain.is_closed() && (millis() as u16).wrapping_sub(self.waits_since) >= STALE_MS;
-        let is_due = queue::used_here() <= 1 || is_stale() && self.queue.free() >= BLOCKS;
+        let is_due = match &self.begun {
+            Begun::Chain(chain) => {
+                let is_stale = || !chain.is_closed() && self.is_stale();
+                queue::used_here() <= 1 || is_stale() && self.queue.free() >= BLOCKS
+            }
+            _ => self.stage_is_due(),
+        };
         is_due && !self.is_flushed()
+    }
+
+    /// Whether lines that wait to be blended are not to wait any longer: nothing runs, or soon nothing will.
+    #[inline(always)]
+    fn stage_is_due(&self) -> bool {
+        let left = queue::used_here();
+        self.queue.has_staged() && (left == 0 || left == 1 && self.is_stale())
+    }
+
+    #[inline(always)]
+    fn is_stale(&self) -> bool {
+        (millis() as u16).wrapping_sub(self.waits_since) >= STALE_MS
     }
 }
 

@@ -1,0 +1,390 @@
+//! Blending: how fast corners are passed where [means](super::smooth) round them.
+//!
+//! Owned by the block queue, in thread mode. Blocks wait here ([`Blend::add`]) until what follows them is known as far as
+//! the means reach, some 50 ms of path, and then go to the queue ([`Blend::take`]). If nothing follows for now, they all
+//! go ([`Blend::flush`]). Only chips with room for the waiting blocks have it ([`STAGE`]).
+//!
+//! A mean over the time T makes of a jump of velocity by d an acceleration d / T. So the acceleration of an axis keeps to
+//! its limit A if its velocity changes by at most A T within any T, for one of the two means. Corners take part of that,
+//! and acceleration along the path takes the remainder:
+//!
+//! - **Velocity.** Two corners share a window if the path between them takes less than T. The change of direction from
+//!   the first to the last corner of a window limits the velocity at all of them, so that no axis changes by more than
+//!   [`SHARE`] of A T. A window is a time, and the machine may speed up between its corners: a path of length x takes
+//!   less than T at a velocity of v and more at both ends if x < v T + A T^2 / 4 (`windows`).
+//! - **Room.** What corners leave over limits the acceleration along the path near them. Long lines are cut there, so that
+//!   the remainder of the line has the whole acceleration. Short lines are limited as a whole. On a curve turning and
+//!   acceleration along the path are at right angles, which leaves more; so does a corner far from all others (`room`).
+//!   A sharp corner is passed at the velocity that costs the least time.
+//! - **Deviation.** What comes out of the means is off the path by the sum of the changes of direction, each times
+//!   `v phi(t) + A Phi(t)` at its distance t in time ([`Kernel`]). The velocity at a corner keeps this within P. Where
+//!   even a stop is off by half of P, acceleration is limited about the corner as well.
+//!
+//! Holds and overrides make the motion slower or begin later, and no bound depends on that.
+//!
+//! If the stage is full, the path that waits is shorter than the windows. The velocity is then limited so that windows
+//! are as short.
+//!
+//! Measured from steps (`tests/blend.rs`): 0.1 % of random paths take up to 1.12 of A, all others keep to it.
+//!
+//! Units: mm, s; lengths in 0.1 um, directions in 2^-14.
+
+mod cut;
+mod deviation;
+mod kernel;
+mod limits;
+mod room;
+mod settle;
+mod windows;
+
+use kernel::Kernel;
+use limits::{Limits, in_lengths, turn, zone};
+use windows::Window;
+
+use super::block::{Block, Body, Line};
+use super::dynamics::Dynamics;
+use super::float::{greater, least};
+use super::smooth::{SAMPLE_S, Spans};
+use crate::hal::STAGE;
+use crate::units::{AXES, PerAxis};
+
+/// Whether this chip blends.
+pub const BLENDS: bool = STAGE > 0;
+
+/// How many stages there are.
+pub const STAGES: usize = BLENDS as usize;
+
+/// Blocks that adding a line may take besides those that wait: the parts of the line and of the line before.
+pub const SPARE: usize = 5;
+
+/// The share of the acceleration that corners may take.
+const SHARE: f32 = 0.8;
+/// The share of P that is used: the deviation is known at corners only.
+const USED: f32 = 0.93;
+/// The share of the acceleration that is left along a curve.
+const ROUND: f32 = 0.6;
+/// The least share of the acceleration that is left along the path, so that a hold can stop there.
+const LEAST_ROOM: f32 = 0.05;
+/// The room at the end of a path that has been flushed. The corner that may follow takes as much.
+const HALF: f32 = 0.5;
+/// A change of direction below this is none: its square, in 2^-28.
+const STRAIGHT: u32 = 1_000;
+/// Axes are alike if the acceleration limits differ by less.
+const EVEN: f32 = 0.9;
+/// A corner of less than this belongs to a curve: the square of a half, in 2^-28.
+const CURVE: u32 = 1 << 26;
+/// Lengths in a mm.
+const PER_MM: f32 = 1e4;
+/// 1 in the units of a direction.
+const ONE: f32 = 16_384.0;
+/// 1 in the units of a weight.
+const WEIGHT: f32 = 256.0;
+
+/// Places for blocks that wait.
+const PLACES: usize = if BLENDS { STAGE } else { 1 };
+
+/// A block that waits, and the corner at its start.
+#[derive(Clone, Copy)]
+struct Entry {
+    block: Block,
+    /// The direction of the path.
+    unit: PerAxis<i16>,
+    /// The length of the path; 0 for a block that moves nothing.
+    length: u32,
+    /// The velocity limit at its start.
+    entry: f32,
+    /// The share of the acceleration that is left in the block.
+    room: f32,
+    /// The square of the change of direction at its start.
+    turn: u32,
+    /// What windows of each mean ask for.
+    asked: [Asked; 2],
+}
+
+/// What the windows with a corner ask for.
+#[derive(Clone, Copy)]
+struct Asked {
+    /// The velocity limit.
+    velocity: f32,
+    /// The greatest change of direction: that of an axis, weighted, in 2^-22, and the square of the whole.
+    change: u32,
+    square: u32,
+}
+
+impl Entry {
+    /// A block that changes nothing about the path.
+    fn new(block: Block, unit: &PerAxis<i16>, length: u32) -> Self {
+        let asked = [Asked { velocity: f32::MAX, change: 0, square: 0 }; 2];
+        Self { block, unit: *unit, length, entry: f32::MAX, room: 1.0, turn: 0, asked }
+    }
+
+    fn line(&self) -> Option<&Line> {
+        match &self.block.body {
+            Body::Line(line) => Some(line),
+            Body::QueuedAction(_) => None,
+        }
+    }
+
+    fn cruise(&self) -> f32 {
+        self.line().map_or(f32::MAX, |line| line.cruise)
+    }
+
+    fn accel(&self) -> f32 {
+        self.line().map_or(0.0, |line| line.accel.get())
+    }
+}
+
+/// A block that is to go to the queue, with the velocity limit at its start, mm/s.
+pub struct Ready {
+    /// The block.
+    pub block: Block,
+    /// The highest velocity at its start, mm/s.
+    pub entry: f32,
+}
+
+/// The blocks that wait, and what limits them.
+pub struct Blend {
+    limits: Limits,
+    /// The blocks: a ring.
+    entries: [Entry; PLACES],
+    /// The windows that begin at each corner and end at the last one, while they are looked for.
+    windows: [Window; PLACES],
+    first: usize,
+    len: usize,
+    /// How many corners are final, from the first block on.
+    done: usize,
+    /// How many blocks are to go because nothing follows for now.
+    flushed: usize,
+    /// The direction before the first block; `None` at a standstill.
+    before: Option<PerAxis<i16>>,
+    /// The velocity limit of the next corner, if the path before it has gone.
+    behind: f32,
+    /// The length of the path from the last corner that has gone to the first block.
+    gone: u32,
+    /// The motor of the extruder.
+    motor: u8,
+    on: bool,
+    /// Lines follow the spindle, and are not blended.
+    follows: bool,
+}
+
+impl Blend {
+    /// A stage that is off, without blocks.
+    pub fn new() -> Self {
+        Self {
+            limits: Limits {
+                kernel: Kernel::NONE,
+                windows: [0.0; 2],
+                deviation: 0.05,
+                accel: 0.0,
+                weights: [0; AXES],
+                accels: [0.0; AXES],
+            },
+            entries: [Entry::new(Block::new(Body::Line(Line::default()), 0), &[0; AXES], 0);
+                PLACES],
+            windows: [Window::default(); PLACES],
+            first: 0,
+            len: 0,
+            done: 0,
+            flushed: 0,
+            before: None,
+            behind: f32::MAX,
+            gone: u32::MAX,
+            motor: 0,
+            on: false,
+            follows: false,
+        }
+    }
+
+    /// Whether lines are to be added.
+    pub fn is_on(&self) -> bool {
+        self.on && !self.follows
+    }
+
+    /// Notes whether lines follow the spindle from here on. No block waits.
+    pub fn follow(&mut self, spindle: bool) {
+        self.follows = spindle;
+    }
+
+    /// How many blocks wait.
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Whether no block waits.
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// Sets the limits for the lines from here on. No block waits.
+    pub fn set(&mut self, spans: Spans, dynamics: &Dynamics) {
+        self.on = BLENDS && spans.rounds() && crate::hal::system::blends();
+        let limits = &mut self.limits;
+        limits.accels = dynamics.axes.map(|axis| axis.accel.get());
+        limits.accel = limits.accels.iter().fold(f32::MAX, |least, accel| match *accel > 0.0 {
+            true => least.min(*accel),
+            false => least,
+        });
+        limits.weights = limits.accels.map(|accel| match accel > 0.0 {
+            true => (WEIGHT * limits.accel / accel + 0.99) as u16,
+            false => 0,
+        });
+        limits.kernel = Kernel::of(spans);
+        let (corner, jerk) = spans.samples();
+        limits.windows = [corner, jerk].map(|samples| f32::from(samples) * SAMPLE_S);
+    }
+
+    /// Sets which motor drives the extruder, if there is one.
+    pub fn set_extruder(&mut self, motor: u8) {
+        self.motor = motor;
+    }
+
+    /// Sets P, mm.
+    pub fn set_deviation(&mut self, deviation: f32) {
+        self.limits.deviation = deviation;
+    }
+
+    /// P, mm.
+    pub fn deviation(&self) -> f32 {
+        self.limits.deviation
+    }
+
+    /// Forgets all blocks: the machine stands still.
+    pub fn clear(&mut self) {
+        (self.first, self.len, self.done, self.flushed) = (0, 0, 0, 0);
+        self.follows = false;
+        self.stop();
+    }
+
+    /// Notes that the machine stands still behind the last block.
+    pub fn stop(&mut self) {
+        (self.before, self.behind, self.gone) = (None, f32::MAX, u32::MAX);
+    }
+
+    /// Adds a block that moves nothing and at which the machine does not stop.
+    pub fn pass(&mut self, block: Block) {
+        let unit = self.last().map(|last| last.unit).or(self.before).unwrap_or_default();
+        self.append(Entry::new(block, &unit, 0));
+    }
+
+    /// Adds a line with this direction. There is room for [`SPARE`] blocks.
+    pub fn add(&mut self, block: Block, unit: &PerAxis<i16>) {
+        let Body::Line(line) = &block.body else { return };
+        let length = in_lengths(line.extent.length());
+        let mut entry = Entry::new(block, unit, length);
+        let from = self.last().map(|last| last.unit).or(self.before);
+        if let Some(from) = from {
+            entry.turn = turn(&from, unit);
+            if entry.turn >= STRAIGHT {
+                return self.corner(entry, &from);
+            }
+        }
+        self.append(entry);
+        self.cut_last();
+    }
+
+    /// Adds a line behind a corner.
+    fn corner(&mut self, mut entry: Entry, from: &PerAxis<i16>) {
+        let cruise = self.last().map_or(f32::MAX, Entry::cruise);
+        let (change, _) = self.limits.change(from, &entry.unit);
+        let top = least(least(cruise, entry.cruise()), self.behind);
+        let [first, second] = self.limits.windows;
+        entry.entry = least(top, self.limits.velocity(change, greater(first, second)));
+        self.behind = f32::MAX;
+        let accel = greater(self.last().map_or(0.0, Entry::accel), entry.accel());
+        let zone = zone(entry.entry, accel, self.limits.kernel.reach());
+        self.cut_end(zone);
+        let cut = in_lengths(zone);
+        self.append(entry);
+        self.look_back(top, 0);
+        self.look_back(top, 1);
+        if entry.length - entry.length / 5 > cut {
+            self.cut_last_at(cut);
+        }
+        self.cut_last();
+    }
+
+    /// Lets all blocks that wait go. If the machine `stops` there, no corner follows; otherwise one may, and the end of the
+    /// path leaves it half of the acceleration.
+    pub fn flush(&mut self, stops: bool) {
+        if self.len == 0 {
+            if stops {
+                self.stop();
+            }
+            return;
+        }
+        if stops {
+            self.settle(true);
+            self.stop();
+        } else {
+            let accel = self.last().map_or(0.0, Entry::accel);
+            let seconds = self.limits.kernel.reach();
+            let wanted = zone(HALF * accel * seconds, HALF * accel, seconds);
+            self.cut_end(wanted);
+            self.settle(true);
+            let newest = self.len - 1;
+            let last = self.entry_mut(newest);
+            last.room = least(last.room, HALF);
+            let (length, unit) = (last.length as f32 * (1.0 / PER_MM), last.unit);
+            self.behind = greater(0.0, length / seconds - 0.25 * accel * seconds);
+            self.before = Some(unit);
+        }
+        self.flushed = self.len;
+    }
+
+    /// Returns the next block that is to go to the queue.
+    pub fn take(&mut self) -> Option<Ready> {
+        if self.len == 0 {
+            return None;
+        }
+        if self.flushed == 0 {
+            self.settle(false);
+            if !self.is_settled() && self.len + SPARE < PLACES {
+                return None;
+            }
+            if !self.is_settled() {
+                self.crowd();
+            }
+        }
+        let (first, followed) = (self.entry(0), self.len > 1);
+        let mut block = first.block;
+        if let Body::Line(line) = &mut block.body {
+            line.accel = super::short::Short::new(line.accel.get() * first.room);
+        }
+        let (entry, turns, length) = (first.entry, first.turn >= STRAIGHT, first.length);
+        if followed || self.flushed == 0 {
+            self.before = Some(first.unit);
+        }
+        self.gone = if turns { length } else { self.gone.saturating_add(length) };
+        self.first = (self.first + 1) % PLACES;
+        self.len -= 1;
+        self.done = self.done.saturating_sub(1);
+        self.flushed = self.flushed.saturating_sub(1);
+        Some(Ready { block, entry })
+    }
+
+    fn last(&self) -> Option<&Entry> {
+        self.len.checked_sub(1).map(|n| self.entry(n))
+    }
+
+    fn append(&mut self, entry: Entry) {
+        if self.len < PLACES {
+            self.len += 1;
+            *self.entry_mut(self.len - 1) = entry;
+        }
+    }
+
+    fn entry(&self, n: usize) -> &Entry {
+        &self.entries[(self.first + n) % PLACES]
+    }
+
+    fn entry_mut(&mut self, n: usize) -> &mut Entry {
+        &mut self.entries[(self.first + n) % PLACES]
+    }
+}
+
+impl Default for Blend {
+    fn default() -> Self {
+        Self::new()
+    }
+}

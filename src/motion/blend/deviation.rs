@@ -1,0 +1,47 @@
+//! How far what comes out of the means is off the path.
+
+use super::limits::{in_lengths, reach};
+use super::{Blend, ONE};
+use crate::math::sqrt;
+use crate::motion::smooth::SAMPLE_S;
+use crate::units::FIRST_ROTARY;
+
+impl Blend {
+    /// Returns how far the path is off at a corner that is passed at `velocity`, mm, if the machine brakes before it and
+    /// speeds up behind it by `accel`.
+    pub(super) fn off(&self, corner: usize, velocity: f32, accel: f32) -> f32 {
+        let kernel = &self.limits.kernel;
+        let mut sum = [0.0f32; FIRST_ROTARY];
+        let (mut ahead, mut ahead_way) = (corner, self.entry(corner).length);
+        let (mut back, mut back_way) = match corner {
+            0 => (0, u32::MAX),
+            _ => (corner, self.entry(corner - 1).length),
+        };
+        for layer in &kernel.layers {
+            let far = in_lengths(reach(velocity, accel, layer.seconds));
+            while ahead_way < far && ahead + 1 < self.len {
+                ahead += 1;
+                ahead_way = ahead_way.saturating_add(self.entry(ahead).length);
+            }
+            while back_way < far && back > 1 {
+                back -= 1;
+                back_way = back_way.saturating_add(self.entry(back - 1).length);
+            }
+            let from = match back {
+                0 => self.before.unwrap_or(self.entry(corner).unit),
+                _ => self.entry(back - 1).unit,
+            };
+            let to = self.entry(ahead).unit;
+            let weight = velocity * layer.velocity + accel * layer.accel;
+            for ((sum, from), to) in sum.iter_mut().zip(from).zip(to) {
+                if from != to {
+                    *sum += weight * f32::from(to.wrapping_sub(from));
+                }
+            }
+        }
+        let square = sum.iter().map(|part| part * part).sum::<f32>();
+        // The chord of a sample.
+        let chord = 0.25 * SAMPLE_S * accel * SAMPLE_S;
+        sqrt(square) * (1.0 / ONE) + chord
+    }
+}

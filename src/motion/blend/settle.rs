@@ -1,0 +1,140 @@
+//! Makes corners final when the path that waits is longer than their windows.
+
+use super::limits::{in_lengths, reach, zone};
+use super::{Blend, LEAST_ROOM, PER_MM, STRAIGHT, USED};
+use crate::motion::float::{greater, least};
+
+impl Blend {
+    /// Makes corners final whose windows lie in the path that waits; all if nothing follows.
+    pub(super) fn settle(&mut self, all: bool) {
+        while self.done < self.len {
+            let corner = self.done;
+            if !all && !self.reaches(corner) {
+                return;
+            }
+            if self.entry(corner).turn >= STRAIGHT {
+                self.finish(corner);
+            }
+            self.done += 1;
+        }
+    }
+
+    /// Whether the path behind a corner is as long as its windows.
+    pub(super) fn reaches(&self, corner: usize) -> bool {
+        let entry = self.entry(corner);
+        let asked = greater(entry.asked[0].velocity, entry.asked[1].velocity);
+        let velocity = least(least(entry.entry, asked), entry.cruise());
+        self.is_as_long(corner, reach(velocity, entry.accel(), self.limits.kernel.reach()))
+    }
+
+    /// Whether the path from the start of block `n` on is as long as this, mm.
+    pub(super) fn is_as_long(&self, n: usize, length: f32) -> bool {
+        let longest = in_lengths(length);
+        let mut way = 0u32;
+        for at in n..self.len {
+            way = way.saturating_add(self.entry(at).length);
+            if way >= longest {
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Whether no corner behind can limit the first block any more: those in reach are final.
+    pub(super) fn is_settled(&self) -> bool {
+        if self.done == 0 {
+            return false;
+        }
+        let first = self.entry(0);
+        let needed = in_lengths(zone(first.cruise(), first.accel(), self.limits.kernel.reach()));
+        let mut way = 0u32;
+        for at in 1..self.done {
+            if way >= needed {
+                return true;
+            }
+            way = way.saturating_add(self.entry(at).length);
+        }
+        way >= needed
+    }
+
+    /// The stage is full: makes the first corners final, at a velocity at which their windows lie in the path that waits.
+    pub(super) fn crowd(&mut self) {
+        let corner = self.done;
+        if corner < self.len {
+            let mut way = 0u32;
+            for at in corner..self.len {
+                way = way.saturating_add(self.entry(at).length);
+            }
+            let (accel, reach) = (self.entry(corner).accel(), self.limits.kernel.reach());
+            let fits = way as f32 * (1.0 / PER_MM) - 0.25 * accel * reach * reach;
+            let entry = self.entry_mut(corner);
+            entry.entry = least(entry.entry, greater(fits, 0.0) * (1.0 / reach));
+            if entry.turn >= STRAIGHT {
+                self.finish(corner);
+            }
+            self.done += 1;
+        }
+    }
+
+    /// Makes a corner final: limits its velocity by the deviation, and the acceleration about it by the room it leaves.
+    pub(super) fn finish(&mut self, corner: usize) {
+        let entry = *self.entry(corner);
+        let before = match corner {
+            0 => entry.accel(),
+            _ => self.entry(corner - 1).accel(),
+        };
+        let accel = greater(before, entry.accel());
+        let mean = self.mean_of(corner, accel);
+        let mut velocity = least(entry.entry, entry.asked[mean].velocity);
+        let allowed = USED * self.limits.deviation;
+        let mut share = 1.0;
+        if self.off(corner, velocity, accel) > allowed {
+            let stands = self.off(corner, 0.0, accel);
+            if stands > 0.5 * allowed {
+                share = greater(0.5 * allowed / stands, LEAST_ROOM);
+            }
+            velocity = self.slowed(corner, velocity, share * accel, allowed);
+        }
+        let (velocity, room) = self.fastest(corner, mean, velocity, accel);
+        self.entry_mut(corner).entry = velocity;
+        let seconds = greater(self.limits.windows[mean], self.limits.kernel.reach());
+        self.leave(corner, room, zone(velocity, room * accel, seconds));
+        if share < 1.0 {
+            let reach = self.limits.kernel.reach();
+            self.leave(corner, share, zone(velocity, share * accel, reach));
+        }
+    }
+
+    /// Returns the highest velocity, up to `most`, at which the path is off by no more than `allowed` at a corner.
+    pub(super) fn slowed(&self, corner: usize, most: f32, accel: f32, allowed: f32) -> f32 {
+        let (mut low, mut high) = (0.0, most);
+        for _ in 0..6 {
+            let middle = 0.5 * (low + high);
+            if self.off(corner, middle, accel) > allowed { high = middle } else { low = middle }
+        }
+        low
+    }
+
+    /// Limits the acceleration as far as `zone` mm about a corner.
+    pub(super) fn leave(&mut self, corner: usize, room: f32, zone: f32) {
+        let zone = in_lengths(zone);
+        let mut way = 0u32;
+        for at in corner..self.len {
+            if way >= zone {
+                break;
+            }
+            let entry = self.entry_mut(at);
+            entry.room = least(entry.room, room);
+            way = way.saturating_add(entry.length);
+        }
+        let mut way = 0u32;
+        for at in (0..corner).rev() {
+            if way >= zone {
+                break;
+            }
+            let entry = self.entry_mut(at);
+            entry.room = least(entry.room, room);
+            way = way.saturating_add(entry.length);
+        }
+    }
+}
