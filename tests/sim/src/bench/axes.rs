@@ -98,7 +98,7 @@ fn over_limit(jobs: &[Measured], greatest: fn(&Measured) -> Greatest) -> Figure 
     let value = jobs.iter().map(|job| greatest(job).over).fold(0.0, f64::max);
     let told = |job: &Measured| {
         let of = greatest(job);
-        format!("{:.2} {}", of.over, AXIS_NAMES[of.axis])
+        format!("{:.2} {} at {:.2} s", of.over, AXIS_NAMES[of.axis], of.seconds)
     };
     Figure { value, note: each(jobs, told) }
 }
