@@ -14,6 +14,7 @@ const { Firmware } = await load('firmware.js');
 const { asLines, load: settingsLoad, read, requests, save } = await load('settings-file.js');
 const { choices } = await load('settings-choices.js');
 const { pathOf } = await load('path.js');
+const { binned, range } = await load('bins.js');
 const { runJob } = await load('job-run.js');
 const { check } = await load('verify.js');
 const module = new WebAssembly.Module(readFileSync(path.join(folder, 'kerf.wasm')));
@@ -125,6 +126,36 @@ test('a job runs in Node as in the page: stops, homing, an alarm', async () => {
   assert.ok(result.notes.some(({ status }) => status === 250), 'no contact');
   const cancelled = await runJob(module, { text: job(50_000).replaceAll('X', 'F800 X') }, () => false);
   assert.equal(cancelled, undefined);
+});
+
+test('curves are those of the steps, with the limits of their axes', async () => {
+  const text = 'G21\nG1 X20 Y10 F600\nG4 P0.1\nG0 Z3\n';
+  const { curves, speed, steps, windowMs, intervalMs } = await runJob(module, { text, settings: ['{xac:80,xjm:400}'] });
+  assert.deepEqual(curves.map(({ axis }) => axis), ['x', 'y', 'z']);
+  assert.deepEqual([windowMs, intervalMs], [10, 2]);
+  const [{ limits, velocity, acceleration, jerk }] = curves;
+  assert.equal(limits.acceleration, 80);
+  assert.ok(Math.abs(limits.jerk - 1_851.85) < 0.1 && limits.velocity > 10);
+  for (const curve of [speed, velocity, acceleration, jerk]) assert.equal(curve.length, steps.length / 4);
+  const most = (curve) => curve.reduce((most, value) => Math.max(most, Math.abs(value)), 0);
+  assert.ok(Math.abs(most(velocity) - 10 / Math.hypot(1, 0.5)) < 0.1, `${most(velocity)} mm/s`);
+  assert.ok(most(acceleration) > 70 && most(acceleration) < 88, `${most(acceleration)} mm/s2`);
+  assert.ok(most(jerk) > 1_000 && most(jerk) < 2_000, `${most(jerk)} mm/s3`);
+  const way = velocity.reduce((sum, v) => sum + v, 0) * 0.002;
+  assert.ok(Math.abs(way - 20) < 0.05, `${way} mm`);
+});
+
+test('bins keep the extremes of each curve, and limits that are near', () => {
+  const flat = new Float32Array(50_000);
+  const spike = Float32Array.from(flat, (_, n) => (n === 31_234 ? 9 : 1));
+  const [times, ...values] = binned([flat, spike], 2, 0, 100, 10);
+  assert.ok(times.length <= 1_402 && times.every((time, n) => n === 0 || time > times[n - 1]));
+  assert.deepEqual(values.map((of) => of.length), [times.length, times.length]);
+  assert.ok(values[1].includes(90) && !values[0].includes(90));
+  assert.deepEqual(binned([Float32Array.of(1, 2, 3)], 2, 0, 1, 1), [[0, 0.002, 0.004], [1, 2, 3]]);
+  const [low, high] = range(-5, 40, [50, 500, Infinity]);
+  assert.ok(low < -50 && low > -60 && high > 50 && high < 60);
+  assert.deepEqual(range(0, 0, [50]), [-1, 1]);
 });
 
 /// A machine as `settings-file.js` wants one.

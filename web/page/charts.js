@@ -1,39 +1,21 @@
-// Charts of velocity, acceleration and jerk over time, drawn by uPlot. The three zoom together, and share a cursor with
-// the time bar.
+// Charts of velocity, acceleration and jerk of each axis over time, drawn by uPlot, with the limits of the axes as dashed
+// lines. The three zoom together, and share a cursor with the time bar.
 //
-// Owned by main.js. Of a long curve the lowest and the highest value of each of `BINS` bins are shown. They are
-// computed again at each zoom.
+// Owned by main.js. `bins.js` makes the points of long curves, again at each zoom.
 
-import { byId } from './dom.js';
+import { binned, range } from './bins.js';
+import { byId, grouped, h } from './dom.js';
 import { colour } from './theme.js';
 
 const HEIGHT = 118;
-/// Number of bins over the width; each has two points.
-const BINS = 700;
+const DASHES = [6, 4];
 
-/// Returns the lowest and the highest value of each bin between two times, in the order of time: times and values.
-export function binned(curve, intervalMs, from, to, factor) {
-  const first = Math.max(Math.floor((from * 1_000) / intervalMs), 0);
-  const last = Math.min(Math.ceil((to * 1_000) / intervalMs), curve.length - 1);
-  const size = Math.max((last - first + 1) / BINS, 1);
-  const [times, values] = [[], []];
-  const put = (i) => {
-    times.push((i * intervalMs) / 1_000);
-    values.push(curve[i] * factor);
-  };
-  for (let start = first; start <= last; start += size) {
-    const end = Math.min(start + size, last + 1);
-    let low = Math.floor(start);
-    let high = low;
-    for (let i = low; i < end; i++) {
-      if (curve[i] < curve[low]) low = i;
-      if (curve[i] > curve[high]) high = i;
-    }
-    put(Math.min(low, high));
-    if (low !== high) put(Math.max(low, high));
-  }
-  return [times, values];
-}
+/// The charts: the place and the key of each, what it shows, and the factor of its unit.
+const ROWS = [
+  { place: 'chart-v', key: 'key-v', quantity: 'velocity', factor: 60 },
+  { place: 'chart-a', key: 'key-a', quantity: 'acceleration', factor: 1 },
+  { place: 'chart-j', key: 'key-j', quantity: 'jerk', factor: 1 },
+];
 
 export class Charts {
   #plots = [];
@@ -47,26 +29,26 @@ export class Charts {
     new ResizeObserver(() => this.#resize()).observe(byId('charts'));
   }
 
-  /// Shows the curves of a job.
-  show(curves, intervalMs, ms) {
+  /// Shows the curves of the result of a job.
+  show({ curves, intervalMs, windowMs, ms }) {
     this.#data = { curves, intervalMs, seconds: ms / 1_000 };
     byId('charts').hidden = false;
+    byId('windows').textContent = `From the steps: acceleration from positions ${windowMs} ms apart, velocity and jerk ${2 * windowMs} ms. Dashed: limits.`;
     this.#make();
   }
 
   #make() {
     this.#plots.forEach((plot) => plot.destroy());
-    const { curves, seconds } = this.#data;
-    const rows = [
-      ['chart-v', curves.velocity, 60, 'mm/min'],
-      ['chart-a', curves.acceleration, 1, 'mm/s²'],
-      ['chart-j', curves.jerk, 1, 'mm/s³'],
-    ];
-    this.#plots = rows.map(([id, curve, factor, unit]) => this.#plot(byId(id), curve, factor, unit));
-    this.#zoom(0, seconds);
+    this.#plots = ROWS.map((row) => this.#plot(row));
+    this.#zoom(0, this.#data.seconds);
   }
 
-  #plot(place, curve, factor, unit) {
+  #plot({ place: id, key, quantity, factor }) {
+    const { curves } = this.#data;
+    const place = byId(id);
+    const limits = curves.map((curve) => curve.limits[quantity] * factor);
+    const colours = curves.map(({ axis }) => colour(`axis-${axis}`));
+    byId(key).replaceChildren(...curves.map(({ axis }, n) => h('span', { class: `key key-${axis}` }, `${axis.toUpperCase()} ${Number.isFinite(limits[n]) ? `limit ${grouped(limits[n])}` : 'no limit'}`)));
     const axis = { stroke: colour('quiet'), grid: { stroke: colour('line'), width: 1 }, ticks: { show: false }, font: '11px system-ui, sans-serif' };
     const plot = new window.uPlot(
       {
@@ -74,15 +56,15 @@ export class Charts {
         height: HEIGHT,
         legend: { show: false },
         cursor: { sync: { key: 'job' }, drag: { x: true, y: false, setScale: false }, points: { show: false }, y: false },
-        scales: { x: { time: false }, y: { range: (_, low, high) => (low === high ? [low - 1, high + 1] : [Math.min(low, 0), high * 1.06]) } },
+        scales: { x: { time: false }, y: { range: (_, low, high) => range(low ?? 0, high ?? 0, limits) } },
         axes: [
           { ...axis, size: 22, values: (_, all) => all.map((s) => `${Number(s.toFixed(3))} s`) },
           { ...axis, size: 62, values: (_, all) => all.map((v) => v.toLocaleString('en').replaceAll(',', ' ')), splits: undefined, space: 30 },
         ],
-        series: [{}, { label: unit, stroke: colour('accent'), width: 1.3, points: { show: false } }],
-        hooks: { setSelect: [(plot) => this.#selected(plot)] },
+        series: [{}, ...curves.map(({ axis: label }, n) => ({ label, stroke: colours[n], width: 1.2, points: { show: false } }))],
+        hooks: { setSelect: [(plot) => this.#selected(plot)], draw: [(plot) => drawLimits(plot, limits, colours)] },
       },
-      [[], []],
+      [[], ...curves.map(() => [])],
       place,
     );
     plot.over.addEventListener('dblclick', () => this.#zoom(0, this.#data.seconds));
@@ -93,7 +75,7 @@ export class Charts {
       }
       this.#onTime(plot.posToVal(event.offsetX, 'x') * 1_000);
     });
-    return Object.assign(plot, { curve, factor });
+    return Object.assign(plot, { curves: curves.map((curve) => curve[quantity]), factor });
   }
 
   #dragged = false;
@@ -108,7 +90,7 @@ export class Charts {
   #zoom(from, to) {
     const { intervalMs } = this.#data;
     for (const plot of this.#plots) {
-      plot.setData(binned(plot.curve, intervalMs, from, to, plot.factor), false);
+      plot.setData(binned(plot.curves, intervalMs, from, to, plot.factor), false);
       plot.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false);
       plot.batch(() => {
         plot.setScale('x', { min: from, max: Math.max(to, from + 0.001) });
@@ -128,4 +110,24 @@ export class Charts {
       if (width > 0 && width !== plot.width) plot.setSize({ width, height: HEIGHT });
     }
   }
+}
+
+/// Draws the limits that are within the scale, each in the colour of its axis.
+function drawLimits(plot, limits, colours) {
+  const { ctx, bbox } = plot;
+  const { min, max } = plot.scales.y;
+  ctx.save();
+  ctx.setLineDash(DASHES.map((dash) => dash * devicePixelRatio));
+  ctx.lineWidth = devicePixelRatio;
+  limits.forEach((limit, n) => {
+    ctx.strokeStyle = colours[n];
+    for (const level of [-limit, limit].filter((level) => level >= min && level <= max)) {
+      const y = plot.valToPos(level, 'y', true);
+      ctx.beginPath();
+      ctx.moveTo(bbox.left, y);
+      ctx.lineTo(bbox.left + bbox.width, y);
+      ctx.stroke();
+    }
+  });
+  ctx.restore();
 }

@@ -97,12 +97,22 @@ export class Firmware {
     return this.wasm.sample_ms();
   }
 
-  /// Returns velocity, acceleration and jerk of the samples, in mm and s. `scale` is the length of a step of each
-  /// motor, mm.
-  curves(scale) {
-    this.wasm.work_out_curves(this.#give(new Uint8Array(Float64Array.from(scale).buffer)));
-    const curve = (which) => new Float32Array(this.#take(this.wasm.curve(which)));
+  /// Returns the speed along the path, mm/s, a value for each sample. `scale` is the length of a step of each motor, mm;
+  /// 0 for a motor that does not count.
+  speed(scale) {
+    return new Float32Array(this.#take(this.wasm.speed(this.#give(new Uint8Array(Float64Array.from(scale).buffer)))));
+  }
+
+  /// Returns velocity, acceleration and jerk of a motor, in mm and s, a value for each sample. `mm` is the length of a
+  /// step.
+  curves(motor, mm) {
+    const curve = (which) => new Float32Array(this.#take(this.wasm.curve(which, motor, mm)));
     return { velocity: curve(0), acceleration: curve(1), jerk: curve(2) };
+  }
+
+  /// Returns the time between positions from which accelerations are computed, ms; twice as much for velocity and jerk.
+  windowMs() {
+    return this.wasm.window_ms();
   }
 
   /// Returns the lowest and the highest position and the number of steps of each motor since the samples began.

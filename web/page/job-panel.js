@@ -137,7 +137,7 @@ export class JobPanel {
   #show(result) {
     const { ms, distance, extents, refused, lines } = result;
     let fastest = 0;
-    for (const v of result.curves.velocity) fastest = Math.max(fastest, v);
+    for (const v of result.speed) fastest = Math.max(fastest, v);
     const outside = extents.filter((e) => e.lower !== e.upper && (e.from < e.lower - 0.01 || e.to > e.upper + 0.01));
     const bad = refused.length > 0 || outside.length > 0;
     const verdict = bad

@@ -16,6 +16,8 @@ const TURN_MS = 40;
 /// With more lines than this in a second the board's CPU may be the limit. The run does not simulate that limit.
 const MOST_LINES = 464;
 const AXES = ['x', 'y', 'z'];
+/// A jerk limit that allows the whole acceleration within this time has no effect, s.
+const AT_ONCE_S = 0.001;
 
 const breath = () => new Promise((resolve) => setTimeout(resolve, 0));
 
@@ -169,12 +171,23 @@ function count(pace, ms) {
   pace.busiest = Math.max(pace.busiest, pace.times.length);
 }
 
+/// Returns the limits of an axis, in mm and s. A limit without effect is infinite.
+export function limitsOf({ vm, ac, jm }) {
+  const acceleration = ac > 0 ? ac : Infinity;
+  const jerk = (jm * 1e6) / 216e3;
+  return { velocity: vm / 60, acceleration, jerk: jerk * AT_ONCE_S < acceleration ? jerk : Infinity };
+}
+
 function finish({ firmware, systems, axes, scale, motorOf, zero, ms, sender, notes, asked, pace }) {
   const steps = firmware.samples();
   const intervalMs = firmware.sampleMs();
   const linear = [0, 1, 2].map(motorOf);
-  const curves = firmware.curves(scale.map((mm, motor) => (linear.includes(motor) ? mm : 0)));
+  const speed = firmware.speed(scale.map((mm, motor) => (linear.includes(motor) ? mm : 0)));
   const extremes = firmware.extremes();
+  const curves = linear.flatMap((motor, axis) => {
+    const moves = motor >= 0 && extremes[motor].total > 0;
+    return moves ? [{ axis: AXES[axis], limits: limitsOf(axes[axis]), ...firmware.curves(motor, scale[motor]) }] : [];
+  });
   const drawn = [0, 1, 2].map((axis) => {
     const motor = motorOf(axis);
     return motor < 0 ? undefined : { motor, scale: scale[motor], origin: 0 };
@@ -187,7 +200,7 @@ function finish({ firmware, systems, axes, scale, motorOf, zero, ms, sender, not
     return [{ axis: AXES[n], from: Math.min(from, to), to: Math.max(from, to), lower: tn - zero[n], upper: tm - zero[n] }];
   });
   let distance = 0;
-  for (const v of curves.velocity) distance += v;
+  for (const v of speed) distance += v;
   const all = [...notes, ...sender.notes].sort((a, b) => a.line - b.line);
   return {
     ms,
@@ -207,7 +220,9 @@ function finish({ firmware, systems, axes, scale, motorOf, zero, ms, sender, not
     intervalMs,
     steps,
     path,
+    speed,
     curves,
+    windowMs: firmware.windowMs(),
     memory: firmware.memory(),
   };
 }

@@ -14,8 +14,8 @@ async function run({ module, job }) {
   const result = await runJob(module, job, progress);
   if (!result) return postMessage({ cancelled: true });
   result.tookMs = performance.now() - began;
-  const { steps, path, curves } = result;
-  const arrays = [steps, path.vertices, path.samples, curves.velocity, curves.acceleration, curves.jerk];
+  const { steps, path, speed, curves } = result;
+  const arrays = [steps, path.vertices, path.samples, speed, ...curves.flatMap(({ velocity, acceleration, jerk }) => [velocity, acceleration, jerk])];
   postMessage({ result }, arrays.map((array) => array.buffer));
 }
 

@@ -7,7 +7,7 @@
 // | `machine-panel.js`, `card-panel.js` | controls and terminal; the files of its SD card |
 // | `verify-panel.js`, `verify.js` | the checks of a real board |
 // | `settings-panel.js`, `settings-file.js` | settings as a form and as a file |
-// | `view.js`, `charts.js` | path and curves |
+// | `view.js`, `charts.js`, `bins.js` | path and curves |
 // | `firmware.js`, `sender.js`, `protocol.js`, `path.js`, `job-run.js` | run in Workers, and in Node for tests |
 
 import { SerialBoard, SimulatedBoard } from './boards.js';
@@ -81,9 +81,7 @@ function go(ms) {
   byId('scrub').setAttribute('aria-valuetext', clock(page.ms));
   byId('clock').textContent = clock(page.ms);
   ['x', 'y', 'z'].forEach((axis, n) => (byId(`at-${axis}`).textContent = place[n].toFixed(3)));
-  byId('at-v').textContent = grouped(result.curves.velocity[sample] * 60);
-  byId('at-a').textContent = grouped(result.curves.acceleration[sample]);
-  byId('at-j').textContent = grouped(result.curves.jerk[sample]);
+  byId('at-v').textContent = grouped(result.speed[sample] * 60);
 }
 
 /// Plays the job in 20 seconds, or at real time if it takes less.
@@ -109,7 +107,7 @@ function showResult(result, name) {
   page.result = result;
   play(false);
   let fastest = 1e-6;
-  for (const v of result.curves.velocity) fastest = Math.max(fastest, v);
+  for (const v of result.speed) fastest = Math.max(fastest, v);
   for (const id of ['timebar', 'readout', 'legend']) byId(id).hidden = false;
   byId('empty').hidden = true;
   byId('legend-max').textContent = grouped(fastest * 60);
@@ -117,8 +115,8 @@ function showResult(result, name) {
   byId('canvas').setAttribute('aria-label', `Path of ${name} in 3D, coloured by speed; it takes ${clock(result.ms)}`);
   const limits = ['x', 'y', 'z'].map((axis) => result.extents.find((extent) => extent.axis === axis));
   page.view.limits(limits.map((extent) => extent?.lower ?? 0), limits.map((extent) => extent?.upper ?? 0), result.systems);
-  page.charts.show(result.curves, result.intervalMs, result.ms);
-  page.view.show(result.path, result.curves.velocity, fastest);
+  page.charts.show(result);
+  page.view.show(result.path, result.speed, fastest);
   go(result.ms);
 }
 

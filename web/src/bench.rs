@@ -14,11 +14,12 @@ const BAUD: u32 = 115_200;
 /// Clock cycles in a millisecond.
 const CYCLES_PER_MS: u64 = kerf::boards::ACTIVE.clock_hz as u64 / 1_000;
 
-/// The lowest and the highest position of a motor, in steps.
+/// The lowest, the highest and the present position of a motor, in steps.
 #[derive(Clone, Copy, Default)]
 struct Range {
     lowest: i64,
     highest: i64,
+    now: i64,
     /// The number of steps made before the samples began.
     before: u64,
 }
@@ -28,6 +29,8 @@ pub struct Bench {
     machine: Machine,
     heard: [Vec<u8>; 2],
     samples: Option<Samples>,
+    /// The cycle at which the samples began.
+    began: u64,
     ranges: [Range; MOTORS],
 }
 
@@ -39,7 +42,8 @@ impl Bench {
         watchdog::set_cause(if asked { Cause::Asked } else { Cause::PowerOn });
         let machine = Machine::boot(BAUD)?;
         machine.insert_card(Some(crate::card::empty()));
-        Some(Self { machine, heard: Default::default(), samples: None, ranges: Default::default() })
+        let (heard, ranges) = Default::default();
+        Some(Self { machine, heard, samples: None, began: 0, ranges })
     }
 
     /// Puts bytes on the line of a port. Bytes for any other port than 0 and 1 are dropped.
@@ -82,17 +86,24 @@ impl Bench {
 
     /// Lets a millisecond pass.
     fn pass(&mut self) {
-        let (machine, ranges) = (&self.machine, &mut self.ranges);
+        let Self { machine, ranges, samples, began, .. } = self;
         machine.run_until(1, || {
             let position = machine.emitted().position;
-            for (range, at) in ranges.iter_mut().zip(position) {
+            for (motor, (range, at)) in ranges.iter_mut().zip(position).enumerate() {
+                if range.now == at {
+                    continue;
+                }
+                range.now = at;
                 range.lowest = range.lowest.min(at);
                 range.highest = range.highest.max(at);
+                if let Some(samples) = samples {
+                    samples.step(motor, at, (now() - *began) as f64 / CYCLES_PER_MS as f64);
+                }
             }
             false
         });
-        if let Some(samples) = &mut self.samples {
-            samples.tick(self.machine.emitted().position);
+        if let Some(samples) = samples {
+            samples.tick();
         }
     }
 
@@ -138,9 +149,10 @@ impl Bench {
     pub fn begin_samples(&mut self) {
         let emitted = self.machine.emitted();
         self.samples = Some(Samples::from(emitted.position));
+        self.began = now();
         for (range, motor) in self.ranges.iter_mut().zip(0..MOTORS) {
             let at = emitted.position[motor];
-            *range = Range { lowest: at, highest: at, before: emitted.steps[motor] };
+            *range = Range { lowest: at, highest: at, now: at, before: emitted.steps[motor] };
         }
     }
 

@@ -8,7 +8,7 @@
 //! |---|---|
 //! | [`mod@bench`] | the simulated machine: ports, clock, switches, spindle |
 //! | [`mod@samples`] | the positions of the motors at equal intervals |
-//! | [`mod@curves`] | velocity, acceleration and jerk, computed from the samples |
+//! | [`mod@curves`], [`mod@windows`] | velocity, acceleration and jerk, computed from the samples |
 //! | [`mod@asked`] | the lines that ask for more than the machine's limits allow |
 //! | [`mod@tables`] | profiles and codes, as JSON |
 //! | [`mod@verify`] | the checks of a real board, for which no machine is needed |
@@ -27,12 +27,13 @@ pub mod curves;
 pub mod samples;
 pub mod tables;
 pub mod verify;
+pub mod windows;
 
 use std::cell::RefCell;
 use std::time::Duration;
 
 use bench::Bench;
-use curves::Curves;
+use curves::Quantity;
 use kerf_verify::dialect::{GRBL, TINYG};
 use verify::{Verification, Want};
 
@@ -42,7 +43,6 @@ struct Page {
     input: Vec<u8>,
     output: Vec<u8>,
     bench: Option<Bench>,
-    curves: Curves,
     verification: Option<Verification>,
 }
 
@@ -67,6 +67,10 @@ impl Page {
     fn tell(&mut self, bytes: Vec<u8>) -> usize {
         self.output = bytes;
         self.output.len()
+    }
+
+    fn tell_floats(&mut self, floats: &[f32]) -> usize {
+        self.tell(floats.iter().flat_map(|value| value.to_le_bytes()).collect())
     }
 }
 
@@ -177,29 +181,36 @@ pub extern "C" fn sample_ms() -> u32 {
     bench(|bench| bench.samples().interval_ms())
 }
 
-/// Computes the curves of the samples. The input is one `f64` for each motor: the length of a step, mm; 0 for a motor
-/// that does not count. Returns the number of samples.
+/// Returns the time between positions from which accelerations are computed, ms; velocity and jerk have twice as much.
 #[unsafe(no_mangle)]
-pub extern "C" fn work_out_curves(len: usize) -> usize {
+pub extern "C" fn window_ms() -> f64 {
+    bench(|bench| 1e3 * curves::windows(bench.samples()).seconds())
+}
+
+/// Writes the speed along the path, an `f32` for each sample. The input is one `f64` for each motor: the length of a
+/// step, mm; 0 for a motor that does not count. Returns the length.
+#[unsafe(no_mangle)]
+pub extern "C" fn speed(len: usize) -> usize {
     page(|page| {
         let scale = numbers(page.given(len));
-        let Some(bench) = &page.bench else { return 0 };
-        page.curves = Curves::of(bench.samples(), scale);
-        page.curves.velocity.len()
+        let speed = page.bench.as_ref().map(|bench| curves::speed(bench.samples(), scale));
+        page.tell_floats(&speed.unwrap_or_default())
     })
 }
 
-/// Writes a curve, an `f32` for each sample: 0 velocity, 1 acceleration, 2 jerk. Returns the length.
+/// Writes a curve of a motor whose steps have a length of `mm`, an `f32` for each sample: 0 velocity, 1 acceleration, 2
+/// jerk. Returns the length.
 #[unsafe(no_mangle)]
-pub extern "C" fn curve(which: u32) -> usize {
+pub extern "C" fn curve(which: u32, motor: usize, mm: f64) -> usize {
+    let quantity = match which {
+        0 => Quantity::Velocity,
+        1 => Quantity::Acceleration,
+        _ => Quantity::Jerk,
+    };
     page(|page| {
-        let curve = match which {
-            0 => &page.curves.velocity,
-            1 => &page.curves.acceleration,
-            _ => &page.curves.jerk,
-        };
-        let bytes = curve.iter().flat_map(|value| value.to_le_bytes()).collect();
-        page.tell(bytes)
+        let bench = page.bench.as_ref();
+        let curve = bench.map(|bench| curves::curve(bench.samples(), quantity, motor, mm));
+        page.tell_floats(&curve.unwrap_or_default())
     })
 }
 

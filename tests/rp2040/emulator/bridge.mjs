@@ -48,7 +48,7 @@ function act(request) {
   if (request.crash) machine.crash(request.crash);
   if (request.reset) machine.reset();
   if (request.loaded) machine.startLoaded();
-  if (request.unmasked) machine.masked = 0;
+  if (request.unmasked) [machine.masked, machine.longest] = [0, machine.longest.map(() => 0)];
   for (const [channel, value] of request.sense ?? []) machine.sense(channel, value);
   for (const [port, rate] of request.baud ?? []) if (machine.senders[port]) machine.senders[port].rate = rate;
   for (const [port, hex] of request.send ?? []) machine.send(port, Buffer.from(hex, 'hex'));
@@ -112,6 +112,8 @@ function answer() {
     strong: machine.mcu.gpio.reduce((bits, { padValue }, gpio) => bits + ((padValue >> 4 & 3) === 3 ? 2 ** gpio : 0), 0),
     asleep: machine.asleep,
     spent: machine.spent,
+    runs: machine.runs,
+    longest: machine.longest,
     masked: machine.masked,
     waited: machine.cache.waited,
     stack: machine.deepest(),

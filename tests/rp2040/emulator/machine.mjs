@@ -178,6 +178,11 @@ export class Machine {
     this.masked = 0;
     // Cycles of each exception's handler by itself, by its number; 0 is thread mode.
     this.spent = new Array(48).fill(0);
+    // What had been spent when each exception's handler began its run, how many runs have ended, the longest, and which one has just ended.
+    this.begun = new Array(48).fill(0);
+    this.runs = new Array(48).fill(0);
+    this.longest = new Array(48).fill(0);
+    this.left = 0;
     this.boot();
   }
 
@@ -316,8 +321,8 @@ export class Machine {
     const { core } = this.mcu;
     const [enter, leave] = [core.exceptionEntry.bind(core), core.exceptionReturn.bind(core)];
     this.extra = 0;
-    core.exceptionEntry = (n) => { this.extra += ENTRY; enter(n); core.PC = (core.PC & ~1) >>> 0; };
-    core.exceptionReturn = (n) => { this.extra += EXIT; leave(n); };
+    core.exceptionEntry = (n) => { this.extra += ENTRY; this.begun[n] = this.spent[n]; enter(n); core.PC = (core.PC & ~1) >>> 0; };
+    core.exceptionReturn = (n) => { this.extra += EXIT; this.left = core.IPSR; leave(n); };
   }
 
   // An output has changed.
@@ -445,6 +450,14 @@ export class Machine {
     return spent;
   }
 
+  // A handler has ended its run.
+  ended() {
+    const n = this.left;
+    this.left = 0;
+    this.runs[n]++;
+    this.longest[n] = Math.max(this.longest[n], this.spent[n] - this.begun[n]);
+  }
+
   // Sleeps until something is due, or runs up to there.
   step(end) {
     const { mcu } = this;
@@ -466,6 +479,7 @@ export class Machine {
       spent += this.extra;
       this.extra = 0;
       this.spent[level] += spent;
+      if (this.left) this.ended();
       clock.tick(spent * NANOS);
     }
     this.cycle += spent;

@@ -43,7 +43,7 @@ export class Motors {
     this.lastStep = 0;
     this.wired = [];
     this.stepListeners = [];
-    // While someone records: when each motor's steps rise, edges of outputs behind a register that are no steps, and the shortest pulse.
+    // While someone records: when each motor's steps rise and in which direction they are, edges of outputs behind a register that are no steps, and the shortest pulse.
     this.times = undefined;
     this.edges = [];
     this.shortest = Infinity;
@@ -57,13 +57,14 @@ export class Motors {
 
   // Begins to record, or ends: then all that has been recorded.
   record(on) {
-    const { times, edges, shortest } = this;
+    const { times, signs, edges, shortest } = this;
     const [hold, setup] = [this.hold, this.setup].map((least) => (Number.isFinite(least) ? least : null));
     this.times = on ? this.pins.map(() => []) : undefined;
+    this.signs = this.pins.map(() => []);
     this.edges = [];
     this.shortest = Infinity;
     this.watchDirections();
-    return { times, edges, shortest, hold, setup };
+    return { times, signs, edges, shortest, hold, setup };
   }
 
   // The least time from the end of a pulse to the next change of the motor's direction, and from there to the next pulse.
@@ -100,7 +101,10 @@ export class Motors {
     this.gaps[motor] = Math.min(this.gaps[motor], cycle - (this.last[motor] ?? -Infinity));
     this.last[motor] = cycle;
     this.lastStep = cycle;
-    this.times?.[motor].push(cycle);
+    if (this.times) {
+      this.times[motor].push(cycle);
+      this.signs[motor].push(sign);
+    }
     for (const listener of this.stepListeners) listener(motor, sign, cycle);
     for (const pin of this.wired) if (pin.motors.includes(motor)) this.work(pin);
   }

@@ -66,13 +66,13 @@ pub struct RunArgs {
     /// Write step and direction signals for GTKWave.
     #[arg(long, value_name = "FILE")]
     pub vcd: Option<PathBuf>,
-    /// Draw path, velocity, acceleration and jerk from the steps.
+    /// Draw the path, and velocity, acceleration and jerk of each axis, from the steps.
     #[arg(long, value_name = "FILE")]
     pub plot: Option<PathBuf>,
     /// The span of time that the curves of the plot show, in seconds, such as 10..14.
     #[arg(long, value_name = "FROM..TO", requires = "plot", value_parser = span)]
     pub span: Option<Range<f64>>,
-    /// Milliseconds over which the plot is smoothed.
+    /// Milliseconds between positions from which the plot computes accelerations; twice as many for jerk.
     #[arg(long, value_name = "MS", default_value_t = WINDOW_MS, requires = "plot")]
     pub smooth: u32,
     /// Print only the result.

@@ -20,6 +20,8 @@ mod flash;
 mod host;
 mod image;
 pub mod job;
+pub mod kinetics;
+pub mod limits;
 pub mod loader;
 mod machine;
 pub mod mechanics;
@@ -47,7 +49,10 @@ pub mod thermal;
 pub mod threads;
 mod timer;
 mod trace;
+pub mod track;
 mod uart;
+#[path = "../../../web/src/windows.rs"]
+mod windows;
 mod wire;
 
 pub use host::{Answered, Host, LINES_IN_FLIGHT};

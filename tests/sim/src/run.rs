@@ -9,6 +9,7 @@ use kerf::boards::{self, Board};
 use kerf_sim::Machine;
 use kerf_sim::emulated::{self, Emulated};
 use kerf_sim::job::{self, Options};
+use kerf_sim::limits;
 use kerf_sim::mechanics::Build;
 use kerf_sim::plot::{self, Look};
 use kerf_sim::print;
@@ -66,7 +67,8 @@ pub fn run(args: &RunArgs) -> Result<bool> {
     }
     if let Some(path) = &args.plot {
         let look = Look { span: args.span.clone(), window_ms: args.smooth };
-        plot::write(path, &machine, &report.setup, &look, report.threads.as_ref())?;
+        let limits = limits::of(&mut machine, &report.setup);
+        plot::write(path, &machine, &report.setup, &limits, &look, report.threads.as_ref())?;
     }
     let text = report.to_string();
     match args.quiet {

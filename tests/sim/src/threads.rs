@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use crate::machine::Machine;
 use crate::oracle::{self, MotorSetup, Setup, UNITS, Word};
-use crate::plot::{Position, SAMPLE_S, positions};
+use crate::track::{self, Position, SAMPLE_S};
 
 /// X and Z, among the axes and in a [`Place`].
 const AXES: [usize; 2] = [0, 2];
@@ -166,7 +166,7 @@ impl Threads {
             .flatten()
             .map(off)
             .fold((0.0f64, 0.0f64), |(low, high), off| (low.min(off), high.max(off)));
-        let samples = positions(machine, setup);
+        let samples = track::positions(&track::steps(machine), setup);
         let begin = machine.recorder().log().first().map_or(0, |step| step.cycle);
         let seconds = |cycle: u64| machine.seconds(cycle.saturating_sub(begin));
         let errors = passes

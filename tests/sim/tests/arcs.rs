@@ -3,8 +3,9 @@
 use std::fmt::Write;
 
 use kerf::boards::MEGA2560_GRBL;
-use kerf_sim::Machine;
 use kerf_sim::job::{self, Options};
+use kerf_sim::kinetics::{self, WINDOW_S, Windows};
+use kerf_sim::track::{self, SAMPLE_S};
 
 use crate::common::{booted, firmware, set};
 
@@ -55,12 +56,8 @@ fn every_arc_goes_its_way_round() {
 
 /// The acceleration limit of axes, mm/s^2.
 const ACCEL: f64 = 500.0;
-/// The time over which velocities are averaged, s.
-const WINDOW_S: f64 = 0.01;
 /// The share of all windows in which the acceleration is no greater than the result.
 const PERCENTILE: f64 = 0.99;
-/// mm in a step.
-const STEP_MM: f64 = 0.0125;
 
 /// A chain of arcs of 0.2 to 30 mm radius, left and right in turns, and a helix.
 fn garland() -> String {
@@ -74,33 +71,6 @@ fn garland() -> String {
     job + "g3 z-2 i-6 p3\n"
 }
 
-/// Returns the position of a motor at the end of each window, mm, interpolated between steps.
-fn positions(machine: &Machine, motor: u8) -> Vec<f64> {
-    let log = machine.recorder().log();
-    let hertz = f64::from(machine.board().clock_hz);
-    let mut steps = vec![(log[0].cycle as f64 / hertz, 0.0)];
-    let mut at = 0.0;
-    for step in log.iter().filter(|step| step.motor == motor) {
-        let way = if step.positive { STEP_MM } else { -STEP_MM };
-        // A step's pulse comes when half of the step is done.
-        steps.push((step.cycle as f64 / hertz, at + way / 2.0));
-        at += way;
-    }
-    let end = log[log.len() - 1].cycle as f64 / hertz;
-    steps.push((end, at));
-    let windows = ((end - steps[0].0) / WINDOW_S) as usize;
-    let mut next = 1;
-    let mut position = |n: usize| {
-        let time = steps[0].0 + n as f64 * WINDOW_S;
-        while next + 1 < steps.len() && steps[next].0 < time {
-            next += 1;
-        }
-        let ((t0, p0), (t1, p1)) = (steps[next - 1], steps[next]);
-        if t1 > t0 { p0 + (p1 - p0) * ((time - t0) / (t1 - t0)) } else { p1 }
-    };
-    (0..=windows).map(&mut position).collect()
-}
-
 /// Returns the percentile of the accelerations of X and Y in windows, mm/s^2, and the time that the job takes, s.
 fn acceleration(job: &str, settings: &[String]) -> (f64, f64) {
     let mut machine = firmware(&MEGA2560_GRBL);
@@ -108,11 +78,10 @@ fn acceleration(job: &str, settings: &[String]) -> (f64, f64) {
     let options = Options { settings: settings.to_vec(), ..Options::default() };
     let report = job::run(&mut machine, &job::lines_of(job), &options, |_| {}).unwrap();
     assert!(report.ok, "{:?}", report.problems);
-    let mut all: Vec<f64> = Vec::new();
-    for motor in 0..2 {
-        let second = |p: &[f64]| (p[2] - 2.0 * p[1] + p[0]).abs() / (WINDOW_S * WINDOW_S);
-        all.extend(positions(&machine, motor).windows(3).map(second));
-    }
+    let positions = track::positions(&track::steps(&machine), &report.setup);
+    let windows = Windows::new(SAMPLE_S, WINDOW_S);
+    let of = |axis: usize| kinetics::curves(&positions, axis, &windows).acceleration;
+    let mut all: Vec<f64> = (0..2).flat_map(of).map(f64::abs).collect();
     all.sort_by(f64::total_cmp);
     (all[(all.len() as f64 * PERCENTILE) as usize], report.seconds_moving)
 }

@@ -1,5 +1,7 @@
 //! Every row of the bench keeps to its floor.
 
+use std::sync::{LazyLock, Mutex, PoisonError};
+
 use kerf::boards::{MEGA2560_GRBL, RAMPS14};
 use kerf_sim::bench::{Bed, ROWS, row};
 
@@ -9,11 +11,19 @@ use crate::common::share::share_of;
 /// Rows that differ by the jerk limit and take long: a share of them runs.
 const PAUSES: [&str; 4] = ["pauses-none", "pauses-500", "pauses-5000", "pauses-50000"];
 
+/// The bed of the rows that measure all jobs of the corpus once.
+static CORPUS: LazyLock<Mutex<Bed>> =
+    LazyLock::new(|| Mutex::new(Bed::new(&image(&MEGA2560_GRBL), &MEGA2560_GRBL).unwrap()));
+
 fn keeps_to_its_floor(name: &str) {
     if PAUSES.contains(&name) && !share_of(&PAUSES, 2).any(|due| *due == name) {
         return;
     }
     let row = row(name).unwrap();
+    if name.starts_with("axes") {
+        let bed = CORPUS.lock().unwrap_or_else(PoisonError::into_inner);
+        return row.keep_to_floor(&bed).unwrap();
+    }
     let bed = Bed::new(&image(&MEGA2560_GRBL), &MEGA2560_GRBL).unwrap();
     if name.starts_with("print") {
         // The bench looks for this image beside the other one.
@@ -70,6 +80,10 @@ rows! {
     a_hold_begins = "hold-begins";
     a_hold_stops = "hold-stops";
     acceleration_on_arcs = "arcs-ac";
+    acceleration_of_axes = "axes-ac";
+    jerk_of_axes = "axes-jerk";
+    distance_from_the_path = "axes-off";
+    time_of_the_corpus = "axes-time";
     a_printers_moves = "print-0.2";
     a_printers_moves_with_pressure_advance = "print-0.2-advance";
     a_printers_moves_with_checksums = "print-0.2-numbered";

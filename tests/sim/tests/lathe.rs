@@ -4,6 +4,7 @@ use std::path::Path;
 
 use kerf::boards::{Board, MEGA2560_LATHE};
 use kerf_sim::job::{self, Options};
+use kerf_sim::limits;
 use kerf_sim::mechanics::{Bounce, Build, Sensors};
 use kerf_sim::plot::{self, Look};
 use kerf_sim::threads::Threads;
@@ -458,7 +459,8 @@ fn the_example_cuts_a_thread() {
     );
     assert!(threads.turns >= 100 && most < 0.02, "{most}");
     let file = scratch("thread.svg");
-    plot::write(&file, &machine, &report.setup, &Look::default(), Some(&threads)).unwrap();
+    let limits = limits::of(&mut machine, &report.setup);
+    plot::write(&file, &machine, &report.setup, &limits, &Look::default(), Some(&threads)).unwrap();
     assert!(std::fs::read_to_string(file).unwrap().contains("error of the thread"));
 }
 

@@ -6,7 +6,9 @@ use std::io::BufReader;
 use kerf::boards::MEGA2560_GRBL;
 use kerf_sim::Machine;
 use kerf_sim::job::{self, Options};
-use kerf_sim::plot::{self, Look, Motion, WINDOW_MS};
+use kerf_sim::limits::{self, Limits};
+use kerf_sim::oracle::AXES;
+use kerf_sim::plot::{self, Axis, Look, Motion, WINDOW_MS};
 use kerf_sim::report::Report;
 
 use crate::common::{firmware, scratch};
@@ -32,35 +34,53 @@ fn highest(values: &[f64]) -> f64 {
 fn an_s_curve_is_seen_in_the_steps() {
     // The acceleration takes 43 ms to build up, as that of the other axes.
     let low = Options { settings: vec!["{xjm:400,xac:80}".to_string()], ..Options::default() };
-    let (machine, report) = run("g1 x20 f600", &low);
-    let motion = Motion::of(&machine, &report.setup, WINDOW_MS);
-    let velocity = highest(&motion.velocity);
+    let (mut machine, report) = run("g1 x20 f600", &low);
+    let limits = limits::of(&mut machine, &report.setup);
+    let motion = Motion::of(&machine, &report.setup, &limits, WINDOW_MS);
+    assert_eq!(motion.axes.iter().map(|axis| axis.name).collect::<String>(), "X");
+    let Axis { curves, limits, .. } = &motion.axes[0];
+    assert_eq!(limits.acceleration, 80.0);
+    assert!((limits.jerk / JERK - 1.0).abs() < 1e-6 && limits.velocity > 10.0, "{limits:?}");
+    let velocity = highest(&curves.velocity);
     assert!((velocity / 10.0 - 1.0).abs() < 0.02, "{velocity} mm/s");
-    let way: f64 = motion.velocity.iter().sum::<f64>() * 1e-3;
-    assert!((way - 20.0).abs() < 0.05, "{way} mm");
-    let seconds = motion.velocity.len() as f64 * 1e-3;
+    assert!((highest(&motion.speed) - velocity).abs() < 1e-9);
+    let way: f64 = curves.velocity.iter().sum::<f64>() * 1e-3;
+    assert!((way - 20.0).abs() < 0.15, "{way} mm");
+    let seconds = curves.velocity.len() as f64 * 1e-3;
     // A trapezoid behind means of 44 and 16 ms, without the first and the last half step.
     let all = 2.0 + 10.0 / 80.0 + 0.060;
     assert!((all - 0.06..all).contains(&seconds), "{seconds} s of {all}");
-    let acceleration = highest(&motion.acceleration);
+    let acceleration = highest(&curves.acceleration);
     assert!((acceleration / 80.0 - 1.0).abs() < 0.1, "{acceleration} mm/s2");
-    let jerk = highest(&motion.jerk);
-    assert!(jerk > 0.5 * JERK && jerk < 1.2 * JERK, "{jerk} of {JERK} mm/s3");
+    let jerk = highest(&curves.jerk);
+    assert!(jerk > 0.7 * JERK && jerk < 1.1 * JERK, "{jerk} of {JERK} mm/s3");
 }
 
 #[test]
 fn the_plot_is_complete_and_small() {
-    let (machine, report) = run("g0 x10 y10\ng1 x20 f600\ny20\ng0 x0 y0", &Options::default());
+    let job = "g0 x10 y10\ng1 x20 f600\ny20\ng0 x0 y0";
+    let (mut machine, report) = run(job, &Options::default());
+    let limits = limits::of(&mut machine, &report.setup);
     let file = scratch("plot.svg");
-    plot::write(&file, &machine, &report.setup, &Look::default(), None).unwrap();
+    plot::write(&file, &machine, &report.setup, &limits, &Look::default(), None).unwrap();
     let svg = fs::read_to_string(&file).unwrap();
     assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>"));
     assert!(svg.len() < 500_000, "{} bytes", svg.len());
-    for text in
-        ["X, mm", "Y, mm", "time, s", "velocity, mm/s", "acceleration, mm/s²", "jerk, mm/s³"]
-    {
+    for text in [
+        "X, mm",
+        "Y, mm",
+        "time, s",
+        "velocity, mm/s",
+        "acceleration, mm/s²",
+        "jerk, mm/s³",
+        "X, limit 200",
+        "Y, limit 200",
+        "from positions 10 ms apart",
+        "from positions 20 ms apart",
+    ] {
         assert!(svg.contains(text), "no {text}");
     }
+    assert!(!svg.contains("Z, limit"), "Z does not move");
     let lines = svg.split("<polyline").skip(1).filter_map(|l| l.split("points=\"").nth(1));
     let mut most = 0;
     for points in lines.filter_map(|l| l.split('"').next()) {
@@ -71,7 +91,7 @@ fn the_plot_is_complete_and_small() {
     }
     assert!(most > 1_000, "{most} points in a curve");
     let part = Look { span: Some(0.5..0.6), ..Look::default() };
-    plot::write(&file, &machine, &report.setup, &part, None).unwrap();
+    plot::write(&file, &machine, &report.setup, &limits, &part, None).unwrap();
     assert!(fs::read_to_string(&file).unwrap().len() < svg.len());
 }
 
@@ -79,7 +99,8 @@ fn the_plot_is_complete_and_small() {
 fn a_job_without_a_step_can_be_drawn() {
     let (machine, report) = run("g4 p0.1", &Options::default());
     let file = scratch("still.svg");
-    plot::write(&file, &machine, &report.setup, &Look::default(), None).unwrap();
+    let limits = [Limits::NONE; AXES];
+    plot::write(&file, &machine, &report.setup, &limits, &Look::default(), None).unwrap();
 }
 
 #[test]

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use kerf::boards::{MEGA2560_GRBL, RAMPS14};
 use kerf_sim::job::{self, Lines, Options};
+use kerf_sim::limits;
 use kerf_sim::plot::{self, Look};
 use kerf_sim::print;
 
@@ -30,7 +31,8 @@ fn the_example_is_printed_exact_to_the_step() {
     assert!(report.motors[3].total > 5_000);
     assert!(report.free_stack.unwrap() >= 400);
     let file = scratch("print.svg");
-    plot::write(&file, &machine, &report.setup, &Look::default(), None).unwrap();
+    let limits = limits::of(&mut machine, &report.setup);
+    plot::write(&file, &machine, &report.setup, &limits, &Look::default(), None).unwrap();
     let svg = fs::read_to_string(&file).unwrap();
     assert!(svg.contains("temperature, °C") && svg.len() < 1_000_000, "{} bytes", svg.len());
 }

@@ -1,17 +1,20 @@
 //! The rows of `pico`, whose chip is emulated. The targets are what users may expect of a chip like the RP2040.
 
+use std::cell::OnceCell;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 use kerf::boards::{Board, PICO, PICO6};
 
 use super::Better::{Higher, Lower};
+use super::axes::{self, Measured};
 use super::workload::{How, USUAL_JERK, disturbances, settings};
-use super::{Figure, Row, ideal, pauses, spiral};
+use super::{Figure, Row, corpus, ideal, pauses, spiral};
 use crate::emulated::even::{FAST, evenness};
 use crate::emulated::{Emulated, Recorded, job};
 use crate::host::{Host, LINES_IN_FLIGHT};
-use crate::job::{Options, lines_of};
+use crate::job::{Options, lines_of, read_setup};
+use crate::limits;
 use crate::machine::USB;
 use crate::runs::Runs;
 
@@ -20,6 +23,8 @@ const PER_US: f64 = 128.0;
 /// The exception that exec runs in: SWI_IRQ_1.
 const EXEC: usize = 16 + 27;
 const NONE: [&str; 3] = ["-"; 3];
+/// Time of a sample of the means, s.
+const SAMPLE_S: f64 = 0.002;
 
 /// A row whose floor is its target.
 const fn row(
@@ -42,7 +47,7 @@ const fn row(
 }
 
 /// The table.
-pub const ROWS: [Row<PicoBed>; 13] = [
+pub const ROWS: [Row<PicoBed>; 19] = [
     Row {
         target: Some(1e6),
         floor: Some(1e6),
@@ -109,6 +114,45 @@ pub const ROWS: [Row<PicoBed>; 13] = [
     },
     Row {
         better: Lower,
+        target: None,
+        floor: Some(10_800.0),
+        ..row("segment-jerk", "exec of a sample of 2 ms under a jerk limit, mean", "cycles", sample)
+    },
+    Row {
+        better: Lower,
+        // 1.3 times the mean.
+        target: Some(13_700.0),
+        floor: Some(25_500.0),
+        ..row("segment-jerk-worst", "a run of exec under a jerk limit, worst", "cycles", run)
+    },
+    Row {
+        better: Lower,
+        decimals: 2,
+        target: Some(1.02),
+        floor: Some(1.87),
+        ..row("axes-ac", "acceleration of an axis over its limit, jobs", "x", axes_acceleration)
+    },
+    Row {
+        better: Lower,
+        decimals: 2,
+        target: Some(2.1),
+        floor: Some(2.1),
+        ..row("axes-jerk", "jerk of an axis over its limit, jobs", "x", axes_jerk)
+    },
+    Row {
+        better: Lower,
+        target: Some(50.0),
+        floor: Some(72.0),
+        ..row("axes-off", "the tool is off the programmed path, jobs", "um", axes_off)
+    },
+    Row {
+        better: Lower,
+        decimals: 1,
+        floor: Some(148.0),
+        ..row("axes-time", "time of these jobs", "s", axes_time)
+    },
+    Row {
+        better: Lower,
         target: Some(0.0),
         floor: Some(0.0),
         ..row("pauses-none", "late segments of jobs without a jerk limit", "", pauses_none)
@@ -129,12 +173,41 @@ pub fn named(name: &str) -> Option<&'static Row<PicoBed>> {
 /// The image of `pico`. The image of the board with six motors lies in the same folder.
 pub struct PicoBed {
     elf: PathBuf,
+    /// What was measured in the corpus of jobs. Several rows share it, because it takes minutes.
+    corpus: OnceCell<Corpus>,
+}
+
+/// The measurements of all jobs of the corpus.
+#[derive(Default)]
+struct Corpus {
+    motion: Vec<Measured>,
+    exec: Vec<Exec>,
+}
+
+/// What exec takes in a job, cycles.
+struct Exec {
+    name: &'static str,
+    /// For each sample of the means, over the whole job.
+    mean: f64,
+    /// In its longest run.
+    worst: f64,
+    /// Its runs, for each sample.
+    runs: f64,
 }
 
 impl PicoBed {
     /// A bed for the ELF file at `path`.
     pub fn new(path: &Path) -> Self {
-        PicoBed { elf: path.to_path_buf() }
+        PicoBed { elf: path.to_path_buf(), corpus: OnceCell::new() }
+    }
+
+    /// Returns the measurements of the corpus of jobs.
+    fn corpus(&self) -> Result<&Corpus> {
+        if self.corpus.get().is_none() {
+            let corpus = measured(self)?;
+            return Ok(self.corpus.get_or_init(|| corpus));
+        }
+        self.corpus.get().context("nothing is measured")
     }
 
     /// Returns a board that has greeted and has these settings.
@@ -294,6 +367,67 @@ fn exec(bed: &PicoBed) -> Result<Figure> {
     let value = 100.0 * (board.spent(EXEC) - before) / (board.cycle() - from) as f64;
     ensure!(value > 0.1, "exec does not run");
     Ok(value.into())
+}
+
+/// Cycles that exec takes for a sample of the means, of the job in which that is most.
+fn sample(bed: &PicoBed) -> Result<Figure> {
+    cycles(bed, |exec| exec.mean)
+}
+
+/// Cycles of the longest run of exec. Nearly each run makes a sample.
+fn run(bed: &PicoBed) -> Result<Figure> {
+    cycles(bed, |exec| exec.worst)
+}
+
+fn cycles(bed: &PicoBed, value: fn(&Exec) -> f64) -> Result<Figure> {
+    let all = &bed.corpus()?.exec;
+    let told =
+        all.iter().map(|exec| format!("{} {:.0} ({:.1} runs)", exec.name, value(exec), exec.runs));
+    let note = told.collect::<Vec<_>>().join(", ");
+    Ok(Figure { value: all.iter().map(value).fold(0.0, f64::max), note })
+}
+
+fn axes_acceleration(bed: &PicoBed) -> Result<Figure> {
+    Ok(axes::acceleration_of(&bed.corpus()?.motion))
+}
+
+fn axes_jerk(bed: &PicoBed) -> Result<Figure> {
+    Ok(axes::jerk_of(&bed.corpus()?.motion))
+}
+
+fn axes_off(bed: &PicoBed) -> Result<Figure> {
+    Ok(axes::off_of(&bed.corpus()?.motion))
+}
+
+fn axes_time(bed: &PicoBed) -> Result<Figure> {
+    Ok(axes::time_of(&bed.corpus()?.motion))
+}
+
+/// Runs all jobs of the corpus.
+fn measured(bed: &PicoBed) -> Result<Corpus> {
+    let mut corpus = Corpus::default();
+    for (name, text) in corpus::jobs() {
+        let how = How { more: &axes::ROUTER, ..How::default() };
+        let options = Options { settings: settings(how, true), ..Options::default() };
+        let mut board = Emulated::load(&bed.elf, &PICO)?;
+        board.begin_recording();
+        let report = job::run(&mut board, &lines_of(&text), &options, |_| ())?;
+        ensure!(report.problems.is_empty(), "{name}: {}", report.problems.join("; "));
+        let steps = board.end_recording()?.steps(f64::from(PICO.clock_hz));
+        let mut host = Host::new(1);
+        let setup = read_setup(&mut board, &mut host)?;
+        let limits = limits::asked(&mut board, &mut host, &setup);
+        let motion = Measured::of(name, &text, &steps, &setup, &limits)?;
+        let samples = motion.seconds / SAMPLE_S;
+        corpus.exec.push(Exec {
+            name,
+            mean: board.spent(EXEC) / samples,
+            worst: board.longest(EXEC),
+            runs: board.runs(EXEC) / samples,
+        });
+        corpus.motion.push(motion);
+    }
+    Ok(corpus)
 }
 
 fn pauses_none(bed: &PicoBed) -> Result<Figure> {

@@ -4,13 +4,14 @@ use anyhow::{Context, Result, ensure};
 
 use super::Figure;
 use super::optimum::rest_to_rest;
-use super::places::Places;
 use super::spirals::spiral;
 use super::workload::{
     ACCELERATION, Bed, FAST_BAUD, How, PER_JERK, PER_MM, USUAL_JERK, small_arcs,
 };
 use crate::host::{Host, LINES_IN_FLIGHT};
+use crate::kinetics::{self, WINDOW_S, Windows};
 use crate::machine::Machine;
+use crate::track::{self, Position, SAMPLE_S};
 
 /// Feed of lone moves, mm/min: higher than the moves can reach.
 const FEED: f64 = 30_000.0;
@@ -20,9 +21,6 @@ const HELD: f64 = 50.0;
 const PHASES: u64 = 8;
 /// Four times finer steps, which show the acceleration of X and Y well enough.
 const FINE: [&str; 2] = ["{1:{tr:5}}", "{2:{tr:5}}"];
-const FINE_PER_MM: f64 = 320.0;
-/// The time over which the acceleration is averaged, s.
-const WINDOW_S: f64 = 0.010;
 
 /// Time of a lone move of 0.1 mm, over the shortest time within the limits.
 pub fn lone_tenth(bed: &Bed) -> Result<Figure> {
@@ -125,34 +123,32 @@ fn first_slower(machine: &Machine, said: u64) -> Option<u64> {
 /// Acceleration of X and Y on arcs: the 99th percentile, over the limit.
 pub fn arcs_acceleration(bed: &Bed) -> Result<Figure> {
     let how = How { log: true, more: &FINE, ..How::default() };
-    let (machine, _) = bed.run(&small_arcs(), how)?;
-    let mut all: Vec<f64> = (0..2).flat_map(|motor| accelerations(&machine, motor)).collect();
+    let (machine, report) = bed.run(&small_arcs(), how)?;
+    let positions = track::positions(&track::steps(&machine), &report.setup);
+    let windows = Windows::new(SAMPLE_S, WINDOW_S);
+    let of = |axis: usize| kinetics::curves(&positions, axis, &windows).acceleration;
+    let mut all: Vec<f64> = (0..2).flat_map(of).map(f64::abs).collect();
     all.sort_by(f64::total_cmp);
     let percentile = all.get(all.len() * 99 / 100).context("nothing has moved")?;
     let note = format!("most {:.0} mm/s2", all[all.len() - 1]);
     Ok(Figure { value: percentile / ACCELERATION, note })
 }
 
-/// Returns the magnitude of a motor's acceleration throughout the job, from positions that are `WINDOW_S` apart.
-fn accelerations(machine: &Machine, motor: u8) -> Vec<f64> {
-    let places = Places::of(machine, motor, FINE_PER_MM);
-    let Some(span) = places.span() else { return Vec::new() };
-    let change = |w: &[f64]| (w[2] - 2.0 * w[1] + w[0]).abs() / (WINDOW_S * WINDOW_S);
-    places.every(WINDOW_S, span).windows(3).map(change).collect()
-}
-
 /// Change of velocity from one slice of 4 ms to the next on a spiral of moves of 0.1 mm: the 99th percentile, mm/s. A
 /// change of 2 mm/s is within the acceleration limit.
 pub fn velocity_jumps(bed: &Bed) -> Result<Figure> {
-    const SLICE_S: f64 = 0.004;
+    const SLICE_MS: usize = 4;
+    /// The first and the last part of the job are left out, so that both motors move all the time.
+    const LEFT_OUT_MS: usize = 100;
     let how = How { log: true, more: &FINE, baud: FAST_BAUD, ..How::default() };
-    let (machine, _) = bed.run(&spiral(0.1), how)?;
-    let all = [0, 1].map(|motor| Places::of(&machine, motor, FINE_PER_MM));
-    let (first, last) = all[0].span().context("nothing has moved")?;
-    // The first and the last 0.1 s are left out, so that both motors move all the time.
-    let [x, y] = all.map(|places| places.every(SLICE_S, (first + 0.1, last - 0.1)));
-    let way = |n: usize| (x[n + 1] - x[n]).hypot(y[n + 1] - y[n]);
-    let velocities: Vec<f64> = (0..x.len() - 1).map(|n| way(n) / SLICE_S).collect();
+    let (machine, report) = bed.run(&spiral(0.1), how)?;
+    let positions = track::positions(&track::steps(&machine), &report.setup);
+    let to = positions.len().saturating_sub(LEFT_OUT_MS);
+    let middle = positions.get(LEFT_OUT_MS..to).context("it is too short")?;
+    let places: Vec<_> = middle.iter().step_by(SLICE_MS).collect();
+    let way = |w: &[&Position]| (w[1][0] - w[0][0]).hypot(w[1][1] - w[0][1]);
+    let velocities: Vec<f64> =
+        places.windows(2).map(|w| way(w) / (SLICE_MS as f64 * SAMPLE_S)).collect();
     let mut jumps: Vec<f64> = velocities.windows(2).map(|v| (v[1] - v[0]).abs()).collect();
     jumps.sort_by(f64::total_cmp);
     let value = *jumps.get(jumps.len() * 99 / 100).context("it is too short")?;

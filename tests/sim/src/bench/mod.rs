@@ -4,7 +4,9 @@
 //! firmware on its board, with settings like those of the other firmwares. `kerf-sim bench` prints the table, and the
 //! tests hold every row to its floor. All figures are counted in cycles and exactly repeatable.
 
+mod axes;
 mod beyond;
+mod corpus;
 mod costs;
 pub mod emulated;
 mod jitter;
@@ -12,8 +14,8 @@ mod limits;
 #[path = "../../../support/optimum.rs"]
 mod optimum;
 mod pauses;
-mod places;
 mod printing;
+mod programmed;
 mod rates;
 mod rows;
 mod spirals;

@@ -7,8 +7,8 @@ use anyhow::{Result, ensure};
 use super::Figure;
 use super::workload::{Bed, How, arcs, braid, pocket};
 
-const SPIRAL: &str = include_str!("../../../../examples/spiral.gcode");
-const SQUARE: &str = include_str!("../../../../examples/square.gcode");
+pub(super) const SPIRAL: &str = include_str!("../../../../examples/spiral.gcode");
+pub(super) const SQUARE: &str = include_str!("../../../../examples/square.gcode");
 const ENGRAVING: &str = include_str!("../../../../examples/engraving.gcode");
 
 /// Counts the pauses without a jerk limit.

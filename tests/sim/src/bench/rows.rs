@@ -6,12 +6,12 @@
 //! 32 MHz. Floors are raised when the firmware has become better.
 
 use super::Better::{Higher, Lower};
-use super::{Row, beyond, costs, jitter, limits, pauses, printing, rates, spirals};
+use super::{Row, axes, beyond, costs, jitter, limits, pauses, printing, rates, spirals};
 
 const NONE: [&str; 3] = ["-"; 3];
 
 /// The table.
-pub const ROWS: [Row; 50] = [
+pub const ROWS: [Row; 54] = [
     Row {
         name: "rate-1",
         what: "highest rate held, 1 motor",
@@ -539,6 +539,50 @@ pub const ROWS: [Row; 50] = [
         target: Some(1.1),
         floor: Some(1.1),
         measure: limits::arcs_acceleration,
+    },
+    Row {
+        name: "axes-ac",
+        what: "acceleration of an axis over its limit, jobs",
+        unit: "x",
+        decimals: 2,
+        better: Lower,
+        peers: NONE,
+        target: Some(1.02),
+        floor: Some(1.32),
+        measure: axes::acceleration,
+    },
+    Row {
+        name: "axes-jerk",
+        what: "jerk of an axis over its limit, jobs",
+        unit: "x",
+        decimals: 2,
+        better: Lower,
+        peers: NONE,
+        target: Some(2.1),
+        floor: Some(2.1),
+        measure: axes::jerk,
+    },
+    Row {
+        name: "axes-off",
+        what: "the tool is off the programmed path, jobs",
+        unit: "um",
+        decimals: 0,
+        better: Lower,
+        peers: NONE,
+        target: Some(50.0),
+        floor: Some(73.0),
+        measure: axes::off,
+    },
+    Row {
+        name: "axes-time",
+        what: "time of these jobs",
+        unit: "s",
+        decimals: 1,
+        better: Lower,
+        peers: NONE,
+        target: None,
+        floor: Some(149.0),
+        measure: axes::time,
     },
     Row {
         name: "print-0.2",

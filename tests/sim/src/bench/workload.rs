@@ -1,11 +1,13 @@
 //! The firmware on its board with the settings of the other firmwares, and jobs for it.
 
+use std::cell::OnceCell;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 use kerf::boards::Board;
 
+use super::axes::Measured;
 use crate::host::{Host, LINES_IN_FLIGHT};
 use crate::image::Image;
 use crate::job::{self, Options};
@@ -66,6 +68,8 @@ pub struct Bed {
     board: &'static Board,
     /// Whether the firmware has a setting for acceleration.
     has_acceleration: bool,
+    /// What was measured in the corpus of jobs. Several rows share it, because it takes a while.
+    corpus: OnceCell<Vec<Measured>>,
 }
 
 /// Parameters of a job.
@@ -102,7 +106,8 @@ impl Bed {
     /// A bed for the ELF file at `path`.
     pub fn new(path: &Path, board: &'static Board) -> Result<Self> {
         let image = Image::read(path)?;
-        let mut bed = Bed { path: path.to_path_buf(), image, board, has_acceleration: true };
+        let (path, corpus) = (path.to_path_buf(), OnceCell::new());
+        let mut bed = Bed { path, image, board, has_acceleration: true, corpus };
         if !board.features.contains(&"dialect-tinyg") {
             return Ok(bed);
         }
@@ -126,6 +131,15 @@ impl Bed {
     /// Returns the settings that make this firmware comparable with the others.
     pub fn settings(&self, how: How) -> Vec<String> {
         settings(how, self.has_acceleration)
+    }
+
+    /// Returns what `measure` finds in the corpus of jobs. It is called once.
+    pub(super) fn corpus(&self, measure: fn(&Bed) -> Result<Vec<Measured>>) -> Result<&[Measured]> {
+        if self.corpus.get().is_none() {
+            let measured = measure(self)?;
+            return Ok(self.corpus.get_or_init(|| measured));
+        }
+        Ok(self.corpus.get().map(Vec::as_slice).unwrap_or_default())
     }
 
     /// A stopwatch for the calls of a function.

@@ -18,6 +18,7 @@ use process::{Answers, Lent};
 use serde::{Deserialize, Serialize};
 
 use crate::runs::Runs;
+use crate::track::Steps;
 
 /// Path of the program where `cargo xtask` has put it, beside the folder of the images.
 const PROGRAM: &str = "rp2040-emulator/bridge.mjs";
@@ -313,6 +314,10 @@ struct Answer {
     #[serde(default)]
     spent: Vec<f64>,
     #[serde(default)]
+    runs: Vec<f64>,
+    #[serde(default)]
+    longest: Vec<f64>,
+    #[serde(default)]
     resets: u64,
     #[serde(default)]
     waiting: usize,
@@ -336,6 +341,9 @@ pub struct Recorded {
     /// The cycles at which each motor's step pulses rise.
     #[serde(default)]
     pub times: Vec<Vec<u64>>,
+    /// The directions of these steps: 1 where the direction pin is low, else -1.
+    #[serde(default)]
+    pub signs: Vec<Vec<i8>>,
     /// Edges of the outputs behind a register that are no steps: which output, whether it rises, and the cycle.
     #[serde(default)]
     pub edges: Vec<(u8, bool, u64)>,
@@ -348,6 +356,18 @@ pub struct Recorded {
     /// The shortest time from such a change to the motor's next pulse, cycles.
     #[serde(default)]
     pub setup: Option<f64>,
+}
+
+impl Recorded {
+    /// Returns the steps of each motor, on a board whose clock has so many cycles in a second.
+    pub fn steps(&self, clock_hz: f64) -> Steps {
+        let mut steps = Steps::default();
+        for ((steps, times), signs) in steps.iter_mut().zip(&self.times).zip(&self.signs) {
+            let both = times.iter().zip(signs);
+            steps.extend(both.map(|(cycle, sign)| (*cycle as f64 / clock_hz, *sign > 0)));
+        }
+        steps
+    }
 }
 
 /// An emulated board.
@@ -555,8 +575,18 @@ impl Emulated {
 
     /// Records the edges of steps in the next milliseconds.
     pub fn record_for_ms(&mut self, ms: u64) -> Result<Recorded> {
-        self.request.record = Some(true);
+        self.begin_recording();
         self.run_for_ms(ms)?;
+        self.end_recording()
+    }
+
+    /// Records the edges of steps from the next run on.
+    pub fn begin_recording(&mut self) {
+        self.request.record = Some(true);
+    }
+
+    /// Returns what has been recorded, and ends the recording.
+    pub fn end_recording(&mut self) -> Result<Recorded> {
         self.request.record = Some(false);
         self.run_for_ms(0)?;
         Ok(self.answer.recorded.take().unwrap_or_default())
@@ -644,7 +674,18 @@ impl Emulated {
         self.answer.stack
     }
 
-    /// Forgets how long interrupts were off.
+    /// How often an exception's handler has run.
+    pub fn runs(&self, exception: usize) -> f64 {
+        self.answer.runs.get(exception).copied().unwrap_or(0.0)
+    }
+
+    /// Cycles of the longest run of an exception's handler since [`Emulated::forget_masked`], without the handlers
+    /// that interrupt it.
+    pub fn longest(&self, exception: usize) -> f64 {
+        self.answer.longest.get(exception).copied().unwrap_or(0.0)
+    }
+
+    /// Forgets how long interrupts were off, and how long handlers ran.
     pub fn forget_masked(&mut self) {
         self.request.unmasked = true;
     }

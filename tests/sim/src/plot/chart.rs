@@ -6,8 +6,8 @@ use anyhow::{Result, anyhow};
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use super::Motion;
-use super::track::SAMPLE_S;
+use super::{Axis, Motion};
+use crate::track::SAMPLE_S;
 
 const WIDTH: u32 = 1_100;
 const PATH_HEIGHT: u32 = 640;
@@ -25,10 +25,54 @@ const SCALE: u32 = 110;
 /// Steps of the colour scale: as many as can be told apart.
 const COLOURS: usize = 16;
 /// Columns of a curve. If there are more samples, each column shows its highest and its lowest.
-const COLUMNS: usize = 1_000;
+const COLUMNS: usize = 700;
 /// How far a simplified path may be off, as a share of its size.
 const SIMPLER: f64 = 1.0 / 2_000.0;
 const FONT: (&str, u32) = ("sans-serif", 13);
+/// Height of the line that names the axes, and the width of an axis in it.
+const LEGEND: u32 = 24;
+const LEGEND_STEP: i32 = 150;
+/// The colours of the axes that move, in order.
+const AXES: [RGBColor; 6] = [
+    RGBColor(196, 40, 40),
+    RGBColor(30, 130, 60),
+    RGBColor(40, 80, 200),
+    RGBColor(190, 120, 0),
+    RGBColor(130, 60, 170),
+    RGBColor(0, 140, 150),
+];
+/// A limit is drawn if it is no more than so many times the largest value.
+const LIMITS_UP_TO: f64 = 3.0;
+
+/// What a panel of curves shows.
+struct Quantity {
+    name: &'static str,
+    /// The windows between positions that it is computed from.
+    windows: f64,
+    values: fn(&Axis) -> &[f64],
+    limit: fn(&Axis) -> f64,
+}
+
+const QUANTITIES: [Quantity; 3] = [
+    Quantity {
+        name: "velocity, mm/s",
+        windows: 2.0,
+        values: |axis| &axis.curves.velocity,
+        limit: |axis| axis.limits.velocity,
+    },
+    Quantity {
+        name: "acceleration, mm/s²",
+        windows: 1.0,
+        values: |axis| &axis.curves.acceleration,
+        limit: |axis| axis.limits.acceleration,
+    },
+    Quantity {
+        name: "jerk, mm/s³",
+        windows: 2.0,
+        values: |axis| &axis.curves.jerk,
+        limit: |axis| axis.limits.jerk,
+    },
+];
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
@@ -75,18 +119,13 @@ fn panels(
         thread_errors(&errors, threads)?;
     }
     let (plane, scale) = top.split_horizontally(WIDTH - SCALE);
-    let fastest = motion.velocity.iter().copied().fold(0.0, f64::max).max(1e-9);
+    let fastest = motion.speed.iter().copied().fold(0.0, f64::max).max(1e-9);
     path(&plane, motion, fastest)?;
     colour_scale(&scale, fastest)?;
-    let all = 0.0..motion.velocity.len() as f64 * SAMPLE_S;
+    let all = 0.0..motion.speed.len() as f64 * SAMPLE_S;
     let span = span.unwrap_or(all);
-    let curves = [
-        (&motion.velocity, "velocity, mm/s"),
-        (&motion.acceleration, "acceleration, mm/s²"),
-        (&motion.jerk, "jerk, mm/s³"),
-    ];
-    for (area, (values, name)) in rest.split_evenly((3, 1)).iter().zip(curves) {
-        curve(area, values, name, &span)?;
+    for (area, quantity) in rest.split_evenly((3, 1)).iter().zip(&QUANTITIES) {
+        curves(area, motion, quantity, &span)?;
     }
     root.present()?;
     Ok(())
@@ -182,7 +221,7 @@ fn pieces(motion: &Motion, fastest: f64) -> Vec<(RGBColor, Vec<(f64, f64)>)> {
     let step =
         |velocity: f64| (velocity / fastest * (COLOURS - 1) as f64).round().max(0.0) as usize;
     let mut pieces: Vec<(usize, Vec<(f64, f64)>)> = Vec::new();
-    for (point, velocity) in motion.path.iter().zip(&motion.velocity) {
+    for (point, velocity) in motion.path.iter().zip(&motion.speed) {
         let step = step(*velocity);
         match pieces.last_mut() {
             Some((of, points)) if *of == step => points.push(*point),
@@ -217,21 +256,55 @@ fn colour_scale(area: &Area<'_>, fastest: f64) -> Drawn {
     Ok(())
 }
 
-/// Draws a quantity over time.
-fn curve(area: &Area<'_>, values: &[f64], name: &str, span: &Range<f64>) -> Drawn {
-    let shown = columns(values, span);
-    let range = extent(shown.iter().map(|p| p.1).chain([0.0]));
+/// Draws a quantity of each axis over time. A dashed line is the limit of the axis of its colour.
+///
+/// Limits far above all curves are not drawn, because the curves would be flat then. The caption names all limits.
+fn curves(area: &Area<'_>, motion: &Motion, quantity: &Quantity, span: &Range<f64>) -> Drawn {
+    let shown: Vec<Points> =
+        motion.axes.iter().map(|axis| columns((quantity.values)(axis), span)).collect();
+    let all = || shown.iter().flatten().map(|point| point.1);
+    let most = all().map(f64::abs).fold(0.0, f64::max);
+    let is_near = |limit: &f64| *limit <= LIMITS_UP_TO * most;
+    let limits: Vec<_> = motion.axes.iter().map(|axis| (quantity.limit)(axis)).collect();
+    let lines = || limits.iter().copied().filter(is_near).flat_map(|limit| [-limit, limit]);
+    let range = extent(all().chain(lines()).chain([0.0]));
     let around = (range.end - range.start) * 0.06;
     let mut chart = ChartBuilder::on(area)
         .margin(MARGIN)
+        .margin_top(LEGEND)
         .margin_right(2 * MARGIN)
         .x_label_area_size(LABELS_BELOW)
         .y_label_area_size(LABELS_LEFT)
         .build_cartesian_2d(span.clone(), range.start - around..range.end + around)?;
     let mut mesh = chart.configure_mesh();
-    mesh.x_desc("time, s").y_desc(name).label_style(FONT).y_labels(7);
+    mesh.x_desc("time, s").y_desc(quantity.name).label_style(FONT).y_labels(7);
     mesh.max_light_lines(0).draw()?;
-    chart.draw_series(LineSeries::new(shown, &BLUE))?;
+    for (n, (points, limit)) in shown.into_iter().zip(&limits).enumerate() {
+        chart.draw_series(LineSeries::new(points, &AXES[n % AXES.len()]))?;
+        for level in [-limit, *limit].into_iter().filter(|_| is_near(limit)) {
+            let line = [(span.start, level), (span.end, level)];
+            let dashed = DashedLineSeries::new(line, 6, 5, AXES[n % AXES.len()].stroke_width(1));
+            chart.draw_series(dashed)?;
+        }
+    }
+    legend(area, motion, quantity, &limits)
+}
+
+/// Writes the names of the axes, each in its colour with its limit, and the times over which values are taken.
+fn legend(area: &Area<'_>, motion: &Motion, quantity: &Quantity, limits: &[f64]) -> Drawn {
+    let mut x = LABELS_LEFT as i32 + MARGIN as i32;
+    for (n, (axis, limit)) in motion.axes.iter().zip(limits).enumerate() {
+        let text = match limit.is_finite() {
+            true => format!("{}, limit {limit:.0}", axis.name),
+            false => format!("{}, no limit", axis.name),
+        };
+        let style = TextStyle::from(FONT).color(&AXES[n % AXES.len()]);
+        area.draw(&Text::new(text, (x, 4), style))?;
+        x += LEGEND_STEP;
+    }
+    let ms = 1e3 * motion.window_s * quantity.windows;
+    let text = format!("from positions {ms:.0} ms apart");
+    area.draw(&Text::new(text, (x, 4), FONT))?;
     Ok(())
 }
 

@@ -1,8 +1,10 @@
-//! Turns steps into positions that are a millisecond apart.
+//! Turns steps into positions of the axes that are a millisecond apart.
 //!
 //! A step is the moment at which the motor passes the middle between two positions. Between steps the motor is taken
 //! to move evenly. When no step comes for [`STILL_S`] the motor stands still, except for the half steps at both ends
 //! of the standstill.
+
+use kerf::boards::MOTORS;
 
 use crate::machine::Machine;
 use crate::oracle::{AXES, MotorSetup, Setup, UNITS};
@@ -11,36 +13,55 @@ use crate::oracle::{AXES, MotorSetup, Setup, UNITS};
 pub const SAMPLE_S: f64 = 0.001;
 /// A motor that makes no step for so long stands still, s.
 const STILL_S: f64 = 0.2;
-/// Axes that are lengths, X Y Z.
-const LINEAR: usize = 3;
 
-/// The positions of all axes.
+/// The positions of all axes, mm or degrees.
 pub type Position = [f64; AXES];
+
+/// The steps of each motor: when, in s, and whether the direction pin is low.
+pub type Steps = [Vec<(f64, bool)>; MOTORS];
 
 /// The path of a motor as corners of a line: time and position.
 type Corners = Vec<(f64, f64)>;
 
+/// Returns the logged steps of a machine.
+pub fn steps(machine: &Machine) -> Steps {
+    let mut steps = Steps::default();
+    for step in machine.recorder().log() {
+        steps[usize::from(step.motor)].push((machine.seconds(step.cycle), step.positive));
+    }
+    steps
+}
+
+/// Returns the times of the first and of the last step of all motors, s.
+pub fn span(steps: &Steps) -> Option<(f64, f64)> {
+    let times = || steps.iter().flatten().map(|step| step.0);
+    let ends = (times().reduce(f64::min), times().reduce(f64::max));
+    ends.0.zip(ends.1)
+}
+
 /// Returns the positions of the axes from the first step to the last. An axis with several motors follows the first
-/// of them.
-pub fn positions(machine: &Machine, setup: &Setup) -> Vec<Position> {
-    let log = machine.recorder().log();
-    let (Some(first), Some(last)) = (log.first(), log.last()) else { return Vec::new() };
-    let count = (machine.seconds(last.cycle - first.cycle) / SAMPLE_S).ceil() as usize + 1;
+/// of them. Two motors that drive X and Y together move both.
+pub fn positions(steps: &Steps, setup: &Setup) -> Vec<Position> {
+    let Some((first, last)) = span(steps) else { return Vec::new() };
+    let count = ((last - first) / SAMPLE_S).ceil() as usize + 1;
     let mut positions = vec![Position::default(); count];
-    for (motor, of) in setup.motors.iter().enumerate().rev() {
-        let steps = log.iter().filter(|s| usize::from(s.motor) == motor);
-        let seconds = |cycle: u64| machine.seconds(cycle - first.cycle);
-        let steps = steps.map(|s| (seconds(s.cycle), s.positive != of.inverted));
+    for (steps, of) in steps.iter().zip(&setup.motors).rev() {
+        let steps = steps.iter().map(|(time, low)| (time - first, *low != of.inverted));
         let corners = corners(steps, step_length(of));
         for (position, value) in positions.iter_mut().zip(sampled(&corners)) {
-            position[of.axis] = value;
+            if of.besides == 0 {
+                position[of.axis] = value;
+            } else {
+                position[0] += value / 2.0;
+                position[1] += of.besides as f64 * value / 2.0;
+            }
         }
     }
     positions
 }
 
 /// Returns the millimetres or degrees in a step.
-fn step_length(motor: &MotorSetup) -> f64 {
+pub fn step_length(motor: &MotorSetup) -> f64 {
     const FAR: i64 = 1_000_000;
     match motor.steps(FAR * UNITS as i64) {
         0 => 0.0,
@@ -86,22 +107,6 @@ fn sampled(corners: &[(f64, f64)]) -> impl Iterator<Item = f64> {
             (None, _) => corners.first().map_or(0.0, |corner| corner.1),
         }
     })
-}
-
-/// Returns the distance travelled up to each sample: of the linear axes, or of the rotary axes if no linear axis ever
-/// moves.
-pub fn way(positions: &[Position]) -> Vec<f64> {
-    let moves = |axis: usize| positions.iter().any(|p| p[axis] != positions[0][axis]);
-    let axes = if (0..LINEAR).any(moves) { 0..LINEAR } else { LINEAR..AXES };
-    let mut sum = 0.0;
-    let distance = |pair: &[Position]| -> f64 {
-        axes.clone().map(|axis| (pair[1][axis] - pair[0][axis]).powi(2)).sum::<f64>().sqrt()
-    };
-    let rest = positions.windows(2).map(|pair| {
-        sum += distance(pair);
-        sum
-    });
-    std::iter::once(0.0).chain(rest).take(positions.len()).collect()
 }
 
 #[cfg(test)]
