@@ -124,6 +124,8 @@ pub struct Prep {
     fine: bool,
     /// Whether ticks are to be as few as in a block of one segment.
     coarse: bool,
+    /// Whether exec is late, and pulses are not to wait for their place in the tick.
+    hurries: bool,
     /// Whether a motor has reversed and no segment has the new direction yet.
     turned: bool,
     /// Direction set-up time before the first step, CPU cycles.
@@ -167,6 +169,7 @@ impl Prep {
             backwards: 0,
             fine: false,
             coarse: false,
+            hurries: false,
             turned: false,
             paces: paces(Drivers::USUAL),
             setup: Drivers::USUAL.setup(),
@@ -202,6 +205,12 @@ impl Prep {
     #[inline(always)]
     pub fn refine(&mut self, fine: bool, coarse: bool) {
         (self.fine, self.coarse) = (fine, coarse);
+    }
+
+    /// Sets whether exec is late.
+    #[inline(always)]
+    pub fn set_hurry(&mut self, hurries: bool) {
+        self.hurries = hurries;
     }
 
     /// Phase units of the dominant motor in the block that no segment covers yet.

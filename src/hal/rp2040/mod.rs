@@ -65,9 +65,9 @@ pub use crate::hal::{exec, flags};
 /// This chip, for the [contract](super::contract).
 pub struct Chip;
 
-/// Whether lines are blended.
+/// Whether lines are blended: not yet.
 pub fn blends() -> bool {
-    true
+    false
 }
 
 /// Functions of [`System`](super::contract::System).

@@ -27,7 +27,6 @@ impl Timing for Chip {
     const SAMPLE_MS: u8 = 2;
     /// Exec is fast enough: 40 % of the CPU are busy with an arc on which a motor makes a million steps a second.
     const SHORT_SHARE: f32 = 1.0;
-    const STAGE: usize = 64;
-    const LOOK_AHEAD: usize = 768;
+    const LOOK_AHEAD: usize = 1_024;
     const LINE_BYTES: [usize; 2] = [2_088, 1_040];
 }

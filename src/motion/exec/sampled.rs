@@ -104,7 +104,8 @@ impl Exec {
             out.velocity += scaled(off, FOLLOWS_LOG2);
         }
         // A steady motion has fine ticks.
-        self.prep.refine(steady && self.running.long, self.hurry);
+        self.prep.refine(steady && self.running.long, self.coarse);
+        self.prep.set_hurry(self.hurry);
         self.prep.slice(&distances, &mut out.target, segment);
     }
 

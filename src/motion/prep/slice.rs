@@ -184,9 +184,9 @@ impl Prep {
         let period = self.time_of(increment, (most, shift), cycles);
         out.ticks = ticks;
         out.period = period;
-        // The wait takes time that exec lacks where it is pressed.
+        // The wait takes time that exec lacks where it is late.
         let settles = self.paces().settles;
-        let least = if self.coarse { 2 * settles } else { settles };
+        let least = if self.hurries { 2 * settles } else { settles };
         out.settle = if period >= least { SETTLE } else { 0 };
         self.complete(cycles, increment, out, |prep, m| prep.minors[m].increment);
     }

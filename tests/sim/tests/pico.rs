@@ -743,12 +743,12 @@ const LONG: [&str; 2] = ["axis-modes", "far"];
 /// Transcripts of a printer, and of drivers that are set up by UART.
 const PRINTING: [&str; 4] = ["bed", "drivers", "heat", "reprap"];
 
-/// Returns an answer of a machine with 61 blocks as this machine, with 768, gives it.
+/// Returns an answer of a machine with 61 blocks as this machine, with 1,024, gives it.
 fn with_more_room(line: &str) -> String {
     let text = [
-        ("Bf:61,", "Bf:768,"),
-        ("A,61,", "A,768,"),
-        ("qr:                 61", "qr:                768"),
+        ("Bf:61,", "Bf:1024,"),
+        ("A,61,", "A,1024,"),
+        ("qr:                 61", "qr:               1024"),
     ];
     let mut line = text.iter().fold(line.to_string(), |line, (few, more)| line.replace(few, more));
     let is_refused = line.contains("\"f\":") && !line.contains("\"f\":[1,0,");
@@ -759,7 +759,7 @@ fn with_more_room(line: &str) -> String {
     let digits = line[at..].bytes().take_while(u8::is_ascii_digit).count();
     let number = line[at..at + digits].parse().unwrap_or(0);
     if (1..=61).contains(&number) {
-        line.replace_range(at..at + digits, &(number + 707).to_string());
+        line.replace_range(at..at + digits, &(number + 963).to_string());
     }
     line
 }
