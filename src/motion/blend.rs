@@ -92,6 +92,8 @@ struct Entry {
     unit: PerAxis<i16>,
     /// The length of the path; 0 for a block that moves nothing.
     length: u32,
+    /// Where on the path it begins: counts on from block to block, and wraps.
+    at: u32,
     /// The velocity limit at its start.
     entry: f32,
     /// The share of the acceleration that is left in the block.
@@ -116,7 +118,7 @@ impl Entry {
     /// A block that changes nothing about the path.
     fn new(block: Block, unit: &PerAxis<i16>, length: u32) -> Self {
         let asked = [Asked { velocity: f32::MAX, change: 0, square: 0 }; 2];
-        Self { block, unit: *unit, length, entry: f32::MAX, room: 1.0, turn: 0, asked }
+        Self { block, unit: *unit, length, at: 0, entry: f32::MAX, room: 1.0, turn: 0, asked }
     }
 
     fn line(&self) -> Option<&Line> {
@@ -152,6 +154,8 @@ pub struct Blend {
     windows: [Window; PLACES],
     first: usize,
     len: usize,
+    /// Where on the path the last block ends.
+    end: u32,
     /// How many corners are final, from the first block on.
     done: usize,
     /// How many blocks are to go because nothing follows for now.
@@ -186,6 +190,7 @@ impl Blend {
             windows: [Window::default(); PLACES],
             first: 0,
             len: 0,
+            end: 0,
             done: 0,
             flushed: 0,
             before: None,
@@ -297,8 +302,7 @@ impl Blend {
         self.cut_end(zone);
         let cut = in_lengths(zone);
         self.append(entry);
-        self.look_back(top, 0);
-        self.look_back(top, 1);
+        self.look_back(top);
         if entry.length - entry.length / 5 > cut {
             self.cut_last_at(cut);
         }
@@ -371,8 +375,16 @@ impl Blend {
     fn append(&mut self, entry: Entry) {
         if self.len < PLACES {
             self.len += 1;
-            *self.entry_mut(self.len - 1) = entry;
+            let at = self.end;
+            self.end = at.wrapping_add(entry.length);
+            *self.entry_mut(self.len - 1) = Entry { at, ..entry };
         }
+    }
+
+    /// Returns the length of the path from the start of block `n` to that of block `to`, or to the end of the last one.
+    fn way(&self, n: usize, to: usize) -> u32 {
+        let place = |n: usize| if n < self.len { self.entry(n).at } else { self.end };
+        place(to).wrapping_sub(place(n))
     }
 
     fn entry(&self, n: usize) -> &Entry {

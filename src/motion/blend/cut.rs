@@ -41,6 +41,7 @@ impl Blend {
         let rest = Entry { room: last.room, ..Entry::new(tail, &last.unit, last.length - length) };
         let entry = self.entry_mut(newest);
         (entry.block, entry.length) = (head, length);
+        self.end = entry.at.wrapping_add(length);
         self.append(rest);
     }
 }

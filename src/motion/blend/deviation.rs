@@ -1,12 +1,23 @@
 //! How far what comes out of the means is off the path.
 
 use super::limits::{in_lengths, reach};
-use super::{Blend, ONE};
+use super::{Blend, Entry, ONE};
 use crate::math::sqrt;
 use crate::motion::smooth::SAMPLE_S;
 use crate::units::FIRST_ROTARY;
 
 impl Blend {
+    /// Returns a bound of [`Blend::off`]. A window as long as the means reach lies within two windows.
+    pub(super) fn most_off(&self, entry: &Entry, velocity: f32, accel: f32) -> f32 {
+        let layers = &self.limits.kernel.layers;
+        let (by_velocity, by_accel) =
+            layers.iter().fold((0.0, 0.0), |(v, a), layer| (v + layer.velocity, a + layer.accel));
+        let square = entry.asked[0].square.max(entry.asked[1].square);
+        let change = sqrt(square as f32) * (2.0 / ONE);
+        let chord = 0.25 * SAMPLE_S * accel * SAMPLE_S;
+        change * (velocity * by_velocity + accel * by_accel) + chord
+    }
+
     /// Returns how far the path is off at a corner that is passed at `velocity`, mm, if the machine brakes before it and
     /// speeds up behind it by `accel`.
     pub(super) fn off(&self, corner: usize, velocity: f32, accel: f32) -> f32 {

@@ -9,10 +9,10 @@ impl Blend {
     pub(super) fn settle(&mut self, all: bool) {
         while self.done < self.len {
             let corner = self.done;
-            if !all && !self.reaches(corner) {
-                return;
-            }
             if self.entry(corner).turn >= STRAIGHT {
+                if !all && !self.reaches(corner) {
+                    return;
+                }
                 self.finish(corner);
             }
             self.done += 1;
@@ -24,20 +24,8 @@ impl Blend {
         let entry = self.entry(corner);
         let asked = greater(entry.asked[0].velocity, entry.asked[1].velocity);
         let velocity = least(least(entry.entry, asked), entry.cruise());
-        self.is_as_long(corner, reach(velocity, entry.accel(), self.limits.kernel.reach()))
-    }
-
-    /// Whether the path from the start of block `n` on is as long as this, mm.
-    pub(super) fn is_as_long(&self, n: usize, length: f32) -> bool {
-        let longest = in_lengths(length);
-        let mut way = 0u32;
-        for at in n..self.len {
-            way = way.saturating_add(self.entry(at).length);
-            if way >= longest {
-                return true;
-            }
-        }
-        false
+        let needed = reach(velocity, entry.accel(), self.limits.kernel.reach());
+        self.way(corner, self.len) >= in_lengths(needed)
     }
 
     /// Whether no corner behind can limit the first block any more: those in reach are final.
@@ -47,24 +35,14 @@ impl Blend {
         }
         let first = self.entry(0);
         let needed = in_lengths(zone(first.cruise(), first.accel(), self.limits.kernel.reach()));
-        let mut way = 0u32;
-        for at in 1..self.done {
-            if way >= needed {
-                return true;
-            }
-            way = way.saturating_add(self.entry(at).length);
-        }
-        way >= needed
+        self.way(1, self.done) >= needed
     }
 
     /// The stage is full: makes the first corners final, at a velocity at which their windows lie in the path that waits.
     pub(super) fn crowd(&mut self) {
         let corner = self.done;
         if corner < self.len {
-            let mut way = 0u32;
-            for at in corner..self.len {
-                way = way.saturating_add(self.entry(at).length);
-            }
+            let way = self.way(corner, self.len);
             let (accel, reach) = (self.entry(corner).accel(), self.limits.kernel.reach());
             let fits = way as f32 * (1.0 / PER_MM) - 0.25 * accel * reach * reach;
             let entry = self.entry_mut(corner);
@@ -88,7 +66,8 @@ impl Blend {
         let mut velocity = least(entry.entry, entry.asked[mean].velocity);
         let allowed = USED * self.limits.deviation;
         let mut share = 1.0;
-        if self.off(corner, velocity, accel) > allowed {
+        let may_be_off = self.most_off(&entry, velocity, accel) > allowed;
+        if may_be_off && self.off(corner, velocity, accel) > allowed {
             let stands = self.off(corner, 0.0, accel);
             if stands > 0.5 * allowed {
                 share = greater(0.5 * allowed / stands, LEAST_ROOM);

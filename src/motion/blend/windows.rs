@@ -1,33 +1,57 @@
 //! Windows: corners in a row that may come within the time of a mean.
 
 use super::limits::{in_lengths, reach, whole};
-use super::{Blend, CURVE, EVEN, Entry, PER_MM, PLACES, ROUND, SHARE, STRAIGHT};
+use super::{Blend, CURVE, EVEN, Entry, ONE, PER_MM, PLACES, ROUND, SHARE, STRAIGHT, WEIGHT};
 use crate::motion::float::{greater, least};
 
-/// Some corners in a row.
+/// Some corners in a row, the last of which is the newest.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Window {
-    /// The velocity below which the path between them takes longer than the mean.
-    pub(super) alone: f32,
-    /// The velocity limit if it does not.
-    pub(super) together: f32,
+    /// The length of the path between them.
+    way: u32,
+    /// The velocity limit for each mean: that at which the path takes longer than the mean, or that of the change.
+    limits: [f32; 2],
     /// The change of direction: that of an axis, weighted, in 2^-22, and the square of the whole.
-    pub(super) change: u32,
-    pub(super) square: u32,
+    change: u32,
+    square: u32,
+}
+
+/// What decides about the windows of a mean.
+struct Bounds {
+    seconds: f32,
+    /// The velocity at which windows are looked for, mm/s.
+    top: f32,
+    /// By how much the machine may speed up between corners, mm/s.
+    speeds_up: f32,
+    /// The velocity limit so far, and the changes above which a window lowers it.
+    limit: f32,
+    change: u32,
+    square: u32,
+    /// The longest window.
+    longest: u32,
+}
+
+impl Bounds {
+    /// Returns the velocity below which a path takes longer than the mean.
+    fn alone(&self, way: u32) -> f32 {
+        greater(way as f32 * (1.0 / PER_MM) / self.seconds - self.speeds_up, 0.0)
+    }
+
+    /// Returns the longest path that may take less time than the mean between places that are passed at `velocity`.
+    fn reach(&self, velocity: f32) -> u32 {
+        in_lengths((velocity + self.speeds_up) * self.seconds)
+    }
 }
 
 impl Blend {
-    /// Applies what the windows of a mean ask for that end at the last corner, up to the velocity `top`.
-    pub(super) fn look_back(&mut self, top: f32, mean: usize) {
+    /// Applies what the windows ask for that end at the last corner, up to the velocity `top`.
+    pub(super) fn look_back(&mut self, top: f32) {
         let newest = self.len - 1;
-        let to = self.entry(newest).unit;
-        let accel = self.entry(newest).accel();
-        let seconds = self.limits.windows[mean & 1];
-        let longest = in_lengths(reach(top, accel, seconds));
-        let speeds_up = 0.25 * ROUND * accel * seconds * seconds;
+        let (to, accel) = (self.entry(newest).unit, self.entry(newest).accel());
         let slowest = self.limits.least_of(self, newest);
         let is_curve = self.entry(newest).turn < CURVE && slowest >= EVEN * accel;
-        let (mut oldest, mut way, mut limit) = (newest, 0u32, top);
+        let mut bounds = [0, 1].map(|mean| self.bounds(mean, top, accel, slowest, is_curve));
+        let mut oldest = newest;
         // The windows, from the shortest to the longest.
         loop {
             let from = match oldest {
@@ -35,30 +59,66 @@ impl Blend {
                 _ => Some(self.entry(oldest - 1).unit),
             };
             let Some(from) = from else { break };
-            let (change, square) = self.limits.change(&from, &to);
-            let alone = (way as f32 * (1.0 / PER_MM) - speeds_up) / seconds;
-            let mut together = self.limits.velocity(change, seconds);
-            if is_curve {
-                together = least(together, SHARE / whole(square, slowest * seconds));
-            }
-            limit = least(limit, greater(together, alone));
-            let window = Window { alone, together, change, square };
-            self.windows[oldest % PLACES] = window;
-            let Some(before) = oldest.checked_sub(1) else { break };
-            way = way.saturating_add(self.entry(before).length);
-            if way >= longest || before < self.done {
+            let way = self.way(oldest, newest);
+            if bounds.iter().all(|bounds| way >= bounds.longest) && oldest < newest {
+                oldest += 1;
                 break;
             }
-            oldest = before;
+            let (change, square) = self.limits.change(&from, &to);
+            let mut window = Window { way, limits: [f32::MAX; 2], change, square };
+            for (limit, bounds) in window.limits.iter_mut().zip(&mut bounds) {
+                if change > bounds.change || square > bounds.square {
+                    let mut together = self.limits.velocity(change, bounds.seconds);
+                    if is_curve {
+                        let whole = whole(square, slowest * bounds.seconds);
+                        together = least(together, SHARE / whole);
+                    }
+                    *limit = greater(together, bounds.alone(way));
+                    bounds.limit = least(bounds.limit, *limit);
+                }
+            }
+            self.windows[oldest % PLACES] = window;
+            match oldest.checked_sub(1) {
+                Some(before) if before >= self.done => oldest = before,
+                _ => break,
+            }
         }
-        let last = limit;
+        for (mean, bounds) in bounds.iter().enumerate() {
+            self.look_ahead(oldest, newest, mean, bounds);
+        }
+    }
+
+    /// Returns what decides about the windows of a mean.
+    fn bounds(&self, mean: usize, top: f32, accel: f32, slowest: f32, is_curve: bool) -> Bounds {
+        let seconds = self.limits.windows[mean & 1];
+        let speeds_up = 0.25 * ROUND * accel * seconds;
+        let share = SHARE * ONE * seconds / top;
+        let square = if is_curve { share * slowest } else { ONE * ONE };
+        Bounds {
+            seconds,
+            top,
+            speeds_up,
+            limit: top,
+            change: (share * WEIGHT * self.limits.accel) as u32,
+            square: if is_curve { (square * square) as u32 } else { u32::MAX },
+            longest: in_lengths((top + speeds_up) * seconds),
+        }
+    }
+
+    /// Applies the windows of a mean to the corners from `oldest` to `newest`.
+    fn look_ahead(&mut self, oldest: usize, newest: usize, mean: usize, bounds: &Bounds) {
+        let last = bounds.limit;
+        let near = bounds.reach(last);
         let (mut limit, mut change, mut square) = (f32::MAX, 0, 0);
         for n in oldest..=newest {
             let window = self.windows[n % PLACES];
             let asked = &mut self.entry_mut(n).asked[mean & 1];
-            limit = least(limit, greater(window.together, window.alone));
+            limit = least(limit, window.limits[mean & 1]);
             asked.velocity = least(asked.velocity, limit);
-            if window.alone < greater(asked.velocity, last) {
+            let velocity = least(asked.velocity, bounds.top);
+            let within =
+                window.way < near || velocity > last && window.way < bounds.reach(velocity);
+            if within {
                 (change, square) = (change.max(window.change), square.max(window.square));
             }
             asked.change = asked.change.max(change);
