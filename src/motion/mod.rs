@@ -7,6 +7,7 @@
 //! ```
 
 pub mod advance;
+pub mod backlash;
 pub mod block;
 pub mod chain;
 pub mod curve;

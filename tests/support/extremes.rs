@@ -59,12 +59,18 @@ struct Motion {
     motors: [Motor; MOTORS],
     /// For each axis: its mode and its radius.
     axes: [(i64, f64); AXES.len()],
+    /// The backlash of each axis.
+    backlash: [f64; AXES.len()],
 }
 
 impl Motion {
     /// The settings of a machine.
     fn of(machine: u8) -> Self {
-        let mut motion = Self { motors: Default::default(), axes: [(0, 0.0); AXES.len()] };
+        let mut motion = Self {
+            motors: Default::default(),
+            axes: [(0, 0.0); AXES.len()],
+            backlash: [0.0; AXES.len()],
+        };
         for setting in (0..Setting::NUMBERS).filter_map(Setting::from_number) {
             if matches!(setting.owner(), Owner::Motor(_) | Owner::Axis(_)) {
                 motion.set(setting, setting.value_on(machine).into());
@@ -90,6 +96,9 @@ impl Motion {
                 }
             }
             Owner::Axis(axis) => {
+                if &token[..2] == b"bl" {
+                    self.backlash[usize::from(axis)] = value;
+                }
                 let axis = &mut self.axes[usize::from(axis)];
                 match &token[..2] {
                     b"am" => axis.0 = kept,
@@ -122,6 +131,14 @@ impl Motion {
     fn steps(&self, motor: usize, axis: usize, way: f64) -> f64 {
         let way = self.way(axis, way);
         if self.motors[motor].axis == axis as i64 { self.ratio(motor) * way } else { 0.0 }
+    }
+
+    /// Returns the steps that a motor makes in addition where an axis turns round; at most 4,095.
+    fn backlash(&self, motor: usize, axis: usize, way: f64) -> f64 {
+        if self.motors[motor].axis != axis as i64 {
+            return 0.0;
+        }
+        (self.ratio(motor) * self.backlash[axis]).abs().min(4_095.0).copysign(way)
     }
 
     /// Whether every move is refused, because some motor has too many steps in a unit. A motor counts even if it
@@ -253,7 +270,9 @@ impl<S: Side> Bench<S> {
             let due = if self.motion.motors[motor].turned { due.copysign(made) } else { due };
             // Both ends are rounded, to steps and to 0.0001 of a unit.
             let close = 1.01 + due.abs() * 1e-6 + self.rounding(motor, axis, between);
-            if (made - due).abs() > close {
+            // The direction may be that of the move before.
+            let more = if refused { 0.0 } else { self.motion.backlash(motor, axis, due) };
+            if (made - due).abs() > close && (made - due - more).abs() > close {
                 return Err(format!("{line}: motor {} makes {made} steps of {due}", motor + 1));
             }
         }
