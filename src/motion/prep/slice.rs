@@ -184,9 +184,11 @@ impl Prep {
         let period = self.time_of(increment, (most, shift), cycles);
         out.ticks = ticks;
         out.period = period;
-        // The wait takes time that exec lacks where it is late.
+        // The wait takes time that exec lacks where it is late, and thread mode where a host waits for an answer. A motor
+        // alone leaves time enough for that.
         let settles = self.paces().settles;
-        let least = if self.hurries { 2 * settles } else { settles };
+        let presses = self.hurries || self.coarse && self.others > 0;
+        let least = if presses { 2 * settles } else { settles };
         out.settle = if period >= least { SETTLE } else { 0 };
         self.complete(cycles, increment, out, |prep, m| prep.minors[m].increment);
     }
