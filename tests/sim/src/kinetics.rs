@@ -90,7 +90,7 @@ pub fn greatest(positions: &[Position], setup: &Setup, limits: &AxisLimits) -> [
 
 /// The length of a step of an axis; of the coarsest, if several motors drive the axis.
 fn step(setup: &Setup, axis: usize) -> f64 {
-    let drives = setup.motors.iter().filter(|m| m.axis == axis || m.besides != 0 && axis == 1);
+    let drives = setup.motors.iter().filter(|motor| motor.drives(axis));
     drives.map(track::step_length).fold(0.0, f64::max)
 }
 

@@ -66,10 +66,7 @@ pub fn asked(machine: &mut impl Runs, host: &mut Host, setup: &Setup) -> AxisLim
 
 fn limits(setup: &Setup, mut value: impl FnMut(&str) -> Option<Value>) -> AxisLimits {
     std::array::from_fn(|axis| {
-        let drives = |motor: &crate::oracle::MotorSetup| {
-            motor.axis == axis || motor.besides != 0 && axis == 1
-        };
-        if !setup.motors.iter().any(drives) {
+        if !setup.motors.iter().any(|motor| motor.drives(axis)) {
             return Limits::NONE;
         }
         let name = AXIS_NAMES[axis];

@@ -49,6 +49,11 @@ pub struct MotorSetup {
 }
 
 impl MotorSetup {
+    /// Whether the motor moves this axis.
+    pub fn drives(&self, axis: usize) -> bool {
+        self.axis == axis || self.besides != 0 && axis == 1
+    }
+
     /// Steps from zero to a position.
     pub fn steps(&self, position: i64) -> i64 {
         let (angle, angle_one) = self.step_angle.ratio();
