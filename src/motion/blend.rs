@@ -38,13 +38,17 @@ mod room;
 mod settle;
 mod windows;
 
+use core::ops::Range;
+
 use kernel::Kernel;
-use limits::{Limits, in_lengths, turn, zone};
+use limits::{Limits, in_lengths, zone};
 use windows::Window;
 
 use super::block::{Block, Body, Line};
 use super::dynamics::Dynamics;
 use super::float::{greater, least};
+use super::junction::{self, STRAIGHT, turn};
+use super::short::Short;
 use super::smooth::{SAMPLE_S, Spans};
 use crate::hal::STAGE;
 use crate::units::{AXES, PerAxis};
@@ -68,8 +72,6 @@ const ROUND: f32 = 0.6;
 const LEAST_ROOM: f32 = 0.05;
 /// The room at the end of a path that has been flushed. The corner that may follow takes as much.
 const HALF: f32 = 0.5;
-/// A change of direction below this is none: its square, in 2^-28.
-const STRAIGHT: u32 = 1_000;
 /// Axes are alike if the acceleration limits differ by less.
 const EVEN: f32 = 0.9;
 /// A corner of less than this belongs to a curve: the square of a half, in 2^-28.
@@ -77,7 +79,7 @@ const CURVE: u32 = 1 << 26;
 /// Lengths in a mm.
 const PER_MM: f32 = 1e4;
 /// 1 in the units of a direction.
-const ONE: f32 = 16_384.0;
+const ONE: f32 = junction::ONE as f32;
 /// 1 in the units of a weight.
 const WEIGHT: f32 = 256.0;
 
@@ -158,8 +160,9 @@ pub struct Blend {
     end: u32,
     /// How many corners are final, from the first block on.
     done: usize,
-    /// How many blocks are to go because nothing follows for now.
+    /// How many blocks are to go because nothing follows for now, and whether the machine stops behind them.
     flushed: usize,
+    stops: bool,
     /// The direction before the first block; `None` at a standstill.
     before: Option<PerAxis<i16>>,
     /// The velocity limit of the next corner, if the path before it has gone.
@@ -193,6 +196,7 @@ impl Blend {
             end: 0,
             done: 0,
             flushed: 0,
+            stops: false,
             before: None,
             behind: f32::MAX,
             gone: u32::MAX,
@@ -224,7 +228,7 @@ impl Blend {
 
     /// Sets the limits for the lines from here on. No block waits.
     pub fn set(&mut self, spans: Spans, dynamics: &Dynamics) {
-        self.on = BLENDS && spans.rounds() && crate::hal::system::blends();
+        self.on = spans.rounds() && crate::hal::system::blends();
         let limits = &mut self.limits;
         limits.accels = dynamics.axes.map(|axis| axis.accel.get());
         limits.accel = limits.accels.iter().fold(f32::MAX, |least, accel| match *accel > 0.0 {
@@ -265,11 +269,12 @@ impl Blend {
     /// Notes that the machine stands still behind the last block.
     pub fn stop(&mut self) {
         (self.before, self.behind, self.gone) = (None, f32::MAX, u32::MAX);
+        self.stops = false;
     }
 
     /// Adds a block that moves nothing and at which the machine does not stop.
     pub fn pass(&mut self, block: Block) {
-        let unit = self.last().map(|last| last.unit).or(self.before).unwrap_or_default();
+        let unit = self.unit_ahead_of(self.len).unwrap_or_default();
         self.append(Entry::new(block, &unit, 0));
     }
 
@@ -278,8 +283,7 @@ impl Blend {
         let Body::Line(line) = &block.body else { return };
         let length = in_lengths(line.extent.length());
         let mut entry = Entry::new(block, unit, length);
-        let from = self.last().map(|last| last.unit).or(self.before);
-        if let Some(from) = from {
+        if let Some(from) = self.unit_ahead_of(self.len) {
             entry.turn = turn(&from, unit);
             if entry.turn >= STRAIGHT {
                 return self.corner(entry, &from);
@@ -292,7 +296,7 @@ impl Blend {
     /// Adds a line behind a corner.
     fn corner(&mut self, mut entry: Entry, from: &PerAxis<i16>) {
         let cruise = self.last().map_or(f32::MAX, Entry::cruise);
-        let (change, _) = self.limits.change(from, &entry.unit);
+        let change = self.limits.change(from, &entry.unit);
         let top = least(least(cruise, entry.cruise()), self.behind);
         let [first, second] = self.limits.windows;
         entry.entry = least(top, self.limits.velocity(change, greater(first, second)));
@@ -318,9 +322,9 @@ impl Blend {
             }
             return;
         }
+        self.stops = stops;
         if stops {
             self.settle(true);
-            self.stop();
         } else {
             let accel = self.last().map_or(0.0, Entry::accel);
             let seconds = self.limits.kernel.reach();
@@ -330,11 +334,25 @@ impl Blend {
             let newest = self.len - 1;
             let last = self.entry_mut(newest);
             last.room = least(last.room, HALF);
-            let (length, unit) = (last.length as f32 * (1.0 / PER_MM), last.unit);
+            let length = last.length as f32 * (1.0 / PER_MM);
             self.behind = greater(0.0, length / seconds - 0.25 * accel * seconds);
-            self.before = Some(unit);
         }
         self.flushed = self.len;
+    }
+
+    /// Drops the lines that wait, and lets all else go: the machine stops.
+    pub fn drop_lines(&mut self) {
+        let mut left = 0;
+        for n in 0..self.len {
+            if self.entry(n).line().is_none() {
+                *self.entry_mut(left) = *self.entry(n);
+                left += 1;
+            }
+        }
+        (self.len, self.done, self.flushed, self.stops) = (left, left, left, true);
+        if left == 0 {
+            self.stop();
+        }
     }
 
     /// Returns the next block that is to go to the queue.
@@ -351,25 +369,34 @@ impl Blend {
                 self.crowd();
             }
         }
-        let (first, followed) = (self.entry(0), self.len > 1);
-        let mut block = first.block;
+        let Entry { mut block, unit, length, entry, room, turn, .. } = *self.entry(0);
         if let Body::Line(line) = &mut block.body {
-            line.accel = super::short::Short::new(line.accel.get() * first.room);
+            line.accel = Short::new(line.accel.get() * room);
         }
-        let (entry, turns, length) = (first.entry, first.turn >= STRAIGHT, first.length);
-        if followed || self.flushed == 0 {
-            self.before = Some(first.unit);
-        }
-        self.gone = if turns { length } else { self.gone.saturating_add(length) };
+        self.before = Some(unit);
+        self.gone = if turn >= STRAIGHT { length } else { self.gone.saturating_add(length) };
         self.first = (self.first + 1) % PLACES;
         self.len -= 1;
         self.done = self.done.saturating_sub(1);
         self.flushed = self.flushed.saturating_sub(1);
+        if self.len == 0 && self.stops {
+            self.stop();
+        }
         Some(Ready { block, entry })
     }
 
     fn last(&self) -> Option<&Entry> {
-        self.len.checked_sub(1).map(|n| self.entry(n))
+        self.ahead_of(self.len)
+    }
+
+    /// Returns the block before block `n`, if it waits.
+    fn ahead_of(&self, n: usize) -> Option<&Entry> {
+        n.checked_sub(1).map(|n| self.entry(n))
+    }
+
+    /// Returns the direction before block `n`; `None` at a standstill.
+    fn unit_ahead_of(&self, n: usize) -> Option<PerAxis<i16>> {
+        self.ahead_of(n).map(|entry| entry.unit).or(self.before)
     }
 
     fn append(&mut self, entry: Entry) {
@@ -387,6 +414,13 @@ impl Blend {
         place(to).wrapping_sub(place(n))
     }
 
+    /// Returns the corners that are less than `far` from a corner, itself included if `far` is more than 0.
+    fn corners_about(&self, corner: usize, far: u32) -> Range<usize> {
+        let ahead = (corner..self.len).take_while(|n| self.way(corner, *n) < far).count();
+        let back = (0..corner).rev().take_while(|n| self.way(*n, corner) < far).count();
+        corner - back..corner + ahead
+    }
+
     fn entry(&self, n: usize) -> &Entry {
         &self.entries[(self.first + n) % PLACES]
     }
@@ -399,5 +433,70 @@ impl Blend {
 impl Default for Blend {
     fn default() -> Self {
         Self::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::motion::block::Extent;
+    use crate::motion::dynamics::Axis;
+    use crate::motion::junction::ONE;
+
+    /// A stage, and a line of 0.1 mm along an axis.
+    fn stage() -> (Blend, impl Fn(usize) -> (Block, PerAxis<i16>)) {
+        crate::hal::imp::set_blends(true);
+        let accel = Short::new(500.0);
+        let axes = [Axis { accel, ..Axis::default() }; AXES];
+        let mut blend = Blend::new();
+        blend.set(Spans::of(0.027), &Dynamics { axes, ..Dynamics::default() });
+        let line = move |axis: usize| {
+            let line =
+                Line { extent: Extent::new(0.1, false), cruise: 50.0, accel, ..Line::default() };
+            let mut unit = [0; AXES];
+            unit[axis] = ONE;
+            (Block::new(Body::Line(line), 0), unit)
+        };
+        (blend, line)
+    }
+
+    /// Adds a line along each axis, and lets all blocks go. Returns the velocity limits at their starts.
+    fn goes(blend: &mut Blend, lines: &[(Block, PerAxis<i16>)], stops: bool) -> std::vec::Vec<f32> {
+        lines.iter().for_each(|(block, unit)| blend.add(*block, unit));
+        blend.flush(stops);
+        core::iter::from_fn(|| blend.take()).map(|ready| ready.entry).collect()
+    }
+
+    #[test]
+    fn the_corner_behind_a_path_that_has_gone_is_a_corner() {
+        let (mut blend, line) = stage();
+        assert_eq!(goes(&mut blend, &[line(0)], false), [f32::MAX]);
+        let [corner, again] = goes(&mut blend, &[line(1), line(0)], false)[..] else { panic!() };
+        assert!(corner < 10.0 && again < 20.0, "{corner} {again}");
+        // The last line was along X.
+        assert!(goes(&mut blend, &[line(1)], true)[0] < 10.0);
+        // The machine has stopped.
+        assert_eq!(goes(&mut blend, &[line(0)], true), [f32::MAX]);
+    }
+
+    #[test]
+    fn lines_are_dropped_and_all_else_goes() {
+        use crate::motion::block::QueuedAction;
+        let (mut blend, line) = stage();
+        let aside = |lead| Block::action(QueuedAction::Lead(lead), 0);
+        let (block, unit) = line(0);
+        blend.add(block, &unit);
+        for lead in [1.0, 2.0] {
+            blend.pass(aside(lead));
+            blend.add(block, &unit);
+        }
+        blend.drop_lines();
+        let left = core::iter::from_fn(|| blend.take());
+        let leads = left.filter_map(|ready| match ready.block.body {
+            Body::QueuedAction(QueuedAction::Lead(lead)) => Some(lead),
+            _ => None,
+        });
+        assert_eq!(leads.collect::<std::vec::Vec<_>>(), [1.0, 2.0]);
+        assert_eq!(goes(&mut blend, &[line(1)], true), [f32::MAX]);
     }
 }

@@ -19,7 +19,7 @@ use crate::units::PerAxis;
 
 /// The square of the largest change of direction that counts as none, in 2^-28. It is about 0.1 degree: rounding
 /// positions to 0.1 um turns 0.1 mm segments of a straight line by as much.
-const STRAIGHT: u32 = 1000;
+pub(super) const STRAIGHT: u32 = 1000;
 /// The square of the sine of half the angle from which on a corner counts as a reversal. It is about 0.4 degree from a
 /// full reversal; closer angles are rounding errors.
 const REVERSED: f32 = 1.0 - 1e-5;

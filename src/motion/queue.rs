@@ -195,7 +195,7 @@ impl BlockQueue {
             }
         }
         self.tail.last = None;
-        self.put(|slot| *slot = block, None, |_| {})
+        self.put_whole(block)
     }
 
     /// Queues a block at which the machine does not stop. Returns false, with nothing done, when there is no room.
@@ -206,11 +206,11 @@ impl BlockQueue {
                 self.forward();
                 true
             }
-            _ => self.put(|slot| *slot = block, None, |_| {}),
+            _ => self.put_whole(block),
         }
     }
 
-    /// Sets how lines are blended from here on. None waits.
+    /// The stage, on a chip that blends.
     #[inline(always)]
     pub fn stage(&mut self) -> Option<&mut Blend> {
         self.stage.first_mut().map(|stage| &mut **stage)
@@ -254,21 +254,9 @@ impl BlockQueue {
     /// Drops the moves that wait to be blended. What else waits is queued: exec carries it out as it drops its blocks.
     #[inline(always)]
     pub fn drop_staged(&mut self) {
-        if self.has_staged() {
-            self.flush_actions();
-        }
-    }
-
-    #[inline(never)]
-    #[small]
-    fn flush_actions(&mut self) {
         if let Some(stage) = self.stage.first_mut() {
-            stage.flush(true);
-        }
-        while let Some(Ready { block, .. }) = self.stage().and_then(Blend::take) {
-            if let Body::QueuedAction(_) = block.body {
-                self.put(|slot| *slot = block, None, |_| {});
-            }
+            stage.drop_lines();
+            self.forward();
         }
     }
 
@@ -283,10 +271,16 @@ impl BlockQueue {
                     }
                 }
                 Body::QueuedAction(_) => {
-                    self.put(|slot| *slot = block, None, |_| {});
+                    self.put_whole(block);
                 }
             }
         }
+    }
+
+    /// Queues a block that is complete. Returns false, with nothing done, when there is no room.
+    #[inline(always)]
+    fn put_whole(&mut self, block: Block) -> bool {
+        self.put(|slot| *slot = block, None, |_| {})
     }
 
     /// Returns the slot in which to build the next move for [`BlockQueue::push_line`], because copying a block takes

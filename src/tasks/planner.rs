@@ -246,9 +246,6 @@ pub fn take_at_once(planner: &mut Planner) -> bool {
     done
 }
 
-/// The share of P that is for merged moves where corners are rounded within P.
-const MERGED: f32 = 0.25;
-
 /// With this many blocks queued, answers come before another block.
 const ENOUGH: usize = CAPACITY / 2;
 /// How many turns answers get then: enough for two answers and the other work of thread mode meanwhile.
@@ -693,8 +690,7 @@ impl Planner {
     #[small]
     fn keep_to_deviation(&mut self) {
         let deviation = self.links.model.borrow().modal().deviation();
-        // A part of it is for moves that are merged.
-        let deviation = f32::from(deviation) * (1e-4 * (1.0 - MERGED));
+        let deviation = f32::from(deviation - merge::share(deviation)) * 1e-4;
         if let Some(stage) = self.queue.stage()
             && stage.deviation().to_bits() != deviation.to_bits()
         {

@@ -14,8 +14,7 @@ impl Blend {
             layers.iter().fold((0.0, 0.0), |(v, a), layer| (v + layer.velocity, a + layer.accel));
         let square = entry.asked[0].square.max(entry.asked[1].square);
         let change = sqrt(square as f32) * (2.0 / ONE);
-        let chord = 0.25 * SAMPLE_S * accel * SAMPLE_S;
-        change * (velocity * by_velocity + accel * by_accel) + chord
+        change * (velocity * by_velocity + accel * by_accel) + chord(accel)
     }
 
     /// Returns how far the path is off at a corner that is passed at `velocity`, mm, if the machine brakes before it and
@@ -38,10 +37,7 @@ impl Blend {
                 back -= 1;
                 back_way = back_way.saturating_add(self.entry(back - 1).length);
             }
-            let from = match back {
-                0 => self.before.unwrap_or(self.entry(corner).unit),
-                _ => self.entry(back - 1).unit,
-            };
+            let from = self.unit_ahead_of(back).unwrap_or(self.entry(corner).unit);
             let to = self.entry(ahead).unit;
             let weight = velocity * layer.velocity + accel * layer.accel;
             for ((sum, from), to) in sum.iter_mut().zip(from).zip(to) {
@@ -51,8 +47,11 @@ impl Blend {
             }
         }
         let square = sum.iter().map(|part| part * part).sum::<f32>();
-        // The chord of a sample.
-        let chord = 0.25 * SAMPLE_S * accel * SAMPLE_S;
-        sqrt(square) * (1.0 / ONE) + chord
+        sqrt(square) * (1.0 / ONE) + chord(accel)
     }
+}
+
+/// Returns how far the chord of a sample is off, mm.
+fn chord(accel: f32) -> f32 {
+    0.25 * SAMPLE_S * accel * SAMPLE_S
 }

@@ -1,7 +1,8 @@
 //! What limits all corners, and the measures of paths.
 
 use super::kernel::Kernel;
-use super::{Blend, ONE, PER_MM, SHARE, WEIGHT};
+use super::{ONE, PER_MM, SHARE, WEIGHT};
+use crate::hal::arithmetic::product;
 use crate::math::sqrt;
 use crate::units::PerAxis;
 
@@ -21,16 +22,13 @@ pub(super) struct Limits {
 }
 
 impl Limits {
-    /// Returns the change between two directions: that of the axis that is limited most, weighted, in 2^-22, and the square
-    /// of the whole, in 2^-28.
-    pub(super) fn change(&self, from: &PerAxis<i16>, to: &PerAxis<i16>) -> (u32, u32) {
-        let (mut most, mut square) = (0, 0u32);
+    /// Returns the change between two directions of the axis that is limited most, weighted, in 2^-22.
+    pub(super) fn change(&self, from: &PerAxis<i16>, to: &PerAxis<i16>) -> u32 {
+        let mut most = 0;
         for ((from, to), weight) in from.iter().zip(to).zip(&self.weights) {
-            let change = u32::from(to.abs_diff(*from));
-            most = most.max(change * u32::from(*weight));
-            square = square.saturating_add(change * change);
+            most = most.max(product(to.abs_diff(*from), *weight));
         }
-        (most, square)
+        most
     }
 
     /// Returns the highest velocity at corners that change by `change` within `seconds`.
@@ -41,36 +39,21 @@ impl Limits {
         (SHARE * WEIGHT * ONE) * seconds * self.accel / change as f32
     }
 
-    /// Returns the least acceleration limit of the axes that take part in a corner.
-    pub(super) fn least_of(&self, blend: &Blend, corner: usize) -> f32 {
-        let to = blend.entry(corner).unit;
-        let from = match corner {
-            0 => blend.before.unwrap_or(to),
-            _ => blend.entry(corner - 1).unit,
-        };
-        let mut least = f32::MAX;
+    /// Returns the least acceleration limit of the axes that move in one of these directions.
+    pub(super) fn slowest(&self, from: &PerAxis<i16>, to: &PerAxis<i16>) -> f32 {
+        let mut slowest = f32::MAX;
         for ((from, to), accel) in from.iter().zip(to).zip(&self.accels) {
-            if (*from != 0 || to != 0) && *accel > 0.0 {
-                least = least.min(*accel);
+            if (*from != 0 || *to != 0) && *accel > 0.0 {
+                slowest = slowest.min(*accel);
             }
         }
-        least
+        slowest
     }
 }
 
 /// Returns the share of a change of velocity that a change of direction takes at a velocity of 1 mm/s.
-pub(super) fn whole(square: u32, change: f32) -> f32 {
+pub(super) fn taken(square: u32, change: f32) -> f32 {
     sqrt(square as f32) / (ONE * change)
-}
-
-/// Returns the square of a change of direction, in 2^-28.
-pub(super) fn turn(from: &PerAxis<i16>, to: &PerAxis<i16>) -> u32 {
-    let mut square = 0u32;
-    for (from, to) in from.iter().zip(to) {
-        let change = u32::from(to.abs_diff(*from));
-        square = square.saturating_add(change * change);
-    }
-    square
 }
 
 /// Returns a length in 0.1 um.

@@ -1,7 +1,7 @@
 //! What a corner leaves of the acceleration along the path, and the velocity at which it costs the least time.
 
-use super::limits::whole;
-use super::{Blend, CURVE, LEAST_ROOM, ONE, WEIGHT};
+use super::limits::taken;
+use super::{Blend, CURVE, Entry, LEAST_ROOM, ONE, WEIGHT};
 use crate::math::sqrt;
 use crate::motion::float::{greater, least};
 
@@ -13,7 +13,7 @@ impl Blend {
         if entry.turn < CURVE || room >= 0.9 {
             return (most, room);
         }
-        let before = corner.checked_sub(1).map_or(f32::MAX, |n| self.entry(n).cruise());
+        let before = self.ahead_of(corner).map_or(f32::MAX, Entry::cruise);
         let top = least(before, entry.cruise());
         let seconds = greater(self.limits.windows[mean & 1], self.limits.kernel.reach());
         // What slowing down and speeding up take longer than passing at the top, s.
@@ -33,6 +33,12 @@ impl Blend {
         (best.1, best.2)
     }
 
+    /// Returns the least acceleration limit of the axes that take part in a corner.
+    pub(super) fn slowest(&self, corner: usize) -> f32 {
+        let to = self.entry(corner).unit;
+        self.limits.slowest(&self.unit_ahead_of(corner).unwrap_or(to), &to)
+    }
+
     /// Returns the share of the acceleration along the path that a corner leaves.
     pub(super) fn room(&self, corner: usize, mean: usize, velocity: f32, accel: f32) -> f32 {
         let (entry, limits) = (self.entry(corner), &self.limits);
@@ -40,8 +46,8 @@ impl Blend {
         let full = WEIGHT * ONE * seconds * limits.accel;
         let straight = 1.0 - velocity * asked.change as f32 / full;
         // Turning is at right angles to the path.
-        let slowest = limits.least_of(self, corner);
-        let e = velocity * whole(asked.square, slowest * seconds);
+        let slowest = self.slowest(corner);
+        let e = velocity * taken(asked.square, slowest * seconds);
         let c = least(sqrt(entry.turn as f32) / (2.0 * ONE) + 0.05, 1.0);
         let mut room = straight;
         if e < 1.0 {
@@ -57,7 +63,7 @@ impl Blend {
     /// Returns the share of the acceleration along the path that a corner leaves if no other corner is near.
     pub(super) fn room_alone(&self, corner: usize, velocity: f32) -> f32 {
         let entry = self.entry(corner);
-        let Some(before) = corner.checked_sub(1).map(|n| self.entry(n)) else { return LEAST_ROOM };
+        let Some(before) = self.ahead_of(corner) else { return LEAST_ROOM };
         let (along_before, along) = (before.accel() / ONE, entry.accel() / ONE);
         let mut room = 1.0;
         for ((from, to), limit) in before.unit.iter().zip(entry.unit).zip(self.limits.accels) {

@@ -1,8 +1,9 @@
 //! Makes corners final when the path that waits is longer than their windows.
 
 use super::limits::{in_lengths, reach, zone};
-use super::{Blend, LEAST_ROOM, PER_MM, STRAIGHT, USED};
+use super::{Blend, Entry, LEAST_ROOM, PER_MM, USED};
 use crate::motion::float::{greater, least};
+use crate::motion::junction::STRAIGHT;
 
 impl Blend {
     /// Makes corners final whose windows lie in the path that waits; all if nothing follows.
@@ -57,11 +58,7 @@ impl Blend {
     /// Makes a corner final: limits its velocity by the deviation, and the acceleration about it by the room it leaves.
     pub(super) fn finish(&mut self, corner: usize) {
         let entry = *self.entry(corner);
-        let before = match corner {
-            0 => entry.accel(),
-            _ => self.entry(corner - 1).accel(),
-        };
-        let accel = greater(before, entry.accel());
+        let accel = greater(self.ahead_of(corner).map_or(0.0, Entry::accel), entry.accel());
         let mean = self.mean_of(corner, accel);
         let mut velocity = least(entry.entry, entry.asked[mean].velocity);
         let allowed = USED * self.limits.deviation;
@@ -96,24 +93,11 @@ impl Blend {
 
     /// Limits the acceleration as far as `zone` mm about a corner.
     pub(super) fn leave(&mut self, corner: usize, room: f32, zone: f32) {
-        let zone = in_lengths(zone);
-        let mut way = 0u32;
-        for at in corner..self.len {
-            if way >= zone {
-                break;
-            }
-            let entry = self.entry_mut(at);
+        let corners = self.corners_about(corner, in_lengths(zone));
+        // The blocks on both sides of each of these corners.
+        for n in corners.start.saturating_sub(1)..corners.end {
+            let entry = self.entry_mut(n);
             entry.room = least(entry.room, room);
-            way = way.saturating_add(entry.length);
-        }
-        let mut way = 0u32;
-        for at in (0..corner).rev() {
-            if way >= zone {
-                break;
-            }
-            let entry = self.entry_mut(at);
-            entry.room = least(entry.room, room);
-            way = way.saturating_add(entry.length);
         }
     }
 }

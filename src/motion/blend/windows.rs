@@ -1,8 +1,9 @@
 //! Windows: corners in a row that may come within the time of a mean.
 
-use super::limits::{in_lengths, reach, whole};
-use super::{Blend, CURVE, EVEN, Entry, ONE, PER_MM, PLACES, ROUND, SHARE, STRAIGHT, WEIGHT};
+use super::limits::{in_lengths, reach, taken};
+use super::{Blend, CURVE, EVEN, Entry, ONE, PER_MM, PLACES, ROUND, SHARE, WEIGHT};
 use crate::motion::float::{greater, least};
+use crate::motion::junction::{STRAIGHT, turn};
 
 /// Some corners in a row, the last of which is the newest.
 #[derive(Clone, Copy, Default)]
@@ -48,30 +49,25 @@ impl Blend {
     pub(super) fn look_back(&mut self, top: f32) {
         let newest = self.len - 1;
         let (to, accel) = (self.entry(newest).unit, self.entry(newest).accel());
-        let slowest = self.limits.least_of(self, newest);
+        let slowest = self.slowest(newest);
         let is_curve = self.entry(newest).turn < CURVE && slowest >= EVEN * accel;
         let mut bounds = [0, 1].map(|mean| self.bounds(mean, top, accel, slowest, is_curve));
         let mut oldest = newest;
         // The windows, from the shortest to the longest.
-        loop {
-            let from = match oldest {
-                0 => self.before,
-                _ => Some(self.entry(oldest - 1).unit),
-            };
-            let Some(from) = from else { break };
+        while let Some(from) = self.unit_ahead_of(oldest) {
             let way = self.way(oldest, newest);
-            if bounds.iter().all(|bounds| way >= bounds.longest) && oldest < newest {
+            if oldest < newest && bounds.iter().all(|bounds| way >= bounds.longest) {
                 oldest += 1;
                 break;
             }
-            let (change, square) = self.limits.change(&from, &to);
+            let (change, square) = (self.limits.change(&from, &to), turn(&from, &to));
             let mut window = Window { way, limits: [f32::MAX; 2], change, square };
             for (limit, bounds) in window.limits.iter_mut().zip(&mut bounds) {
                 if change > bounds.change || square > bounds.square {
                     let mut together = self.limits.velocity(change, bounds.seconds);
                     if is_curve {
-                        let whole = whole(square, slowest * bounds.seconds);
-                        together = least(together, SHARE / whole);
+                        let taken = taken(square, slowest * bounds.seconds);
+                        together = least(together, SHARE / taken);
                     }
                     *limit = greater(together, bounds.alone(way));
                     bounds.limit = least(bounds.limit, *limit);
@@ -93,14 +89,14 @@ impl Blend {
         let seconds = self.limits.windows[mean & 1];
         let speeds_up = 0.25 * ROUND * accel * seconds;
         let share = SHARE * ONE * seconds / top;
-        let square = if is_curve { share * slowest } else { ONE * ONE };
+        let whole = share * slowest;
         Bounds {
             seconds,
             top,
             speeds_up,
             limit: top,
             change: (share * WEIGHT * self.limits.accel) as u32,
-            square: if is_curve { (square * square) as u32 } else { u32::MAX },
+            square: if is_curve { (whole * whole) as u32 } else { u32::MAX },
             longest: in_lengths((top + speeds_up) * seconds),
         }
     }
@@ -138,53 +134,15 @@ impl Blend {
             greater(self.limits.windows[0], self.limits.windows[1]),
         ));
         let differs = |entry: &Entry| entry.turn >= STRAIGHT && !is_first(entry);
-        let mut way = 0u32;
-        for at in corner..self.len {
-            if way >= near {
-                break;
-            }
-            if differs(self.entry(at)) {
-                return 1;
-            }
-            way = way.saturating_add(self.entry(at).length);
-        }
-        let mut way = 0u32;
-        for at in (0..corner).rev() {
-            way = way.saturating_add(self.entry(at).length);
-            if way >= near {
-                break;
-            }
-            if differs(self.entry(at)) {
-                return 1;
-            }
-        }
-        0
+        self.corners_about(corner, near).any(|n| differs(self.entry(n))).into()
     }
 
     /// Whether no other corner is so near that the means mix it with this one.
     pub(super) fn is_alone(&self, corner: usize, velocity: f32, accel: f32) -> bool {
         let near = in_lengths(reach(velocity, accel, 2.0 * self.limits.kernel.reach()));
-        let mut way = 0u32;
-        for at in corner..self.len {
-            way = way.saturating_add(self.entry(at).length);
-            if way >= near {
-                break;
-            }
-            if at + 1 < self.len && self.entry(at + 1).turn >= STRAIGHT {
-                return false;
-            }
-        }
-        let mut way = 0u32;
-        for at in (0..corner).rev() {
-            let entry = self.entry(at);
-            way = way.saturating_add(entry.length);
-            if way >= near {
-                return true;
-            }
-            if entry.turn >= STRAIGHT {
-                return false;
-            }
-        }
-        way.saturating_add(self.gone) >= near
+        let about = self.corners_about(corner, near);
+        let reaches_gone = about.start == 0 && self.way(0, corner).saturating_add(self.gone) < near;
+        let mut others = about.filter(|n| *n != corner);
+        !reaches_gone && !others.any(|n| self.entry(n).turn >= STRAIGHT)
     }
 }

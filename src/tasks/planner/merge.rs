@@ -38,6 +38,11 @@ const LONG: u8 = 64;
 /// See [`LONG`]. A power of two.
 const SELDOM: u8 = 32;
 
+/// Returns how much of P is for moves that are merged, where corners are rounded within P.
+pub(super) fn share(deviation: u16) -> u16 {
+    deviation / 4
+}
+
 impl Planner {
     /// Whether a chain waits for the next line.
     #[inline(always)]
@@ -71,7 +76,7 @@ impl Planner {
         match commands.blend {
             wide if wide > 4 && self.queue.blends() => {
                 let deviation = self.links.model.borrow().modal().deviation();
-                wide.min((deviation / 4 + 1).min(u8::MAX.into()) as u8)
+                wide.min(u8::try_from(share(deviation) + 1).unwrap_or(u8::MAX))
             }
             other => other,
         }
