@@ -2,7 +2,7 @@
 //! hosts get their answers.
 
 use kerf::capability::Capability;
-use kerf::hal::imp::Machine;
+use kerf::hal::imp::{self, Machine};
 use kerf::heat::sensor::{Kind, SAMPLES, reading};
 
 use crate::plant::Plant;
@@ -144,6 +144,26 @@ fn hosts_get_through_while_a_line_waits_for_a_temperature() {
         assert!(printer.ask("M114").contains("X:4.000"), "M108 ends the wait: {}", printer.said);
         assert!(printer.is_on() || printer.plants[0].sensor > 150.0, "it heats on");
     });
+}
+
+/// Short lines may still wait to be blended when the line behind them begins to wait.
+#[test]
+fn lines_before_a_wait_for_a_temperature_run_before_it() {
+    for lines in [1, 2, 5] {
+        alone(move || {
+            imp::set_blends(true);
+            let Some(mut printer) = Printer::new() else { return };
+            for n in 1..=lines {
+                printer.send(&format!("G1 X{} F600", f64::from(n) * 0.1));
+            }
+            printer.send("M109 S60");
+            printer.run(3_000);
+            assert!(printer.ask("M114").contains(&format!("X:0.{lines}00")), "{}", printer.said);
+            printer.said.clear();
+            printer.run(60_000);
+            assert!(printer.said.ends_with("ok\n"), "{}", printer.said);
+        });
+    }
 }
 
 /// An `ok` tells a host that the temperature is reached, so it must not come too early.

@@ -366,7 +366,7 @@ impl Planner {
                 self.announcement = Announcement::Lead;
             }
             self.dynamics.rounds = self.spans.is_some();
-            self.queue.flush(false);
+            self.let_go(false);
             self.set_blend();
         }
         self.outputs.on ^= self.links.changes.take_flipped();
@@ -694,10 +694,19 @@ impl Planner {
         if let Some(stage) = self.queue.stage()
             && stage.deviation().to_bits() != deviation.to_bits()
         {
-            self.queue.flush(false);
+            self.let_go(false);
             if let Some(stage) = self.queue.stage() {
                 stage.set_deviation(deviation);
             }
+        }
+    }
+
+    /// Queues the lines that wait to be blended, and tells exec. `stops` says whether the machine stops there.
+    #[inline(always)]
+    fn let_go(&mut self, stops: bool) {
+        if self.queue.has_staged() {
+            self.queue.flush(stops);
+            self.announce();
         }
     }
 

@@ -87,7 +87,7 @@ impl Planner {
     /// Waits until the heaters of the line have reached their targets, or until the wait is ended.
     pub(super) async fn await_heat(&mut self) {
         let links = self.links;
-        self.queue.flush(true);
+        self.let_go(true);
         wait(links.thread, Event::BlockDone, || {
             (queue::used() == 0 || self.is_flushed()).then_some(())
         })

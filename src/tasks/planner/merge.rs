@@ -168,8 +168,7 @@ impl Planner {
             }
             self.build_chain(false);
             if self.stage_is_due() {
-                self.queue.flush(false);
-                self.announce();
+                self.let_go(false);
             }
         }
         self.links.chain_waits.set(self.has_waiting());
