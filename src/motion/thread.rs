@@ -335,8 +335,8 @@ impl Thread {
         ratio
     }
 
-    /// Fixes the time at which the queued segments end. The steppers have been started, and make their first tick
-    /// `cycles` after `time`, which is in counts. All segments queued since they stood still have been
+    /// Fixes the time at which the queued segments end. The steppers are started at `time`, which is in counts, and
+    /// make their first tick `cycles` later. All segments queued since they stood still have been
     /// [reported](Thread::queued).
     pub fn anchor(&mut self, time: u32, cycles: u32) {
         self.end = self.end.wrapping_add(time.wrapping_mul(CYCLES)).wrapping_add(cycles);

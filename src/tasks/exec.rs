@@ -166,11 +166,14 @@ impl Runner<'_> {
         }
         match step {
             Step::Segment => {
-                let next = self.queued(rested);
+                let passed_over = self.queued(rested);
+                // The time of the start is read before it: behind it, the first tick may already have interrupted exec,
+                // and a pass would be off by the time that this tick took.
                 if standstill && let Some(thread) = self.machine.thread() {
                     common.with(|common| start_thread(thread, &common.encoder));
                 }
-                next
+                stepper::go();
+                self.next_turn(passed_over)
             }
             Step::Held if machine::rested() => Next::Turn,
             Step::Idle | Step::Standstill | Step::Held => Next::Block,
@@ -340,10 +343,10 @@ impl Runner<'_> {
         }
     }
 
-    /// Acts on a new segment in the ring: starts the steppers if they stand still, and decides whether thread mode
-    /// gets a turn. `rested` says whether the machine stood still before that segment.
+    /// Acts on a new segment in the ring: decides how long the next ones are to be. `rested` says whether the machine
+    /// stood still before that segment. Returns how often thread mode has been passed over.
     #[inline(always)]
-    fn queued(&mut self, rested: bool) -> Next {
+    fn queued(&mut self, rested: bool) -> u8 {
         let Self { waiting, segments, rests, .. } = self;
         health::moves(waiting.count);
         waiting.update(segments.used());
@@ -356,7 +359,13 @@ impl Runner<'_> {
         if !rested {
             health::look_for_starvation();
         }
-        stepper::go();
+        passed_over
+    }
+
+    /// Decides when exec takes its next turn, and whether thread mode gets a turn before it.
+    #[inline(always)]
+    fn next_turn(&mut self, passed_over: u8) -> Next {
+        let Self { waiting, .. } = self;
         if !waiting.is_enough(passed_over) {
             return Next::Turn;
         }
@@ -425,7 +434,8 @@ fn follow_speed(exec: &mut Exec, encoder: &mut Encoder, out: &Snapshot) {
     }
 }
 
-/// Passes the start time of the steppers to a pass: their first tick comes [`FIRST_TICK`] cycles later.
+/// Passes the start time of the steppers to a pass: they are started now, and their first tick comes [`FIRST_TICK`] cycles
+/// later.
 #[inline(never)]
 #[small]
 fn start_thread(thread: &mut Thread, encoder: &Encoder) {

@@ -19,7 +19,8 @@ use crate::side::Side;
 const APART: u64 = 4;
 /// The longest difference between the times of a step in a thread, cycles: 0.1 ms. The edges of the spindle's sensors are
 /// rounded differently. Where one of them falls into the next clock of the timer that measures them, its time differs by
-/// 4 us, and the axes follow another speed. One cycle has been measured with one image, 794 with the next.
+/// 4 us, and the axes follow another speed. None has been measured since a pass is told its start before the first tick;
+/// until then it was 9,049 with one image, as the first tick took longer on one simulator.
 const APART_IN_THREADS: u64 = 1_600;
 /// The longest difference between the times of a step in a job that fills the queue, cycles: 10 ms. A block may end just
 /// before a line is answered or just behind it; then the sender is a line further, and the next blocks look further ahead
