@@ -18,14 +18,14 @@ pub const PRINTER: MachineProfile = MachineProfile {
         set("xy", "fr", 12_000.0),
         set("z", "vm", 720.0),
         set("z", "fr", 720.0),
-        // 1,000 mm/s^2, reached in 30 ms
+        // 1,000 mm/s^2, reached in 30 ms. All axes share the longest of these times
         set("xy", "ac", 1_000.0),
         set("xy", "jm", 7_200.0),
         set("xy", "jh", 14_400.0),
         set("xya", "jd", 0.02),
         set("", "ja", 3_600_000.0),
         set("z", "ac", 100.0),
-        set("z", "jm", 500.0),
+        set("z", "jm", 720.0),
         set("z", "jh", 1_000.0),
         // 48 mm/s of filament and 960 mm/s^2, reached in 30 ms
         set("a", "vm", 2_880.0),

@@ -17,14 +17,14 @@ pub const ROUTER: MachineProfile = MachineProfile {
         set("xy", "fr", 5_000.0),
         set("z", "vm", 500.0),
         set("z", "fr", 500.0),
-        // 500 mm/s^2, reached in 27 ms
+        // 500 mm/s^2, reached in 27 ms. All axes share the longest of these times
         set("xy", "ac", 500.0),
         set("xy", "jm", 4_000.0),
         set("xy", "jh", 8_000.0),
         set("xy", "jd", 0.02),
         set("", "ja", 1_800_000.0),
         set("z", "ac", 100.0),
-        set("z", "jm", 500.0),
+        set("z", "jm", 800.0),
         set("z", "jh", 1_000.0),
         set("x", "tm", 290.0),
         set("y", "tm", 320.0),

@@ -116,11 +116,11 @@ fn place_card() -> &'static RefCell<crate::card::Card> {
     place!(RefCell<crate::card::Card>, RefCell::new(crate::card::Card::new()))
 }
 
-/// Creates the stage in its static place, if this chip blends.
+/// Creates the stage in its static place, if this chip blends. Constant: the stack has no room for another one.
 #[inline(never)]
 #[small]
 fn place_stage() -> Stage {
-    core::array::from_fn(|_| place!(Blend, Blend::new()))
+    core::array::from_fn(|_| place!(Blend, const { Blend::new() }))
 }
 
 /// Creates the planner in its static place. The planner task and the parser share it.

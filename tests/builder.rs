@@ -194,6 +194,7 @@ proptest! {
             let mut block = Move::default();
             match builder.line(&line, &dynamics, &config, &mut block) {
                 Built::Nothing => prop_assert_eq!(from, to),
+                Built::Blended(_) => prop_assert!(false, "nothing blends"),
                 // The state of the builder has not changed: the next move begins where this one did.
                 Built::Merge => {
                     prop_assert!(may_merge);

@@ -390,7 +390,7 @@ mod tests {
         let value = |name: &str| router.get(setting(name));
         assert_eq!((value("mch"), value("1tr"), value("3tr")), (1, 40_000_000, 1_250_000));
         assert_eq!((value("4ma"), value("4po"), value("2po")), (1, 1, 0));
-        assert_eq!((value("yjm"), value("zjm"), value("ztn")), (4_000_000, 500_000, -60_0000));
+        assert_eq!((value("yjm"), value("zjm"), value("ztn")), (4_000_000, 800_000, -60_0000));
         assert_eq!(router.step_ratio(0).steps(crate::units::Length(10_000)), 40);
         let lathe = settings_of(4);
         let value = |name: &str| lathe.get(setting(name));

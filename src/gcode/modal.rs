@@ -190,7 +190,7 @@ pub const TOLERANCE_MAX: u16 = 10_000;
 /// How far merged moves may deviate from the path with G64 without P: 1 um.
 const MERGED: u8 = 10;
 /// The greatest deviation of merged moves.
-const MERGED_MAX: u8 = 254;
+pub const MERGED_MAX: u8 = 254;
 /// How far rounded corners may deviate from the path with G64 without P: 0.05 mm.
 const ROUNDED: u16 = 500;
 
@@ -304,6 +304,11 @@ impl Modal {
     /// Returns how far the tool may be off the path, in units of [`Length`](crate::units::Length).
     pub fn deviation(&self) -> u16 {
         if self.tolerance == USUAL { ROUNDED } else { self.tolerance }
+    }
+
+    /// Whether G64 has set no P.
+    pub fn has_usual_deviation(&self) -> bool {
+        self.tolerance == USUAL
     }
 
     /// Returns the modes at power-up: the defaults, and G8 G80 G91.1 G94 G97 G98 M5 M9.

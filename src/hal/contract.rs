@@ -327,6 +327,8 @@ pub trait Timing {
     /// Blocks that can wait to be [blended](crate::motion::blend) before they are queued: a power of two, or 0 for a chip
     /// that does not blend.
     const STAGE: usize = if cfg!(feature = "std") { 32 } else { 0 };
+    /// The least time of a line that is blended, s.
+    const BLEND_S_MIN: f32 = 0.0;
     /// Blocks that can wait at once, limited by RAM.
     const LOOK_AHEAD: usize = if cfg!(feature = "sd") && !cfg!(feature = "std") { 38 } else { 61 };
     /// Lines that can wait on a port. At most 9, because brief answers report with one digit how many more may come.
@@ -347,6 +349,8 @@ pub const SAMPLE_MS: u8 = <imp::Chip as Timing>::SAMPLE_MS;
 pub const SHORT_SHARE: f32 = <imp::Chip as Timing>::SHORT_SHARE;
 /// [`Timing::STAGE`] of the chip of this image.
 pub const STAGE: usize = <imp::Chip as Timing>::STAGE;
+/// [`Timing::BLEND_S_MIN`] of the chip of this image.
+pub const BLEND_S_MIN: f32 = <imp::Chip as Timing>::BLEND_S_MIN;
 /// [`Timing::LOOK_AHEAD`] of the chip of this image.
 pub const LOOK_AHEAD: usize = <imp::Chip as Timing>::LOOK_AHEAD;
 /// [`Timing::LINES`] of the chip of this image.

@@ -12,9 +12,9 @@ pub use avr_embassy::{Ceiling, Interrupt, Thread, byte, ring};
 mod place;
 
 pub use contract::{
-    BLOCK_S_MIN, LINE_BYTES, LINES, LOOK_AHEAD, PULSE_US, SAMPLE_MS, SHORT_SHARE, STAGE, TICKS,
-    TIMER_HZ, card, drivers, eeprom, encoder, gpio, heaters, inputs, pwm, stepper, system, time,
-    uart, watchdog,
+    BLEND_S_MIN, BLOCK_S_MIN, LINE_BYTES, LINES, LOOK_AHEAD, PULSE_US, SAMPLE_MS, SHORT_SHARE,
+    STAGE, TICKS, TIMER_HZ, card, drivers, eeprom, encoder, gpio, heaters, inputs, pwm, stepper,
+    system, time, uart, watchdog,
 };
 pub use place::Never;
 pub use primitives::{arithmetic, float, text};

@@ -2,8 +2,7 @@
 //!
 //! Owned by the block queue, in thread mode. Blocks wait here ([`Blend::add`]) until what follows them is known as far as
 //! the means reach, some 50 ms of path, and then go to the queue ([`Blend::take`]). If nothing follows for now, they all
-//! go ([`Blend::flush`]). Only the host has it yet, where tests choose ([`STAGE`]): on an RP2040 moves of 0.1 mm would
-//! take 1.11 times as long, because each line goes through the stage several times.
+//! go ([`Blend::flush`]). Chips with [`STAGE`] places do this; on the host tests choose.
 //!
 //! A mean over the time T makes of a jump of velocity by d an acceleration d / T. So the acceleration of an axis keeps to
 //! its limit A if its velocity changes by at most A T within any T, for one of the two means. Corners take part of that,
@@ -26,6 +25,10 @@
 //! If the stage is full, the path that waits is shorter than the windows. The velocity is then limited so that windows
 //! are as short.
 //!
+//! Cost on the RP2040: 600 cycles for a line that goes straight on. A corner costs more for each corner within its windows;
+//! with a full stage some 750 lines a second are left while four motors run fast. So lines that take less than
+//! [`BLEND_S_MIN`] are not blended ([`is_dense`]).
+//!
 //! Measured from steps (`tests/blend.rs`): 0.1 % of random paths take up to 1.12 of A, all others keep to it.
 //!
 //! Units: mm, s; lengths in 0.1 um, directions in 2^-14.
@@ -46,11 +49,10 @@ use windows::Window;
 
 use super::block::{Block, Body, Line};
 use super::dynamics::Dynamics;
-use super::float::{greater, least};
+use super::float::{below, greater, least};
 use super::junction::{self, STRAIGHT, turn};
-use super::short::Short;
 use super::smooth::{SAMPLE_S, Spans};
-use crate::hal::STAGE;
+use crate::hal::{BLEND_S_MIN, STAGE};
 use crate::units::{AXES, PerAxis};
 
 /// Whether this chip blends.
@@ -83,6 +85,12 @@ const ONE: f32 = junction::ONE as f32;
 /// 1 in the units of a weight.
 const WEIGHT: f32 = 256.0;
 
+/// Whether a line of this length, mm, takes too little time at its velocity to be blended: each line looks at all those that
+/// waits within its windows, and the planner has no time for so many. Its corners are those of a chip that does not blend.
+pub fn is_dense(length: f32, cruise: f32) -> bool {
+    below(length, cruise * BLEND_S_MIN)
+}
+
 /// Places for blocks that wait.
 const PLACES: usize = if BLENDS { STAGE } else { 1 };
 
@@ -96,6 +104,10 @@ struct Entry {
     length: u32,
     /// Where on the path it begins: counts on from block to block, and wraps.
     at: u32,
+    /// How much path may be covered at its cruise within the reach of the kernel, and twice that if it speeds up between
+    /// corners at both ends.
+    zone: u32,
+    span: u32,
     /// The velocity limit at its start.
     entry: f32,
     /// The share of the acceleration that is left in the block.
@@ -116,11 +128,26 @@ struct Asked {
     square: u32,
 }
 
+impl Asked {
+    /// No limit.
+    const NOTHING: Self = Self { velocity: f32::MAX, change: 0, square: 0 };
+}
+
 impl Entry {
-    /// A block that changes nothing about the path.
-    fn new(block: Block, unit: &PerAxis<i16>, length: u32) -> Self {
-        let asked = [Asked { velocity: f32::MAX, change: 0, square: 0 }; 2];
-        Self { block, unit: *unit, length, at: 0, entry: f32::MAX, room: 1.0, turn: 0, asked }
+    /// A place without a block.
+    const fn vacant() -> Self {
+        Self {
+            block: Block::new(Body::Line(Line::NONE), 0),
+            unit: [0; AXES],
+            length: 0,
+            at: 0,
+            zone: 0,
+            span: 0,
+            entry: f32::MAX,
+            room: 1.0,
+            turn: 0,
+            asked: [Asked::NOTHING; 2],
+        }
     }
 
     fn line(&self) -> Option<&Line> {
@@ -139,16 +166,30 @@ impl Entry {
     }
 }
 
-/// A block that is to go to the queue, with the velocity limit at its start, mm/s.
-pub struct Ready {
+/// A block that is to go to the queue.
+pub struct Ready<'a> {
     /// The block.
-    pub block: Block,
+    pub block: &'a Block,
     /// The highest velocity at its start, mm/s.
     pub entry: f32,
+    /// The share of its acceleration limit that it has.
+    pub room: f32,
+}
+
+/// How the corner before a new line may be passed.
+struct Approach {
+    /// The velocity up to which windows are looked for, mm/s.
+    top: f32,
+    /// The velocity limit, mm/s.
+    entry: f32,
+    /// How much path behind the corner it may limit.
+    zone: u32,
 }
 
 /// The blocks that wait, and what limits them.
 pub struct Blend {
+    /// When the planner began to wait for lines that follow, ms, modulo 2^16. The planner's.
+    pub since: u16,
     limits: Limits,
     /// The blocks: a ring.
     entries: [Entry; PLACES],
@@ -178,19 +219,20 @@ pub struct Blend {
 
 impl Blend {
     /// A stage that is off, without blocks.
-    pub fn new() -> Self {
+    pub const fn new() -> Self {
         Self {
+            since: 0,
             limits: Limits {
                 kernel: Kernel::NONE,
+                spans: [0.0; 2],
                 windows: [0.0; 2],
                 deviation: 0.05,
                 accel: 0.0,
                 weights: [0; AXES],
                 accels: [0.0; AXES],
             },
-            entries: [Entry::new(Block::new(Body::Line(Line::default()), 0), &[0; AXES], 0);
-                PLACES],
-            windows: [Window::default(); PLACES],
+            entries: [Entry::vacant(); PLACES],
+            windows: [Window::NONE; PLACES],
             first: 0,
             len: 0,
             end: 0,
@@ -240,6 +282,8 @@ impl Blend {
             false => 0,
         });
         limits.kernel = Kernel::of(spans);
+        let reach = limits.kernel.reach();
+        limits.spans = [PER_MM * reach, 0.5 * PER_MM * reach * reach];
         let (corner, jerk) = spans.samples();
         limits.windows = [corner, jerk].map(|samples| f32::from(samples) * SAMPLE_S);
     }
@@ -275,42 +319,56 @@ impl Blend {
     /// Adds a block that moves nothing and at which the machine does not stop.
     pub fn pass(&mut self, block: Block) {
         let unit = self.unit_ahead_of(self.len).unwrap_or_default();
-        self.append(Entry::new(block, &unit, 0));
+        self.append(&unit, 0).block = block;
     }
 
-    /// Adds a line with this direction. There is room for [`SPARE`] blocks.
-    pub fn add(&mut self, block: Block, unit: &PerAxis<i16>) {
-        let Body::Line(line) = &block.body else { return };
+    /// Adds a line with this N word and direction. There is room for [`SPARE`] blocks.
+    pub fn add(&mut self, line: &Line, number: u32, unit: &PerAxis<i16>) {
+        let from = self.unit_ahead_of(self.len);
+        let change = from.map_or(0, |from| turn(&from, unit));
+        let corner =
+            from.filter(|_| change >= STRAIGHT).map(|from| self.approach(line, &from, unit));
         let length = in_lengths(line.extent.length());
-        let mut entry = Entry::new(block, unit, length);
-        if let Some(from) = self.unit_ahead_of(self.len) {
-            entry.turn = turn(&from, unit);
-            if entry.turn >= STRAIGHT {
-                return self.corner(entry, &from);
+        let (zone, span) = self.measures(line);
+        let entry = self.append(unit, length);
+        entry.block.set(line, number);
+        (entry.zone, entry.span) = (zone, span);
+        if let Some(Approach { top, entry: velocity, zone }) = corner {
+            (entry.turn, entry.entry) = (change, velocity);
+            self.look_back(top);
+            if length - length / 5 > zone {
+                self.cut_last_at(zone);
             }
         }
-        self.append(entry);
         self.cut_last();
     }
 
-    /// Adds a line behind a corner.
-    fn corner(&mut self, mut entry: Entry, from: &PerAxis<i16>) {
+    /// Returns the limits of the corner before a line that is to be added, and cuts the line before it.
+    fn approach(&mut self, line: &Line, from: &PerAxis<i16>, unit: &PerAxis<i16>) -> Approach {
         let cruise = self.last().map_or(f32::MAX, Entry::cruise);
-        let change = self.limits.change(from, &entry.unit);
-        let top = least(least(cruise, entry.cruise()), self.behind);
+        let top = least(least(cruise, line.cruise), self.behind);
         let [first, second] = self.limits.windows;
-        entry.entry = least(top, self.limits.velocity(change, greater(first, second)));
+        let change = self.limits.change(from, unit);
+        let entry = least(top, self.limits.velocity(change, greater(first, second)));
         self.behind = f32::MAX;
-        let accel = greater(self.last().map_or(0.0, Entry::accel), entry.accel());
-        let zone = zone(entry.entry, accel, self.limits.kernel.reach());
+        let accel = greater(self.last().map_or(0.0, Entry::accel), line.accel.get());
+        let zone = zone(entry, accel, self.limits.kernel.reach());
         self.cut_end(zone);
-        let cut = in_lengths(zone);
-        self.append(entry);
-        self.look_back(top);
-        if entry.length - entry.length / 5 > cut {
-            self.cut_last_at(cut);
-        }
-        self.cut_last();
+        Approach { top, entry, zone: in_lengths(zone) }
+    }
+
+    /// Returns [`Entry::zone`] and [`Entry::span`] of a line.
+    fn measures(&self, line: &Line) -> (u32, u32) {
+        let [by_velocity, by_accel] = self.limits.spans;
+        let (way, more) = (line.cruise * by_velocity, line.accel.get() * by_accel);
+        let zone = way + more;
+        (zone as u32, (zone + way) as u32)
+    }
+
+    /// Notes that a line with this direction and length goes past the stage, in which no block waits.
+    pub fn went_past(&mut self, unit: &PerAxis<i16>, length: f32) {
+        (self.before, self.behind, self.gone) = (Some(*unit), f32::MAX, in_lengths(length));
+        self.stops = false;
     }
 
     /// Lets all blocks that wait go. If the machine `stops` there, no corner follows; otherwise one may, and the end of the
@@ -356,7 +414,7 @@ impl Blend {
     }
 
     /// Returns the next block that is to go to the queue.
-    pub fn take(&mut self) -> Option<Ready> {
+    pub fn take(&mut self) -> Option<Ready<'_>> {
         if self.len == 0 {
             return None;
         }
@@ -369,20 +427,19 @@ impl Blend {
                 self.crowd();
             }
         }
-        let Entry { mut block, unit, length, entry, room, turn, .. } = *self.entry(0);
-        if let Body::Line(line) = &mut block.body {
-            line.accel = Short::new(line.accel.get() * room);
-        }
+        let at = self.first;
+        let Entry { unit, length, turn, .. } = self.entries[at];
         self.before = Some(unit);
         self.gone = if turn >= STRAIGHT { length } else { self.gone.saturating_add(length) };
-        self.first = (self.first + 1) % PLACES;
+        self.first = (at + 1) % PLACES;
         self.len -= 1;
         self.done = self.done.saturating_sub(1);
         self.flushed = self.flushed.saturating_sub(1);
         if self.len == 0 && self.stops {
             self.stop();
         }
-        Some(Ready { block, entry })
+        let Entry { block, entry, room, .. } = &self.entries[at];
+        Some(Ready { block, entry: *entry, room: *room })
     }
 
     fn last(&self) -> Option<&Entry> {
@@ -399,13 +456,17 @@ impl Blend {
         self.ahead_of(n).map(|entry| entry.unit).or(self.before)
     }
 
-    fn append(&mut self, entry: Entry) {
-        if self.len < PLACES {
-            self.len += 1;
-            let at = self.end;
-            self.end = at.wrapping_add(entry.length);
-            *self.entry_mut(self.len - 1) = Entry { at, ..entry };
-        }
+    /// Adds a place for a block of this length that changes nothing. There is room; else it takes the last place.
+    fn append(&mut self, unit: &PerAxis<i16>, length: u32) -> &mut Entry {
+        self.len = PLACES.min(self.len + 1);
+        let at = self.end;
+        self.end = at.wrapping_add(length);
+        let entry = self.entry_mut(self.len - 1);
+        (entry.unit, entry.length, entry.at) = (*unit, length, at);
+        (entry.zone, entry.span) = (0, 0);
+        (entry.entry, entry.room, entry.turn) = (f32::MAX, 1.0, 0);
+        entry.asked = [Asked::NOTHING; 2];
+        entry
     }
 
     /// Returns the length of the path from the start of block `n` to that of block `to`, or to the end of the last one.
@@ -442,9 +503,10 @@ mod tests {
     use crate::motion::block::Extent;
     use crate::motion::dynamics::Axis;
     use crate::motion::junction::ONE;
+    use crate::motion::short::Short;
 
     /// A stage, and a line of 0.1 mm along an axis.
-    fn stage() -> (Blend, impl Fn(usize) -> (Block, PerAxis<i16>)) {
+    fn stage() -> (Blend, impl Fn(usize) -> (Line, PerAxis<i16>)) {
         crate::hal::imp::set_blends(true);
         let accel = Short::new(500.0);
         let axes = [Axis { accel, ..Axis::default() }; AXES];
@@ -455,16 +517,16 @@ mod tests {
                 Line { extent: Extent::new(0.1, false), cruise: 50.0, accel, ..Line::default() };
             let mut unit = [0; AXES];
             unit[axis] = ONE;
-            (Block::new(Body::Line(line), 0), unit)
+            (line, unit)
         };
         (blend, line)
     }
 
     /// Adds a line along each axis, and lets all blocks go. Returns the velocity limits at their starts.
-    fn goes(blend: &mut Blend, lines: &[(Block, PerAxis<i16>)], stops: bool) -> std::vec::Vec<f32> {
-        lines.iter().for_each(|(block, unit)| blend.add(*block, unit));
+    fn goes(blend: &mut Blend, lines: &[(Line, PerAxis<i16>)], stops: bool) -> std::vec::Vec<f32> {
+        lines.iter().for_each(|(line, unit)| blend.add(line, 0, unit));
         blend.flush(stops);
-        core::iter::from_fn(|| blend.take()).map(|ready| ready.entry).collect()
+        core::iter::from_fn(|| blend.take().map(|ready| ready.entry)).collect()
     }
 
     #[test]
@@ -484,15 +546,15 @@ mod tests {
         use crate::motion::block::QueuedAction;
         let (mut blend, line) = stage();
         let aside = |lead| Block::action(QueuedAction::Lead(lead), 0);
-        let (block, unit) = line(0);
-        blend.add(block, &unit);
+        let (first, unit) = line(0);
+        blend.add(&first, 0, &unit);
         for lead in [1.0, 2.0] {
             blend.pass(aside(lead));
-            blend.add(block, &unit);
+            blend.add(&first, 0, &unit);
         }
         blend.drop_lines();
-        let left = core::iter::from_fn(|| blend.take());
-        let leads = left.filter_map(|ready| match ready.block.body {
+        let left = core::iter::from_fn(|| blend.take().map(|ready| ready.block.body));
+        let leads = left.filter_map(|body| match body {
             Body::QueuedAction(QueuedAction::Lead(lead)) => Some(lead),
             _ => None,
         });

@@ -53,7 +53,7 @@ impl Block {
 
     /// Returns a block of the line with this N word, 0 for none; at most [`N_MAX`](crate::gcode::command::N_MAX).
     #[inline(always)]
-    pub fn new(body: Body, line: u32) -> Self {
+    pub const fn new(body: Body, line: u32) -> Self {
         Self { body, line: Number::of(line) }
     }
 
@@ -61,6 +61,13 @@ impl Block {
     #[inline(always)]
     pub fn set_line(&mut self, line: u32) {
         self.line = Number::of(line);
+    }
+
+    /// Makes it a line with this N word.
+    #[inline(always)]
+    pub fn set(&mut self, line: &Line, number: u32) {
+        self.body = Body::Line(*line);
+        self.set_line(number);
     }
 
     /// A block that does something other than move.
@@ -82,7 +89,7 @@ pub struct Number([u8; 3]);
 impl Number {
     /// Keeps an N word, which is at most [`N_MAX`](crate::gcode::command::N_MAX).
     #[inline(always)]
-    pub fn of(line: u32) -> Self {
+    pub const fn of(line: u32) -> Self {
         let [a, b, c, _] = line.to_le_bytes();
         Self([a, b, c])
     }
@@ -227,6 +234,17 @@ pub struct Line {
 }
 
 impl Line {
+    /// A line of no length.
+    pub const NONE: Self = Self {
+        way: [0; MOTORS],
+        extent: Extent(0.0),
+        reserve: Reserve::NONE,
+        cruise: 0.0,
+        start: 0.0,
+        entry: Short::ZERO,
+        accel: Short::ZERO,
+    };
+
     /// Velocity limit on the path under an override, mm/s.
     #[inline(always)]
     pub fn velocity(&self, factors: &Factors) -> f32 {

@@ -52,7 +52,7 @@ impl Reserve {
     pub const TRAVERSE: Self = Self(NonZero::<u8>::MAX);
 
     /// A line that may not be run faster than its cruise velocity.
-    const NONE: Self = Self(NonZero::<u8>::MIN);
+    pub const NONE: Self = Self(NonZero::<u8>::MIN);
 
     /// Returns the reserve of a line at `cruise` that may be run at `top`, which is no less than `cruise` and at most
     /// twice as much. Cost: 30; 300 between the two.

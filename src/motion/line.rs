@@ -11,7 +11,7 @@
 //!
 //! A ramp may go over many blocks. Each block has its own acceleration limit: what its axes allow in its direction.
 
-use super::blend::BLENDS;
+use super::blend::{BLENDS, is_dense};
 use super::block::{Block, Extent, Line as Move, QueuedAction};
 use super::curve::{Bend, Curve};
 use super::dynamics::Dynamics;
@@ -52,7 +52,7 @@ pub struct Line<'a> {
     pub curve: Option<&'a Curve>,
     /// Whether the move may be merged with the next one.
     pub may_merge: bool,
-    /// Whether the move is [blended](super::blend): its corners are limited there.
+    /// Whether the move is to be [blended](super::blend), unless it is too short for its velocity.
     pub blends: bool,
 }
 
@@ -64,6 +64,8 @@ pub enum Built {
     /// A block. The value is the velocity limit of the corner before it, mm/s; it may be above any velocity of the
     /// block, and is then no limit.
     Line(f32),
+    /// A block that is to be blended. The value says whether it begins at a standstill.
+    Blended(bool),
     /// More steps than a block holds: the move must be divided into this many parts.
     Parts(u16),
     /// The move is less than half a step, and shorter than exec needs to prepare it: the next move begins where this
@@ -125,7 +127,7 @@ impl Builder {
         path.limit_change(dynamics);
         // The chords of an arc have its limits, and no corners between them.
         let goes_on = matches!(line.curve, Some(curve) if curve.goes_on);
-        let blends = BLENDS && line.blends;
+        let blends = BLENDS && line.blends && !is_dense(path.length, path.cruise);
         let turned = match line.curve {
             Some(curve) => {
                 self.bend.chord(&mut path, curve);
@@ -156,7 +158,7 @@ impl Builder {
         };
         out.cruise = path.cruise;
         out.accel = path.accel;
-        Built::Line(entry)
+        if blends { Built::Blended(!some(entry)) } else { Built::Line(entry) }
     }
 
     /// Moves in whole steps, for distances too long for parts of a step; motors keep their fraction of a step. Returns

@@ -311,7 +311,7 @@ impl Prep {
     pub fn whole(&mut self, cycles: u32, exact: bool, out: &mut Segment) -> bool {
         let cycles = self.with_kept(cycles);
         let most = self.most;
-        let limit = self.limit(cycles, COARSEST);
+        let limit = self.limit(cycles, self.coarsest());
         // The time carried over may be long.
         if exact || most == 0 || !self.parts || cycles >> 24 != 0 {
             return self.last_of(cycles, limit, exact, out);
@@ -461,7 +461,14 @@ impl Prep {
                 return fine;
             }
         }
-        self.limit(cycles, if self.coarse { COARSEST } else { self.paces().coarse })
+        self.limit(cycles, if self.coarse { self.coarsest() } else { self.paces().coarse })
+    }
+
+    /// The pace of the coarsest ticks. Wide pulses may require longer ones than [`COARSEST`]: with shorter ones the segment
+    /// would take longer than its stretch.
+    #[inline(always)]
+    fn coarsest(&self) -> u16 {
+        COARSEST.min(self.paces().coarse)
     }
 
     /// Whether all motors that move go equally far.
@@ -581,7 +588,9 @@ impl Default for Prep {
 #[cfg(test)]
 mod tests {
     use super::super::block::{Extent, Line};
+    use super::super::smooth::{CHANNELS, SAMPLE_CYCLES};
     use super::*;
+    use crate::hal::TIMER_HZ;
 
     /// Three and a half steps of 50 us: the last half takes half as long as a step, not sixteen of the shortest ticks.
     #[test]
@@ -596,5 +605,46 @@ mod tests {
         assert!(prep.last(400, false, &mut out));
         let took = u32::from(out.ticks) * u32::from(out.period);
         assert!((350..=450).contains(&took), "{out:?}");
+    }
+
+    /// Ticks that are shorter than pulses allow would be longer than computed, and so would each sample: a motor would
+    /// keep one velocity while its ramp asks for others.
+    #[test]
+    fn samples_take_their_time_whatever_pulses_and_ticks() {
+        for pulse_us in [0, 2, 5, 10, 30, 60, 100] {
+            let drivers = Drivers { pulse_us, setup_us: 1 };
+            let fastest = drivers.step_rate_max(2) * SAMPLE_CYCLES as f32 / TIMER_HZ as f32;
+            for (fine, coarse) in [(true, false), (false, false), (false, true)] {
+                for part in 1..100 {
+                    let most = fastest * part as f32 / 100.0;
+                    let [long, odd] = longest_and_average(drivers, (fine, coarse), most);
+                    assert!(
+                        odd < 0.001 && long < 1.3,
+                        "{drivers:?} {fine} {coarse} {most}: {long} {odd}"
+                    );
+                }
+            }
+        }
+    }
+
+    /// Makes samples in which a motor goes `most` steps, and another seven tenths. Returns how long the longest segment
+    /// is, and by how much they are longer or shorter together, over what they should be.
+    fn longest_and_average(drivers: Drivers, (fine, coarse): (bool, bool), most: f32) -> [f32; 2] {
+        const COUNT: u32 = 300;
+        let (mut prep, mut out, mut target) = (Prep::new(), Segment::default(), [0; MOTORS]);
+        prep.set_drivers(drivers);
+        prep.refine(fine, coarse);
+        let (mut sum, mut longest) = (0, 0);
+        for _ in 0..COUNT {
+            let mut distances = [0; CHANNELS];
+            distances[0] = (most * f32::from(STEP)) as i32;
+            distances[1] = (0.7 * most * f32::from(STEP)) as i32;
+            prep.slice(&distances, &mut target, &mut out);
+            let cycles = u32::from(out.ticks) * u32::from(out.period);
+            (sum, longest) = (sum + cycles, longest.max(cycles));
+        }
+        let wanted = (COUNT * SAMPLE_CYCLES) as f32;
+        let [sum, longest] = [sum.saturating_add_signed(prep.kept()), longest].map(|of| of as f32);
+        [longest / SAMPLE_CYCLES as f32, (sum / wanted - 1.0).abs()]
     }
 }

@@ -10,6 +10,7 @@ use super::blend::{Blend, Ready, SPARE, STAGES};
 use super::block::{Block, Body, Line, QueuedAction};
 use super::factors::Factors;
 use super::float::{OCTAVE, below, log, some};
+use super::short::Short;
 pub use super::source::BlockSource;
 use super::speed_constraints::SpeedConstraints;
 use super::tail::Tail;
@@ -31,6 +32,9 @@ pub(super) const SEQ: Index = Index::MAX >> 1;
 
 /// Potentials above this many times the square of the velocity are counted from zero again.
 const COARSE: f32 = 1024.0;
+
+/// The queue is short if its potential is below this many times the square of the velocity: exec brakes at 1.
+const AHEAD: f32 = 2.0;
 
 /// The logarithm of half of [`COARSE`].
 const FINE: i32 = 9 * OCTAVE;
@@ -172,7 +176,21 @@ impl BlockQueue {
     /// Whether lines wait besides the one that runs.
     #[inline(always)]
     pub fn is_busy(&self) -> bool {
-        self.ring.free() < CAPACITY - 1
+        self.ring.free() < CAPACITY - 1 || self.has_staged()
+    }
+
+    /// Whether exec soon brakes for the end of the queue. Cost: 300.
+    pub fn is_short(&self) -> bool {
+        let used = self.ring.used();
+        let oldest = self.ring.pushed(used.saturating_sub(1));
+        let Some(Block { body: Body::Line(oldest), .. }) = oldest else { return false };
+        let constraints = self.constraints;
+        exec::lock(self.thread, |ceiling| {
+            constraints.with(ceiling, |constraints| {
+                let left = constraints.end - oldest.start;
+                !constraints.is_mixed() && below(left, AHEAD * oldest.cruise * oldest.cruise)
+            })
+        })
     }
 
     /// Notes that exec has dropped all blocks: the next block begins at a standstill.
@@ -228,6 +246,12 @@ impl BlockQueue {
         self.stage.first().is_some_and(|stage| !stage.is_empty())
     }
 
+    /// When the first of the lines that wait to be blended came, or the last one while others ran: [`Blend::since`].
+    #[inline(always)]
+    pub fn waits_since(&self) -> u16 {
+        self.stage.first().map_or(0, |stage| stage.since)
+    }
+
     /// Queues the blocks that wait to be blended. `stops` says whether the machine stops there.
     #[inline(always)]
     pub fn flush(&mut self, stops: bool) {
@@ -240,14 +264,42 @@ impl BlockQueue {
     /// Takes the move in [`BlockQueue::next_line`], with this direction, to be blended and queued. There is room. If it
     /// `begins` at a standstill, all moves before it are queued first.
     pub fn blend(&mut self, unit: &PerAxis<i16>, number: u32, begins: bool) {
-        let Some(line) = self.next_line().copied() else { return };
         if begins {
-            self.flush(true);
+            self.flush_ahead(true);
             self.tail.last = None;
         }
-        if let Some(stage) = self.stage.first_mut() {
-            stage.add(Block::new(Body::Line(line), number), unit);
+        let line = self.ring.vacant_mut();
+        if let (Some(stage), Some(Block { body: Body::Line(line), .. })) =
+            (self.stage.first_mut(), line)
+        {
+            stage.add(line, number, unit);
             self.forward();
+        }
+    }
+
+    /// Queues the move in [`BlockQueue::next_line`], as [`BlockQueue::push_line`], behind those that wait to be blended.
+    #[inline(always)]
+    pub fn push_unblended(&mut self, entry: f32, unit: &PerAxis<i16>, number: u32) -> bool {
+        if self.blends() {
+            self.flush_ahead(false);
+            let length = self.next_line().map_or(0.0, |line| line.extent.length());
+            if let Some(stage) = self.stage.first_mut() {
+                stage.went_past(unit, length);
+            }
+        }
+        self.push_line(entry, number)
+    }
+
+    /// Queues the blocks that wait to be blended, and keeps the move in [`BlockQueue::next_line`].
+    #[inline(never)]
+    fn flush_ahead(&mut self, stops: bool) {
+        if !self.has_staged() {
+            return self.flush(stops);
+        }
+        let Some(line) = self.next_line().copied() else { return };
+        self.flush(stops);
+        if let Some(slot) = self.next_line() {
+            *slot = line;
         }
     }
 
@@ -260,19 +312,21 @@ impl BlockQueue {
         }
     }
 
-    /// Queues the blocks that are ready.
+    /// Queues the blocks that are ready. There is room.
     fn forward(&mut self) {
-        while let Some(Ready { block, entry }) = self.stage().and_then(Blend::take) {
-            match block.body {
-                Body::Line(line) => {
-                    if let Some(slot) = self.next_line() {
-                        *slot = line;
-                        self.push_line(entry, block.line());
-                    }
+        while let Some(stage) = self.stage.first_mut()
+            && let Some(Ready { block, entry, room }) = stage.take()
+            && let Some(slot) = self.ring.vacant_mut()
+        {
+            *slot = *block;
+            if let Body::Line(line) = &mut slot.body {
+                if room < 1.0 {
+                    line.accel = Short::new(line.accel.get() * room);
                 }
-                Body::QueuedAction(_) => {
-                    self.put_whole(block);
-                }
+                let number = slot.line();
+                self.push_line(entry, number);
+            } else {
+                self.put(|_| {}, None, |_| {});
             }
         }
     }

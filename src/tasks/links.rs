@@ -66,7 +66,7 @@ pub struct Links {
     pub reporter_wake: ReporterWake,
     /// A line has left a pool. The reader waits for this when a pool is full.
     pub pool_space: Wake,
-    /// A chain of lines may wait for more. The power task then wakes the planner.
+    /// Lines wait for more: a chain, or lines to be blended. The power task then wakes the planner.
     pub chain_waits: Cell<bool>,
     /// Changes that the planner handles before the next line.
     pub changes: Changes,

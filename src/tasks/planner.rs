@@ -47,7 +47,6 @@ use crate::gcode::modal::FeedMode;
 use crate::gcode::overrides::Change;
 use crate::gcode::steps::{Step, Steps};
 use crate::hal::event::{Event, is_asked, wait};
-use crate::hal::time::millis;
 use crate::jobs::Job;
 use crate::machine::{self, Cycle};
 #[cfg(feature = "printer")]
@@ -69,7 +68,7 @@ pub struct Planner {
     links: &'static Links,
     /// The N word of the line that is being carried out; before its move, that of the line before.
     line: u32,
-    /// When the chain that waits got its last line, ms.
+    /// When the last of the lines that wait came, ms.
     waits_since: u16,
     /// How many lines in a row have not gone on with a chain.
     alone: u8,
@@ -205,6 +204,8 @@ pub fn run(links: &'static Links, shared: &'static Shared) -> impl Future<Output
                     }
                 }
             }
+            // In this order, because a line is told to wait or to be carried out at any time.
+            links.chain_waits.set(planner.has_waiting());
             links.commands_taken.set(false);
             if planner.is_flushed() {
                 planner.queue.drop_staged();
@@ -216,6 +217,7 @@ pub fn run(links: &'static Links, shared: &'static Shared) -> impl Future<Output
                     }
                     parser::end_program(links, resets);
                 }
+                links.chain_waits.set(planner.has_waiting());
             }
             links.parser_wake.signal();
         }
@@ -232,8 +234,8 @@ pub fn take_at_once(planner: &mut Planner) -> bool {
     }
     let waited = planner.has_waiting();
     let done = planner.carry_out_at_once();
+    planner.links.chain_waits.set(planner.has_waiting());
     if planner.has_waiting() {
-        planner.links.chain_waits.set(true);
         if queue::used_here() <= 1 {
             // Exec may have finished a block of which the planner's task has not been told yet.
             planner.make_up();
@@ -330,7 +332,7 @@ impl Planner {
         match self.line(target, feed.copied(), may_merge) {
             Built::Parts(_) => return false,
             Built::Merge => self.begun = Begun::Chain(Chain::closed(&self.position, target)),
-            Built::Line(_) | Built::Nothing => {
+            Built::Line(_) | Built::Blended(_) | Built::Nothing => {
                 self.begun = Begun::Nothing;
                 self.moved(&commands);
                 self.position = *target;
@@ -558,19 +560,23 @@ impl Planner {
         let line = Line { from, to, feed, curve, may_merge, blends };
         let Some(block) = self.queue.next_line() else { return Built::Nothing };
         let built = self.builder.line(&line, &self.dynamics, &*settings, block);
-        if let Built::Line(entry) = built {
+        if matches!(built, Built::Line(_) | Built::Blended(_)) {
             #[cfg(feature = "printer")]
             heat::refine_by(&self.lead, &settings, block, from, to);
             if let Ongoing::Arc(arc) = &mut self.walk {
                 arc.curve.go_on();
             }
-            if blends {
-                self.keep_to_deviation();
-                self.waits_since = millis() as u16;
-                self.queue.blend(self.builder.unit(), self.line, entry <= 0.0);
-            } else {
-                self.queue.push_line(entry, self.line);
+        }
+        match built {
+            Built::Line(entry) => {
+                self.queue.push_unblended(entry, self.builder.unit(), self.line);
             }
+            Built::Blended(begins) => {
+                self.keep_to_deviation();
+                self.waits_from_now();
+                self.queue.blend(self.builder.unit(), self.line, begins);
+            }
+            _ => {}
         }
         built
     }
@@ -629,7 +635,7 @@ impl Planner {
     fn set_origin(&mut self) -> bool {
         let links = self.links;
         let origin = origin::read(&links.settings.borrow(), &links.model.borrow());
-        let runs = queue::used() > 0 || self.queue.has_staged();
+        let runs = queue::used() > 0 || self.has_waiting();
         let runs = common::with(links.thread, move |common| {
             let runs = runs || common.motion.running;
             if !runs {

@@ -36,8 +36,8 @@ pub async fn run(links: &'static Links) -> ! {
         if uart::sees_opening() {
             system::set_rests(rests(links));
         }
-        if links.chain_waits.take() {
-            // The chain may have waited long enough.
+        if links.chain_waits.get() {
+            // The lines may have waited long enough.
             links.planner_wake.signal();
         }
         after_ms(LOOK_MS).await;

@@ -103,7 +103,8 @@ impl Seen {
     /// Returns the present state of the machine. Thread mode.
     fn now(links: &Links, settings: &Settings) -> Self {
         // In this order, because exec may begin a queued block in between.
-        let (taken, queued) = (links.commands_taken.get(), queue::used() > 0);
+        let taken = links.commands_taken.get();
+        let queued = links.chain_waits.get() || queue::used() > 0;
         let mut motion = snapshot(links.thread).moment();
         let runs = queued || motion.running;
         if !runs {
@@ -115,7 +116,7 @@ impl Seen {
 
 /// Whether a line waits to be carried out, or a block of it.
 fn is_queued(links: &Links) -> bool {
-    links.commands_taken.get() || queue::used() > 0
+    links.commands_taken.get() || links.chain_waits.get() || queue::used() > 0
 }
 
 #[small]

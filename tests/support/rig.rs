@@ -240,22 +240,25 @@ impl Rig {
         let line =
             Line { from: &self.position, to: &to, feed, curve: None, may_merge: false, blends };
         let block = self.queue.next_line().expect("room");
-        match self.builder.line(&line, &self.dynamics, &self.config, block) {
+        let built = self.builder.line(&line, &self.dynamics, &self.config, block);
+        match built {
             Built::Nothing => {}
             Built::Parts(_) => panic!("too long for a test"),
             Built::Merge => unreachable!("it may not"),
-            Built::Line(entry) => {
+            Built::Line(_) | Built::Blended(_) => {
                 if let Some(motor) = self.leads {
                     let axis = usize::from(self.config.drives[motor]);
                     let travel = to[axis].0 - self.position[axis].0;
                     advance::refine(block, motor, self.config.ratio[motor], travel);
                 }
-                if blends {
-                    self.queue.blend(self.builder.unit(), number, entry <= 0.0);
-                } else {
-                    assert!(self.queue.push_line(entry, number));
-                }
             }
+        }
+        match built {
+            Built::Line(entry) => {
+                assert!(self.queue.push_unblended(entry, self.builder.unit(), number));
+            }
+            Built::Blended(begins) => self.queue.blend(self.builder.unit(), number, begins),
+            _ => {}
         }
         self.position = to;
     }

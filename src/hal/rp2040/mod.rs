@@ -65,9 +65,9 @@ pub use crate::hal::{exec, flags};
 /// This chip, for the [contract](super::contract).
 pub struct Chip;
 
-/// Whether lines are blended: not yet.
+/// Whether lines are blended.
 pub fn blends() -> bool {
-    false
+    true
 }
 
 /// Functions of [`System`](super::contract::System).

@@ -27,6 +27,8 @@ impl Timing for Chip {
     const SAMPLE_MS: u8 = 2;
     /// Exec is fast enough: 40 % of the CPU are busy with an arc on which a motor makes a million steps a second.
     const SHORT_SHARE: f32 = 1.0;
-    const LOOK_AHEAD: usize = 1_024;
+    const STAGE: usize = 64;
+    const BLEND_S_MIN: f32 = 0.000_8;
+    const LOOK_AHEAD: usize = 768;
     const LINE_BYTES: [usize; 2] = [2_088, 1_040];
 }

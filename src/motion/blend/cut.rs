@@ -1,9 +1,9 @@
 //! Cuts lines in two, so that a part of a long line can have limits of its own.
 
-use super::limits::{in_lengths, reach};
-use super::{Blend, Entry};
+use super::Blend;
+use super::limits::in_lengths;
 use crate::motion::advance::cut_push;
-use crate::motion::block::{Block, Body, Extent, Line};
+use crate::motion::block::{Extent, Line};
 
 impl Blend {
     /// Cuts off the last `zone` mm of the path that waits, if they lie in a line that is longer.
@@ -18,9 +18,8 @@ impl Blend {
     /// Cuts the last block if it reaches farther than the corner that may follow it: the first part need not wait.
     pub(super) fn cut_last(&mut self) {
         let Some(last) = self.last() else { return };
-        let end = 2.0 * reach(last.cruise(), last.accel(), self.limits.kernel.reach());
-        let (length, end) = (last.length, in_lengths(end));
-        if length - length / 3 > end {
+        let (length, end) = (last.length, last.span);
+        if length > end && length - length / 3 > end {
             self.cut_last_at(length - end);
         }
     }
@@ -34,15 +33,14 @@ impl Blend {
         }
         let share = length as f32 / last.length as f32;
         let (head, tail) = halves(line, share, self.motor.into());
-        let number = last.block.line();
-        let newest = self.len - 1;
-        let head = Block::new(Body::Line(head), number);
-        let tail = Block::new(Body::Line(tail), number);
-        let rest = Entry { room: last.room, ..Entry::new(tail, &last.unit, last.length - length) };
+        let (number, newest) = (last.block.line(), self.len - 1);
         let entry = self.entry_mut(newest);
-        (entry.block, entry.length) = (head, length);
+        entry.block.set(&head, number);
+        entry.length = length;
         self.end = entry.at.wrapping_add(length);
-        self.append(rest);
+        let rest = self.append(&last.unit, last.length - length);
+        rest.block.set(&tail, number);
+        (rest.room, rest.zone, rest.span) = (last.room, last.zone, last.span);
     }
 }
 

@@ -16,6 +16,10 @@ pub const LAYERS: usize = 6;
 /// The most samples that the means cover.
 const SAMPLES: usize = 80;
 
+/// Distances in time are counted in parts of half a sample. The number of these parts, and how long one is, s.
+const PARTS: usize = LAYERS;
+const PART_S: f32 = 0.5 * SAMPLE_S / PARTS as f32;
+
 /// A step: its height for a velocity, s, and for an acceleration, s^2, and how far it reaches, s.
 #[derive(Clone, Copy)]
 pub struct Layer {
@@ -43,27 +47,31 @@ impl Kernel {
         reach: 0.0,
     };
 
-    /// Returns the kernel of these means.
+    /// Returns the kernel of these means. Cost: 20,000, in integers.
     pub fn of(spans: Spans) -> Self {
-        let count = usize::from(spans.lag()) + 1;
-        let half = 0.5 * count as f32;
-        let mut kernel = Self { reach: half * SAMPLE_S, ..Self::NONE };
-        let step = kernel.reach / LAYERS as f32;
-        let mut last = values(spans, 0.0);
+        let (weights, count) = weights(spans);
+        let (a, b) = spans.samples();
+        let all = 1.0 / (f32::from(a) * f32::from(b));
+        let reach = 0.5 * count as f32 * SAMPLE_S;
+        let mut kernel = Self { reach, ..Self::NONE };
+        let step = reach / LAYERS as f32;
+        let mut last = values(&weights, count, 0);
         for (n, layer) in kernel.layers.iter_mut().enumerate() {
-            let next = values(spans, (n + 1) as f32 * step);
+            let next = values(&weights, count, n + 1);
+            let [velocity, accel] = [last.0 - next.0, last.1 - next.1].map(|of| of as f32 * all);
             *layer = Layer {
                 seconds: (n as f32 + 0.5) * step,
-                velocity: last.0 - next.0,
-                accel: last.1 - next.1,
+                velocity: velocity * PART_S,
+                accel: 0.5 * accel * (PART_S * PART_S),
             };
             last = next;
         }
-        let weights = weights(spans);
         for (n, (passed, height)) in kernel.shape.iter_mut().enumerate() {
             let at = (2 * n + 1) * count / (2 * PLACES);
-            *passed = weights.iter().take(at).sum::<f32>() + 0.5 * weights.get(at).unwrap_or(&0.0);
-            *height = weights.get(at).unwrap_or(&0.0) * (1.0 / SAMPLE_S);
+            let here = weights.get(at).copied().unwrap_or(0);
+            let before: u32 = weights.iter().take(at).map(|weight| u32::from(*weight)).sum();
+            *passed = (2 * before + u32::from(here)) as f32 * (0.5 * all);
+            *height = f32::from(here) * all * (1.0 / SAMPLE_S);
         }
         kernel
     }
@@ -74,31 +82,69 @@ impl Kernel {
     }
 }
 
-/// Returns phi and Phi at `t`, s and s^2.
-fn values(spans: Spans, t: f32) -> (f32, f32) {
-    let middle = 0.5 * f32::from(spans.lag());
-    let (mut phi, mut sum) = (0.0, 0.0);
-    for (n, weight) in weights(spans).iter().enumerate() {
-        let far = (n as f32 - middle) * SAMPLE_S - t;
-        if far > 0.0 {
+/// Returns phi at the end of a step, in parts of half a sample, and twice Phi, in their squares, each times all weights.
+/// Step 0 ends in the middle. Both fit: a distance is 480 parts at most, and all weights are 240.
+fn values(weights: &[u16; SAMPLES], count: usize, step: usize) -> (u32, u32) {
+    let (mut phi, mut sum) = (0, 0);
+    for (n, weight) in weights.iter().enumerate().take(count) {
+        // From the middle of all samples to that of this one, less the steps.
+        let place = PARTS * (2 * n + 1);
+        if let Some(far) = place.checked_sub(PARTS * count + count * step) {
+            let (far, weight) = (far as u32, u32::from(*weight));
             phi += weight * far;
-            sum += weight * (0.5 * far * far);
+            sum += weight * far * far;
         }
     }
     (phi, sum)
 }
 
-/// Returns the share of a distance that comes out in each sample.
-fn weights(spans: Spans) -> [f32; SAMPLES] {
-    let mut weights = [0.0; SAMPLES];
+/// Returns the parts of a distance that come out in each sample, and the number of samples.
+fn weights(spans: Spans) -> ([u16; SAMPLES], usize) {
+    let mut weights = [0; SAMPLES];
     let (a, b) = spans.samples();
-    let share = 1.0 / (f32::from(a) * f32::from(b));
-    for m in 0..usize::from(a) {
-        for n in 0..usize::from(b) {
-            if let Some(weight) = weights.get_mut(m + n) {
-                *weight += share;
+    let count = usize::from(spans.lag()) + 1;
+    for (n, weight) in weights.iter_mut().enumerate().take(count) {
+        let ends = (n + 1).min(count - n) as u16;
+        *weight = ends.min(a.into()).min(b.into());
+    }
+    (weights, count)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The mean of what is above 0, by the definition.
+    fn exact(spans: Spans, t: f64) -> (f64, f64) {
+        let (a, b) = spans.samples();
+        let middle = f64::from(spans.lag()) / 2.0;
+        let (mut phi, mut sum) = (0.0, 0.0);
+        for m in 0..a {
+            for n in 0..b {
+                let far = (f64::from(m + n) - middle) * f64::from(SAMPLE_S) - t;
+                if far > 0.0 {
+                    (phi, sum) = (phi + far, sum + 0.5 * far * far);
+                }
             }
         }
+        let all = f64::from(a) * f64::from(b);
+        (phi / all, sum / all)
     }
-    weights
+
+    #[test]
+    fn layers_are_the_steps_of_the_kernel() {
+        for ms in [1, 8, 27, 30, 43, 60] {
+            let spans = Spans::of(ms as f32 * 1e-3);
+            let kernel = Kernel::of(spans);
+            for (n, layer) in kernel.layers.iter().enumerate() {
+                let at =
+                    |n: usize| exact(spans, n as f64 * f64::from(kernel.reach) / LAYERS as f64);
+                let ((v0, a0), (v1, a1)) = (at(n), at(n + 1));
+                assert!((f64::from(layer.velocity) - (v0 - v1)).abs() < 1e-5, "{ms} {n}");
+                assert!((f64::from(layer.accel) - (a0 - a1)).abs() < 1e-7, "{ms} {n}");
+            }
+            let passed = kernel.shape.map(|place| place.0);
+            assert!(passed.is_sorted() && (passed[PLACES / 2] - 0.5).abs() < 0.13, "{passed:?}");
+        }
+    }
 }

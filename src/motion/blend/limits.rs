@@ -9,6 +9,8 @@ use crate::units::PerAxis;
 /// What limits all corners.
 pub(super) struct Limits {
     pub(super) kernel: Kernel,
+    /// The reach of the kernel times a velocity, and half its square times an acceleration, make a length.
+    pub(super) spans: [f32; 2],
     /// How long windows are, s: as each mean.
     pub(super) windows: [f32; 2],
     /// P, mm.

@@ -34,21 +34,25 @@ impl Blend {
         if self.done == 0 {
             return false;
         }
-        let first = self.entry(0);
-        let needed = in_lengths(zone(first.cruise(), first.accel(), self.limits.kernel.reach()));
-        self.way(1, self.done) >= needed
+        self.way(1, self.done) >= self.entry(0).zone
     }
 
-    /// The stage is full: makes the first corners final, at a velocity at which their windows lie in the path that waits.
+    /// The stage is full: makes the corners of its first half final, at velocities at which their windows lie in the path
+    /// that waits behind them, and what they limit in the path that waits before them.
     pub(super) fn crowd(&mut self) {
-        let corner = self.done;
-        if corner < self.len {
-            let way = self.way(corner, self.len);
-            let (accel, reach) = (self.entry(corner).accel(), self.limits.kernel.reach());
-            let fits = way as f32 * (1.0 / PER_MM) - 0.25 * accel * reach * reach;
-            let entry = self.entry_mut(corner);
-            entry.entry = least(entry.entry, greater(fits, 0.0) * (1.0 / reach));
-            if entry.turn >= STRAIGHT {
+        let reach = self.limits.kernel.reach();
+        while self.done <= self.len / 2 {
+            let corner = self.done;
+            if self.entry(corner).turn >= STRAIGHT {
+                let mm = |way: u32| way as f32 * (1.0 / PER_MM);
+                let more = self.entry(corner).accel() * reach * reach;
+                let behind = mm(self.way(corner, self.len)) - 0.25 * more;
+                let fits = match self.before {
+                    Some(_) => least(behind, mm(self.way(0, corner)) - 0.5 * more),
+                    None => behind,
+                };
+                let entry = self.entry_mut(corner);
+                entry.entry = least(entry.entry, greater(fits, 0.0) * (1.0 / reach));
                 self.finish(corner);
             }
             self.done += 1;

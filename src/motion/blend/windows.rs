@@ -6,7 +6,7 @@ use crate::motion::float::{greater, least};
 use crate::motion::junction::{STRAIGHT, turn};
 
 /// Some corners in a row, the last of which is the newest.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy)]
 pub(super) struct Window {
     /// The length of the path between them.
     way: u32,
@@ -15,6 +15,11 @@ pub(super) struct Window {
     /// The change of direction: that of an axis, weighted, in 2^-22, and the square of the whole.
     change: u32,
     square: u32,
+}
+
+impl Window {
+    /// No window.
+    pub(super) const NONE: Self = Self { way: 0, limits: [f32::MAX; 2], change: 0, square: 0 };
 }
 
 /// What decides about the windows of a mean.

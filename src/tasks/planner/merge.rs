@@ -14,10 +14,15 @@
 //!
 //! **N words.** A block has the N word of its last line: it is finished when that line is.
 
+use embassy_futures::select::{Either, select};
+
 use super::{Begun, Parts, Planner, Shared, Turn};
 use crate::gcode::command::{Commands, Feed};
+use crate::gcode::modal::MERGED_MAX;
+use crate::hal::after_ms;
 use crate::hal::event::{Event, wait};
 use crate::hal::time::millis;
+use crate::motion::blend::BLENDS;
 use crate::motion::chain::Chain;
 use crate::motion::line::Built;
 use crate::motion::queue;
@@ -26,6 +31,9 @@ use crate::units::{Length, PerAxis};
 
 /// How long after its last line a chain becomes a block, ms.
 const STALE_MS: u16 = 8;
+
+/// How long the first lines are waited for, ms: a path begins that long after its first line, at the latest.
+const START_MS: u16 = 24;
 
 /// Blocks that may be needed at once: for a chain, for the position, and for the timing of drivers.
 const BLOCKS: usize = 3;
@@ -37,6 +45,10 @@ const ALONE: u8 = 8;
 const LONG: u8 = 64;
 /// See [`LONG`]. A power of two.
 const SELDOM: u8 = 32;
+
+/// How far merged moves may be off the path without P where corners are rounded, in units of [`Length`]. Lines of 0.03 mm
+/// whose ends are rounded to 0.001 mm zigzag by 0.03 rad, which looks like acceleration. Merged lines do not.
+const ROUNDED: u16 = 25;
 
 /// Returns how much of P is for moves that are merged, where corners are rounded within P.
 pub(super) fn share(deviation: u16) -> u16 {
@@ -70,16 +82,17 @@ impl Planner {
         self.alone <= ALONE || self.alone & (each - 1) == 0
     }
 
-    /// Returns how far merged moves may be off the path, as [`Commands::blend`]: less where corners are rounded within P.
+    /// Returns how far merged moves may be off the path, as [`Commands::blend`]: less than P where corners are rounded
+    /// within P, but enough for coordinates that are rounded to 0.001 mm.
     #[inline(always)]
     pub(super) fn merged(&self, commands: &Commands) -> u8 {
-        match commands.blend {
-            wide if wide > 4 && self.queue.blends() => {
-                let deviation = self.links.model.borrow().modal().deviation();
-                wide.min(u8::try_from(share(deviation) + 1).unwrap_or(u8::MAX))
-            }
-            other => other,
+        if commands.blend == 0 || !self.queue.blends() {
+            return commands.blend;
         }
+        let model = self.links.model.borrow();
+        let most = share(model.modal().deviation());
+        let least = if model.modal().has_usual_deviation() { ROUNDED } else { most };
+        u8::try_from(most.min(least).min(u16::from(MERGED_MAX))).map_or(0, |most| most + 1)
     }
 
     /// Begins a chain with a line. Returns false if the line cannot be merged with lines that follow.
@@ -108,8 +121,20 @@ impl Planner {
     #[inline(always)]
     pub(super) fn wait_for_more(&mut self, line: u32) {
         self.line = line;
-        self.waits_since = millis() as u16;
+        self.waits_from_now();
         self.links.chain_waits.set(true);
+    }
+
+    /// Notes that a line waits for the next one from now on.
+    #[inline(always)]
+    pub(super) fn waits_from_now(&mut self) {
+        self.waits_since = millis() as u16;
+        let (now, runs) = (self.waits_since, queue::used_here() > 0);
+        if let Some(stage) = self.queue.stage()
+            && (runs || stage.is_empty())
+        {
+            stage.since = now;
+        }
     }
 
     /// Makes a block of the chain, for which there is room. Only closes the chain if it is less than half a step.
@@ -138,7 +163,7 @@ impl Planner {
                     chain.close();
                 }
             }
-            Built::Line(_) | Built::Nothing => {
+            Built::Line(_) | Built::Blended(_) | Built::Nothing => {
                 self.begun = Begun::Nothing;
                 self.position = target;
                 self.announce();
@@ -179,18 +204,29 @@ impl Planner {
         let is_due = match &self.begun {
             Begun::Chain(chain) => {
                 let is_stale = || !chain.is_closed() && self.is_stale();
-                queue::used_here() <= 1 || is_stale() && self.queue.free() >= BLOCKS
+                self.runs_out() || is_stale() && self.queue.free() >= BLOCKS
             }
             _ => self.stage_is_due(),
         };
         is_due && !self.is_flushed()
     }
 
-    /// Whether lines that wait to be blended are not to wait any longer: nothing runs, or soon nothing will.
+    /// Whether lines that wait to be blended are not to wait any longer.
     #[inline(always)]
     fn stage_is_due(&self) -> bool {
+        self.queue.has_staged() && self.runs_out()
+    }
+
+    /// Whether nothing runs, or soon nothing will. Where lines are blended, those that follow at once are waited for: a
+    /// path that has gone to the queue is no longer rounded at its end.
+    #[inline(always)]
+    fn runs_out(&self) -> bool {
         let left = queue::used_here();
-        self.queue.has_staged() && (left == 0 || left == 1 && self.is_stale())
+        if !self.queue.blends() {
+            return left <= 1;
+        }
+        let since = (millis() as u16).wrapping_sub(self.queue.waits_since());
+        left == 0 && since >= START_MS || self.is_stale() && (left <= 1 || self.queue.is_short())
     }
 
     #[inline(always)]
@@ -199,8 +235,17 @@ impl Planner {
     }
 }
 
-/// Waits until the planner has a chain that is not to wait any longer.
-pub(super) fn nothing_follows(links: &Links, shared: &'static Shared) -> impl Future<Output = ()> {
+/// Waits until the planner has lines that are not to wait any longer.
+pub(super) async fn nothing_follows(links: &Links, shared: &'static Shared) {
     let is_due = || shared.try_lock().is_ok_and(|planner| planner.is_due());
-    wait(links.thread, Event::BlockDone, move || is_due().then_some(()))
+    loop {
+        let ended = wait(links.thread, Event::BlockDone, move || is_due().then_some(()));
+        // Only where lines are blended may lines wait while nothing runs.
+        if !BLENDS {
+            return ended.await;
+        }
+        if let Either::First(()) = select(ended, after_ms(STALE_MS.into())).await {
+            return;
+        }
+    }
 }

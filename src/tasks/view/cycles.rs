@@ -82,9 +82,7 @@ pub(super) fn check(view: &mut View<'_>, on: bool) -> Status {
         return alarm.status();
     }
     // Check mode itself is no work, but a hold in check mode is.
-    let links = view.links;
-    let waits = view.has_others() || links.chain_waits.get();
-    let works = machine::is_held() || view.has_work() || waits;
+    let works = machine::is_held() || view.has_work() || view.has_others();
     // What an alarm or a `^d` switches off would be off in check mode, too: it must be off before.
     let runs = values::modal(view, Value::SpindleOn)
         + values::modal(view, Value::Mist)

@@ -536,26 +536,29 @@ fn interrupts_are_never_off_for_long() {
     assert!(masked > 0.1 && masked <= MASKED_US, "{masked} us");
 }
 
-/// An arc that is asked for more than its axes can do has one velocity, that of an axis.
+/// An arc that is asked for more than its axes can do has one velocity: that of an axis, or that at which it is off by P.
 #[test]
 #[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn an_arc_at_the_limit_of_its_axes_is_even() {
-    let (mut board, mut host) = booted();
-    FAST.iter().for_each(|line| set(&mut board, &mut host, line));
-    set(&mut board, &mut host, "g2 x0 y0 i100 j0.001 f60000");
-    host.run_for_ms(&mut board, 150).unwrap();
-    let mut velocities = Vec::new();
-    for _ in 0..50 {
-        let before = Emulated::steps(&board);
-        board.run_for_ms(10).unwrap();
-        let now = Emulated::steps(&board);
-        let way = |m: usize| (now[m] - before[m]) as f64 / 1_280.0;
-        velocities.push(way(0).hypot(way(1)) * 100.0);
+    for (mode, from, to) in [("g61", 775.0, 787.0), ("g64 p0.05", 280.0, 292.0)] {
+        let (mut board, mut host) = booted();
+        FAST.iter().for_each(|line| set(&mut board, &mut host, line));
+        set(&mut board, &mut host, mode);
+        set(&mut board, &mut host, "g2 x0 y0 i100 j0.001 f60000");
+        host.run_for_ms(&mut board, 150).unwrap();
+        let mut velocities = Vec::new();
+        for _ in 0..50 {
+            let before = Emulated::steps(&board);
+            board.run_for_ms(10).unwrap();
+            let now = Emulated::steps(&board);
+            let way = |m: usize| (now[m] - before[m]) as f64 / 1_280.0;
+            velocities.push(way(0).hypot(way(1)) * 100.0);
+        }
+        let (least, most) =
+            velocities.iter().fold((f64::MAX, 0f64), |(a, b), v| (a.min(*v), b.max(*v)));
+        println!("{mode}: {least:.0} to {most:.0} mm/s");
+        assert!(least > from && most < to, "{mode}: {velocities:.0?}");
     }
-    let (least, most) =
-        velocities.iter().fold((f64::MAX, 0f64), |(a, b), v| (a.min(*v), b.max(*v)));
-    println!("{least:.0} to {most:.0} mm/s");
-    assert!(least > 775.0 && most < 787.0, "{velocities:.0?}");
 }
 
 /// 200 kHz at the probe's input, and around it, take no step of a million a second out of its place.
@@ -743,12 +746,12 @@ const LONG: [&str; 2] = ["axis-modes", "far"];
 /// Transcripts of a printer, and of drivers that are set up by UART.
 const PRINTING: [&str; 4] = ["bed", "drivers", "heat", "reprap"];
 
-/// Returns an answer of a machine with 61 blocks as this machine, with 1,024, gives it.
+/// Returns an answer of a machine with 61 blocks as this machine, with 768, gives it.
 fn with_more_room(line: &str) -> String {
     let text = [
-        ("Bf:61,", "Bf:1024,"),
-        ("A,61,", "A,1024,"),
-        ("qr:                 61", "qr:               1024"),
+        ("Bf:61,", "Bf:768,"),
+        ("A,61,", "A,768,"),
+        ("qr:                 61", "qr:                768"),
     ];
     let mut line = text.iter().fold(line.to_string(), |line, (few, more)| line.replace(few, more));
     let is_refused = line.contains("\"f\":") && !line.contains("\"f\":[1,0,");
@@ -759,7 +762,7 @@ fn with_more_room(line: &str) -> String {
     let digits = line[at..].bytes().take_while(u8::is_ascii_digit).count();
     let number = line[at..at + digits].parse().unwrap_or(0);
     if (1..=61).contains(&number) {
-        line.replace_range(at..at + digits, &(number + 963).to_string());
+        line.replace_range(at..at + digits, &(number + 707).to_string());
     }
     line
 }
@@ -793,13 +796,13 @@ fn greeted(board: &'static Board) -> Emulated {
 }
 
 /// Moves of 0.03 mm at 100 mm/s: 3,333 blocks a second. With a jerk limit the board makes as many, and none comes
-/// late.
+/// late. Turning takes two thirds of the acceleration: ramps have 420 of 500 mm/s^2, which makes 1.10 of the ideal time.
 #[test]
 #[ignore = "needs the emulator, which `cargo xtask test` installs"]
 fn tiny_moves_are_as_fast_as_could_be() {
     let [free, limited] = [1e6, 5e3].map(tiny_moves);
     println!("{free:.3}, {limited:.3}");
-    assert!(free < 1.05 && limited < 1.15, "{free}, {limited}");
+    assert!(free < 1.15 && limited < 1.15, "{free}, {limited}");
 }
 
 /// Returns the time of the moves under a jerk limit, over the ideal time without a limit.

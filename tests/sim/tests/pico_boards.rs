@@ -200,7 +200,7 @@ fn directions_of_a_picocnc_stand_before_and_behind_pulses() {
             lines += "g2 x1 i-4\ng3 x9 i4\nx9.01\nx9\ny0 x0\nx9 y5\n";
         }
         board.send_to(USB, lines.as_bytes());
-        let recorded = board.record_for_ms(2_000).unwrap();
+        let recorded = board.record_for_ms(4_000).unwrap();
         let [hold, setup] = [recorded.hold, recorded.setup].map(|least| least.unwrap() / 128.0);
         let pulse = recorded.shortest.unwrap() / 128.0;
         println!("{pulse:.2} us, {hold:.2} us behind, {setup:.2} us before");

@@ -21,8 +21,8 @@ const FLAGS: &str = "-C linker=ld.lld -C link-arg=-Tlink.x -C link-arg=-Tlink-rp
 
 /// Flash that the image may take: 2 MiB minus the part of `memory.x` that stores settings.
 const FLASH: u64 = (2 << 20) - (68 << 10);
-/// RAM for statics and for code, of 256 KiB; the rest is for the stack (`src/hal/rp2040/memory.x`).
-const STATIC_RAM: u64 = 244 << 10;
+/// RAM for statics and for code, of 264 KiB; the rest is for the stack (`src/hal/rp2040/memory.x`).
+const STATIC_RAM: u64 = 252 << 10;
 
 /// The sizes of an image, bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
