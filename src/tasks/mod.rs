@@ -45,7 +45,7 @@ pub mod wake;
 pub use crate::hal::Never;
 
 /// Tasks that wait for a time. `xtask/src/layers.rs` checks that the list is complete.
-pub const WAIT_FOR_TIME: [&str; 3] = ["power", "reporter", "storage"];
+pub const WAIT_FOR_TIME: [&str; 4] = ["planner/merge", "power", "reporter", "storage"];
 const _: () = assert!(
     WAIT_FOR_TIME.len() <= avr_embassy::timers::TIMERS,
     "more tasks wait for a time than the runtime has timers, and would poll: turn on the feature `timers-8` of avr-embassy in Cargo.toml"

@@ -7,6 +7,10 @@
 //! stores its end. Either the next line joins the chain, or the chain becomes a block and the line begins another
 //! chain. A chain of less than half a step becomes no block: the next line then begins where the chain did.
 //!
+//! **Blending.** On a chip that [blends](crate::motion::blend) lines also wait in its stage, while others run and at the
+//! start of motion: for [`STALE_MS`] after the last of them, [`START_MS`] in all. While others run they go to the queue
+//! before exec brakes for its end.
+//!
 //! **Nothing waits long.** A chain becomes a block when the last block runs, and before anything that is not a line.
 //! [`STALE_MS`] after its last line it also becomes a block at the next block or at the next turn of the power task. So
 //! positions at stops are exact, and the last line of a program is not delayed, because exec is some milliseconds ahead
