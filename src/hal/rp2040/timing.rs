@@ -29,6 +29,7 @@ impl Timing for Chip {
     const SHORT_SHARE: f32 = 1.0;
     const STAGE: usize = 64;
     const BLEND_S_MIN: f32 = 0.000_8;
-    const LOOK_AHEAD: usize = 768;
+    // Blocks of six motors take more RAM.
+    const LOOK_AHEAD: usize = if MOTORS > 5 { 704 } else { 768 };
     const LINE_BYTES: [usize; 2] = [2_088, 1_040];
 }
