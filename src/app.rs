@@ -57,7 +57,7 @@ impl Links {
             commands: RefCell::new(Commands::default()),
             commands_taken: Cell::new(false),
             planner_wake: Wake::default(),
-            chain_waits: Cell::new(false),
+            moves_wait: Cell::new(false),
             last: Cell::new(Last::Other),
             cycle_start: Wake::default(),
             notices: Notices::default(),

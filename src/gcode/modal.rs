@@ -190,9 +190,12 @@ pub const TOLERANCE_MAX: u16 = 10_000;
 /// How far merged moves may deviate from the path with G64 without P: 1 um.
 const MERGED: u8 = 10;
 /// The greatest deviation of merged moves.
-pub const MERGED_MAX: u8 = 254;
-/// How far rounded corners may deviate from the path with G64 without P: 0.05 mm.
+const MERGED_MAX: u8 = 254;
+/// How far the tool may be off the path with G64 without P where corners are rounded: 0.05 mm.
 const ROUNDED: u16 = 500;
+/// How far merged moves may deviate from the path then: 2.5 um. Moves of 0.03 mm whose ends are rounded to 0.001 mm zigzag
+/// by 0.03 rad, which looks like acceleration. Merged moves do not.
+const MERGED_WHERE_ROUNDED: u16 = 25;
 
 /// Group 7 of the M codes: how the spindle turns.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -301,14 +304,21 @@ impl Modal {
         }
     }
 
-    /// Returns how far the tool may be off the path, in units of [`Length`](crate::units::Length).
-    pub fn deviation(&self) -> u16 {
-        if self.tolerance == USUAL { ROUNDED } else { self.tolerance }
+    /// Returns the value for [`Commands::blend`](super::command::Commands::blend) where corners are rounded: a quarter of
+    /// P is for moves that are merged.
+    pub fn blend_where_rounded(&self) -> u8 {
+        let merged = match self.tolerance {
+            USUAL => MERGED_WHERE_ROUNDED,
+            tolerance => tolerance / 4,
+        };
+        u8::try_from(merged).map_or(MERGED_MAX, |merged| merged.min(MERGED_MAX)) + 1
     }
 
-    /// Whether G64 has set no P.
-    pub fn has_usual_deviation(&self) -> bool {
-        self.tolerance == USUAL
+    /// Returns how far rounded corners may be off the path, in units of [`Length`](crate::units::Length): three quarters
+    /// of P.
+    pub fn rounded(&self) -> u16 {
+        let deviation = if self.tolerance == USUAL { ROUNDED } else { self.tolerance };
+        deviation - deviation / 4
     }
 
     /// Returns the modes at power-up: the defaults, and G8 G80 G91.1 G94 G97 G98 M5 M9.

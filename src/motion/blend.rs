@@ -86,7 +86,7 @@ const ONE: f32 = junction::ONE as f32;
 const WEIGHT: f32 = 256.0;
 
 /// Whether a line of this length, mm, takes too little time at its velocity to be blended: each line looks at all those that
-/// waits within its windows, and the planner has no time for so many. Its corners are those of a chip that does not blend.
+/// wait within its windows, and the planner has no time for so many. Its corners are those of a chip that does not blend.
 pub fn is_dense(length: f32, cruise: f32) -> bool {
     below(length, cruise * BLEND_S_MIN)
 }

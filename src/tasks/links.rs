@@ -67,7 +67,7 @@ pub struct Links {
     /// A line has left a pool. The reader waits for this when a pool is full.
     pub pool_space: Wake,
     /// Lines wait for more: a chain, or lines to be blended. The power task then wakes the planner.
-    pub chain_waits: Cell<bool>,
+    pub moves_wait: Cell<bool>,
     /// Changes that the planner handles before the next line.
     pub changes: Changes,
     /// The built-in job that runs.

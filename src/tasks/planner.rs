@@ -205,7 +205,7 @@ pub fn run(links: &'static Links, shared: &'static Shared) -> impl Future<Output
                 }
             }
             // In this order, because a line is told to wait or to be carried out at any time.
-            links.chain_waits.set(planner.has_waiting());
+            links.moves_wait.set(planner.has_waiting());
             links.commands_taken.set(false);
             if planner.is_flushed() {
                 planner.queue.drop_staged();
@@ -217,7 +217,7 @@ pub fn run(links: &'static Links, shared: &'static Shared) -> impl Future<Output
                     }
                     parser::end_program(links, resets);
                 }
-                links.chain_waits.set(planner.has_waiting());
+                links.moves_wait.set(planner.has_waiting());
             }
             links.parser_wake.signal();
         }
@@ -234,7 +234,7 @@ pub fn take_at_once(planner: &mut Planner) -> bool {
     }
     let waited = planner.has_waiting();
     let done = planner.carry_out_at_once();
-    planner.links.chain_waits.set(planner.has_waiting());
+    planner.links.moves_wait.set(planner.has_waiting());
     if planner.has_waiting() {
         if queue::used_here() <= 1 {
             // Exec may have finished a block of which the planner's task has not been told yet.
@@ -695,8 +695,7 @@ impl Planner {
     #[inline(never)]
     #[small]
     fn keep_to_deviation(&mut self) {
-        let deviation = self.links.model.borrow().modal().deviation();
-        let deviation = f32::from(deviation - merge::share(deviation)) * 1e-4;
+        let deviation = f32::from(self.links.model.borrow().modal().rounded()) * 1e-4;
         if let Some(stage) = self.queue.stage()
             && stage.deviation().to_bits() != deviation.to_bits()
         {

@@ -36,7 +36,7 @@ pub async fn run(links: &'static Links) -> ! {
         if uart::sees_opening() {
             system::set_rests(rests(links));
         }
-        if links.chain_waits.get() {
+        if links.moves_wait.get() {
             // The lines may have waited long enough.
             links.planner_wake.signal();
         }

@@ -103,8 +103,7 @@ impl Seen {
     /// Returns the present state of the machine. Thread mode.
     fn now(links: &Links, settings: &Settings) -> Self {
         // In this order, because exec may begin a queued block in between.
-        let taken = links.commands_taken.get();
-        let queued = links.chain_waits.get() || queue::used() > 0;
+        let (taken, queued) = (links.commands_taken.get(), has_moves(links));
         let mut motion = snapshot(links.thread).moment();
         let runs = queued || motion.running;
         if !runs {
@@ -114,9 +113,14 @@ impl Seen {
     }
 }
 
+/// Whether moves wait for more, or blocks in the queue.
+fn has_moves(links: &Links) -> bool {
+    links.moves_wait.get() || queue::used() > 0
+}
+
 /// Whether a line waits to be carried out, or a block of it.
 fn is_queued(links: &Links) -> bool {
-    links.commands_taken.get() || links.chain_waits.get() || queue::used() > 0
+    links.commands_taken.get() || has_moves(links)
 }
 
 #[small]

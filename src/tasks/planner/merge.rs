@@ -22,7 +22,6 @@ use embassy_futures::select::{Either, select};
 
 use super::{Begun, Parts, Planner, Shared, Turn};
 use crate::gcode::command::{Commands, Feed};
-use crate::gcode::modal::MERGED_MAX;
 use crate::hal::after_ms;
 use crate::hal::event::{Event, wait};
 use crate::hal::time::millis;
@@ -49,15 +48,6 @@ const ALONE: u8 = 8;
 const LONG: u8 = 64;
 /// See [`LONG`]. A power of two.
 const SELDOM: u8 = 32;
-
-/// How far merged moves may be off the path without P where corners are rounded, in units of [`Length`]. Lines of 0.03 mm
-/// whose ends are rounded to 0.001 mm zigzag by 0.03 rad, which looks like acceleration. Merged lines do not.
-const ROUNDED: u16 = 25;
-
-/// Returns how much of P is for moves that are merged, where corners are rounded within P.
-pub(super) fn share(deviation: u16) -> u16 {
-    deviation / 4
-}
 
 impl Planner {
     /// Whether a chain waits for the next line.
@@ -86,17 +76,13 @@ impl Planner {
         self.alone <= ALONE || self.alone & (each - 1) == 0
     }
 
-    /// Returns how far merged moves may be off the path, as [`Commands::blend`]: less than P where corners are rounded
-    /// within P, but enough for coordinates that are rounded to 0.001 mm.
+    /// Returns how far merged moves may be off the path, as [`Commands::blend`].
     #[inline(always)]
     pub(super) fn merged(&self, commands: &Commands) -> u8 {
-        if commands.blend == 0 || !self.queue.blends() {
-            return commands.blend;
+        match self.queue.blends() {
+            true if commands.blend != 0 => self.links.model.borrow().modal().blend_where_rounded(),
+            _ => commands.blend,
         }
-        let model = self.links.model.borrow();
-        let most = share(model.modal().deviation());
-        let least = if model.modal().has_usual_deviation() { ROUNDED } else { most };
-        u8::try_from(most.min(least).min(u16::from(MERGED_MAX))).map_or(0, |most| most + 1)
     }
 
     /// Begins a chain with a line. Returns false if the line cannot be merged with lines that follow.
@@ -126,7 +112,7 @@ impl Planner {
     pub(super) fn wait_for_more(&mut self, line: u32) {
         self.line = line;
         self.waits_from_now();
-        self.links.chain_waits.set(true);
+        self.links.moves_wait.set(true);
     }
 
     /// Notes that a line waits for the next one from now on.
@@ -195,12 +181,15 @@ impl Planner {
             while self.has_announced() {
                 self.tell();
             }
+            let last = self.waits_since;
             self.build_chain(false);
+            // No line has come.
+            self.waits_since = last;
             if self.stage_is_due() {
                 self.let_go(false);
             }
         }
-        self.links.chain_waits.set(self.has_waiting());
+        self.links.moves_wait.set(self.has_waiting());
     }
 
     /// Whether what waits is not to wait any longer, and there is room for it and for the blocks of changed settings.
