@@ -35,11 +35,13 @@ pub enum Capability {
     Drivers,
     /// Moves that follow the plane of a tilted bed: G29 and M420.
     BedPlane,
+    /// Backlash compensation: the settings `xbl` to `abl`.
+    Backlash,
 }
 
 impl Capability {
     /// All capabilities.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 14] = [
         Self::Cycles,
         Self::Boring,
         Self::Probing,
@@ -53,6 +55,7 @@ impl Capability {
         Self::CardWrite,
         Self::Drivers,
         Self::BedPlane,
+        Self::Backlash,
     ];
 
     /// Whether this image has the capability.
@@ -72,6 +75,7 @@ impl Capability {
             Self::CardWrite => cfg!(feature = "card-write"),
             Self::Drivers => cfg!(feature = "drivers"),
             Self::BedPlane => cfg!(feature = "bed-plane"),
+            Self::Backlash => cfg!(feature = "backlash"),
         }
     }
 
@@ -98,6 +102,7 @@ impl Capability {
             Self::CardWrite => "card-write",
             Self::Drivers => "drivers",
             Self::BedPlane => "bed-plane",
+            Self::Backlash => "backlash",
         }
     }
 }

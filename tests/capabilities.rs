@@ -93,6 +93,7 @@ fn the_machine_says_that_it_lacks_something() {
         (Capability::Printer, "m104s0"),
         (Capability::Printer, "m107"),
         (Capability::CoreXy, "{1ma:6}"),
+        (Capability::Backlash, "{xbl:0.1}"),
         (Capability::Help, "{h:n}"),
         (Capability::Jobs, "{test:3}"),
     ] {

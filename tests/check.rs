@@ -347,8 +347,8 @@ fn a_print_is_judged_as_a_print() {
     }
     assert!(text.contains("line 11: G1 X6 E2\n    echo: cold extrusion"), "{text}");
     assert!(text.contains("line 12: M104 S900\n    Error:"), "{text}");
-    // A line without F has that of the line before, 1,500 mm/min in the first one: 40 mm take 1.6 s, and a ramp.
-    let (text, ok) = judged("no-f.gcode", b"M104 S0\nG1 X40\n", &["--machine", "printer"]);
+    // A line without F has that of the line before, 1,500 mm/min in the first one: 42 mm take 1.68 s, and a ramp.
+    let (text, ok) = judged("no-f.gcode", b"M104 S0\nG1 X42\n", &["--machine", "printer"]);
     assert!(ok && text.contains("time 0:00:01.7"), "{text}");
     let (text, ok) = judged("no-f.nc", b"G1 X40\nG1 X20 F1200\n", &["--machine", "router"]);
     assert!(!ok && text.contains(", without the refused lines"), "{text}");

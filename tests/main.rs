@@ -74,6 +74,7 @@ mod wiring;
 mod advance;
 mod alarm_packets;
 mod arc_props;
+mod backlash;
 mod bed;
 mod blend;
 mod builder;

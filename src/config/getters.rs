@@ -87,6 +87,12 @@ impl Settings {
         self.axis(axis, axis::AC) as f32 * (0.1 * 3_600.0)
     }
 
+    /// Backlash of an axis; 0 for none. On a CoreXY machine that of X or Y is the backlash of a motor.
+    pub fn backlash(&self, axis: usize) -> Length {
+        let built_in = Capability::Backlash.is_built_in();
+        Length(if built_in { self.homing(axis, axis::BL) } else { 0 })
+    }
+
     /// Jerk limit while homing and probing, mm or degrees per minute cubed.
     pub fn jerk_homing(&self, axis: usize) -> f32 {
         self.homing(axis, axis::JH) as f32 * 1e3

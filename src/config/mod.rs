@@ -30,6 +30,7 @@ pub use words::Words;
 
 use crate::baud;
 use crate::boards::MOTORS;
+use crate::capability::Capability;
 use crate::kinematics;
 use crate::status::Status;
 use crate::units::{AXES, FIRST_ROTARY};
@@ -127,6 +128,9 @@ impl Settings {
     #[small]
     pub fn check(&self, setting: Setting, number: Number, inches: bool) -> Result<i32, Status> {
         let row = setting.row();
+        if !Capability::Backlash.is_built_in() && setting.is_backlash() {
+            return Err(Status::NotBuiltIn);
+        }
         if matches!(row.kind, Kind::Constant | Kind::Text) {
             return Err(Status::ReadOnly);
         }

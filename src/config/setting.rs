@@ -382,6 +382,12 @@ impl Setting {
         matches!(self.owner(), Owner::Motor(_)) || self.row().is(IDLE)
     }
 
+    /// Whether this is `bl`, the backlash of an axis.
+    pub fn is_backlash(self) -> bool {
+        matches!(self.owner(), Owner::Axis(_))
+            && self.index() == const { row_of(&axis::LIST, "bl") }
+    }
+
     /// Whether this is `baud`, the rate of the serial line.
     pub fn is_baud(self) -> bool {
         self.0 == const { row_of(&system::LIST, "baud") }
@@ -615,10 +621,13 @@ mod tests {
             let rows = (0..owner.rows()).filter_map(|row| Setting::of(owner, row));
             rows.map(|s| String::from_utf8(s.name().bytes()[1..].to_vec()).unwrap()).collect()
         };
-        assert_eq!(list(Owner::Axis(0)).join(" "), "am vm fr tn tm jm jh jd sn sx sv lv lb zb ac");
+        assert_eq!(
+            list(Owner::Axis(0)).join(" "),
+            "am vm fr tn tm jm jh jd sn sx sv lv lb zb ac bl"
+        );
         assert_eq!(
             list(Owner::Axis(3)).join(" "),
-            "am vm fr tn tm jm jh jd ra sn sx sv lv lb zb ac"
+            "am vm fr tn tm jm jh jd ra sn sx sv lv lb zb ac bl"
         );
         assert_eq!(list(Owner::Axis(5)).join(" "), "am vm fr tn tm jm jd ra ac");
         assert_eq!(list(Owner::Motor(2)).join(" "), "ma sa tr mi po pm sp");

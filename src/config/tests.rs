@@ -168,8 +168,9 @@ fn ram_is_accounted_for() {
     // The status and the padding behind it.
     let drives = drive::DRIVERS * 6;
     let bed = bed::BEDS * 48;
-    assert_eq!(size_of::<Settings>(), 436 + heating + drives + bed);
-    assert!(size_of::<SettingRow>() * 51 + (28 + 7 * 4 + 16 * 6) * 4 < 2048);
+    let backlash = if Capability::Backlash.is_built_in() { 16 } else { 0 };
+    assert_eq!(size_of::<Settings>(), 436 + heating + drives + bed + backlash);
+    assert!(size_of::<SettingRow>() * 52 + (28 + 7 * 4 + 17 * 6) * 4 < 2048);
 }
 
 proptest! {

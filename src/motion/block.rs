@@ -6,6 +6,7 @@
 //! has 30 bytes on AVR.
 
 use super::advance::Lead;
+use super::backlash::Slack;
 use super::factors::{Factors, Reserve};
 use super::float::size;
 use super::pace::Drivers;
@@ -46,6 +47,7 @@ impl Block {
                     | QueuedAction::PerTurn(_)
                     | QueuedAction::Heat(_)
                     | QueuedAction::Advance(_)
+                    | QueuedAction::Backlash(_)
                     | QueuedAction::Origin(_)
             )
         )
@@ -143,6 +145,8 @@ pub enum QueuedAction {
     Heat(Heat),
     /// M900: sets the extruder's lead. Does not stop the machine.
     Advance(Lead),
+    /// The backlash of the motors, from their next reversal on. Does not stop the machine.
+    Backlash([Slack; MOTORS]),
     /// The origin of the lines from here on, for reports. Does not stop the machine.
     Origin(Origin),
     /// The means for the motion from here on. Done at a standstill.

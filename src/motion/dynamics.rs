@@ -40,6 +40,10 @@ pub trait MachineLimits {
     fn junction_deviation(&self, axis: usize) -> f32;
     /// Junction acceleration, mm/min^2.
     fn junction_acceleration(&self) -> f32;
+    /// Whether an axis has [backlash](super::backlash).
+    fn has_backlash(&self) -> bool {
+        false
+    }
     /// The pulse width and direction set-up time of the drivers.
     fn drivers(&self) -> Drivers {
         Drivers::USUAL
@@ -156,6 +160,10 @@ impl Dynamics {
             self.merges &= is_coarse(machine.ratio(m));
         }
         self.spans = Spans::of(self.build_up());
+        if machine.has_backlash() {
+            // The take-up needs a mean, also where no jerk limit has an effect.
+            self.spans = self.spans.and_corner();
+        }
         self.junction = machine.junction_acceleration() * PER_SECOND_SQUARED;
         let drivers = machine.drivers();
         for (others, rate) in self.rates.iter_mut().enumerate() {

@@ -29,13 +29,14 @@
 mod sampled;
 mod spindle;
 
+use super::backlash::Backlash;
 use super::block::{Block, Body, Line, QueuedAction};
 use super::float::{below, greater, lesser, scaled, some, whole};
 use super::governor::{Governor, Stretch, same};
 use super::prep::{CYCLES_MAX, FINE_LOG2, Prep};
 use super::queue::BlockSource;
 use super::sampler::Sampler;
-use super::smooth::Smooth;
+use super::smooth::{Smooth, Spans};
 use super::snapshot::{Program, Snapshot};
 use super::thread::Thread;
 use crate::capability::Capability;
@@ -201,6 +202,9 @@ pub struct Exec {
     prep: Prep,
     sampler: Sampler,
     smooth: Smooth,
+    backlash: Backlash,
+    /// A line waits for the take-up at a standstill. These are its means, in whose place others are meanwhile.
+    lent: Option<Spans>,
     // Last of all, because few lines need it.
     follows: Follows,
 }
@@ -226,6 +230,8 @@ impl Exec {
             governor: Governor::new(),
             sampler: Sampler::new(),
             smooth: Smooth::new(),
+            backlash: Backlash::new(),
+            lent: None,
             running,
             hold: false,
             coarse: false,
@@ -274,6 +280,9 @@ impl Exec {
                     return Step::Segment;
                 }
                 return self.idle(standstill, out);
+            }
+            if Capability::Backlash.is_built_in() && self.takes_up(blocks, out, segment) {
+                return Step::Segment;
             }
             if !self.begin(blocks, out)
                 && let Some(block) = blocks.oldest()
@@ -369,7 +378,7 @@ impl Exec {
     /// segment that [`Prep`] held back, which has not been queued. `out.target` is then where the queued segments and
     /// the returned one end; [`Dda::settle`](crate::dda::Dda::settle) makes the last steps made the position.
     ///
-    /// Blocks that set drivers, means, pressure advance, G95 or the origin still take effect, as do those that set the position before the
+    /// Blocks that set drivers, means, backlash, pressure advance, G95 or the origin still take effect, as do those that set the position before the
     /// first dropped line, dwell, output or stop.
     ///
     /// Cost: 600 a block.
@@ -380,6 +389,10 @@ impl Exec {
         let held = self.prep.cut(&mut out.target);
         self.sampler.clear();
         self.smooth.clear();
+        if Capability::Backlash.is_built_in() {
+            self.backlash.stop();
+            self.give_back();
+        }
         self.running.active = false;
         self.dwell_ms = 0;
         let keeps = match &mut self.follows {
@@ -417,6 +430,7 @@ impl Exec {
                 }
                 Body::QueuedAction(QueuedAction::Origin(origin)) => out.origin = *origin,
                 Body::QueuedAction(QueuedAction::Smooth(spans)) => self.smooth.set(*spans),
+                Body::QueuedAction(QueuedAction::Backlash(slacks)) => self.backlash.set(slacks),
                 Body::QueuedAction(
                     QueuedAction::SetPosition(_)
                     | QueuedAction::Override(_)
@@ -480,6 +494,7 @@ impl Exec {
             QueuedAction::Origin(origin) => out.origin = *origin,
             QueuedAction::Drivers(drivers) => self.prep.set_drivers(*drivers),
             QueuedAction::Smooth(spans) => self.smooth.set(*spans),
+            QueuedAction::Backlash(slacks) => self.backlash.set(slacks),
             QueuedAction::Advance(lead) if Capability::Printer.is_built_in() => {
                 self.prep.set_lead(lead)
             }
@@ -569,6 +584,9 @@ impl Exec {
         running.fresh = true;
         running.done = false;
         self.governor.begin(line.accel.get());
+        if Capability::Backlash.is_built_in() {
+            self.backlash.turn(&line.way);
+        }
         if self.is_sampled() {
             self.begin_sampled(line, out);
         } else {

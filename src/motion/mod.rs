@@ -7,6 +7,7 @@
 //! ```
 
 pub mod advance;
+pub mod backlash;
 pub mod blend;
 pub mod block;
 pub mod chain;

@@ -49,7 +49,7 @@ const CORNER_MS: u8 = 16;
 pub const CORNER_S: f32 = CORNER_MS as f32 * 1e-3;
 
 /// Samples of the mean that rounds corners.
-const CORNER: u8 = CORNER_MS / SAMPLE_MS;
+pub const CORNER: u8 = CORNER_MS / SAMPLE_MS;
 const _: () = assert!(CORNER * SAMPLE_MS == CORNER_MS, "a mean is a whole number of samples");
 
 /// The most samples of the mean that limits jerk.
@@ -88,6 +88,12 @@ impl Spans {
     pub fn alone(seconds: f32) -> Self {
         let samples = whole(seconds * (1.0 / SAMPLE_S) + 0.98);
         Self { corner: 1, jerk: samples.clamp(1, JERK_MOST.into()) as u8 }
+    }
+
+    /// Returns these means, and the one that rounds corners.
+    #[inline(always)]
+    pub fn and_corner(self) -> Self {
+        Self { corner: CORNER, ..self }
     }
 
     /// Whether there is a mean.

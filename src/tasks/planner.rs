@@ -60,6 +60,8 @@ use crate::motion::queue::{self, BlockQueue, CAPACITY};
 use crate::motion::smooth::Spans;
 use crate::status::Status;
 use crate::units::{AXES, Length, PerAxis};
+#[cfg(feature = "backlash")]
+use crate::{boards::MOTORS, motion::backlash::Slack, tasks::setup::slack_of};
 
 /// The planner's own state.
 // In this order: AVR reaches a field within 63 bytes of the first in one instruction.
@@ -91,6 +93,9 @@ pub struct Planner {
     spans: Spans,
     /// The last move ends in an exact stop, at which the means are to be empty.
     stops: bool,
+    /// Exec has been told of a backlash.
+    #[cfg(feature = "backlash")]
+    has_backlash: bool,
     /// A heater or the fan has been switched on since the last end of a program.
     #[cfg(feature = "printer")]
     heats: bool,
@@ -121,6 +126,8 @@ enum Announcement {
     None,
     /// The relation of steps to positions has changed: positions in steps are computed again.
     Position,
+    /// The backlash of motors may have changed.
+    Backlash,
     /// The demands of the drivers may have changed.
     Drivers,
     /// The means have changed.
@@ -266,6 +273,8 @@ impl Planner {
             drivers: Drivers::USUAL,
             spans: Spans::NONE,
             stops: false,
+            #[cfg(feature = "backlash")]
+            has_backlash: false,
             outputs: Outputs { on: 0, speed: 0.0 },
             has_surface: false,
             per_turn: false,
@@ -351,7 +360,10 @@ impl Planner {
         let smooths = self.stops || self.wanted_spans(&commands) != self.spans;
         match self.announcement {
             // That of the means follows.
-            Announcement::Position | Announcement::Drivers | Announcement::Smooth => {}
+            Announcement::Position
+            | Announcement::Backlash
+            | Announcement::Drivers
+            | Announcement::Smooth => {}
             _ if smooths && commands.moves() => self.announcement = Announcement::Smooth,
             Announcement::None => self.announcement = Announcement::Origin,
             Announcement::Lead | Announcement::Origin => {}
@@ -370,6 +382,9 @@ impl Planner {
             self.dynamics.rounds = self.spans.is_some();
             self.let_go(false);
             self.set_blend();
+            if self.knows_backlash() {
+                self.announcement = Announcement::Backlash;
+            }
         }
         self.outputs.on ^= self.links.changes.take_flipped();
         if self.links.changes.has(Changes::STEPS) {
@@ -598,6 +613,14 @@ impl Planner {
                 let position = self.position;
                 self.set_position(&position);
                 self.links.changes.note(Changes::ORIGIN);
+                self.announcement = match self.knows_backlash() {
+                    true => Announcement::Backlash,
+                    false => Announcement::Drivers,
+                };
+            }
+            Announcement::Backlash => {
+                #[cfg(feature = "backlash")]
+                self.set_backlash();
                 self.announcement = Announcement::Drivers;
             }
             Announcement::Drivers => {
@@ -660,6 +683,34 @@ impl Planner {
         let action = self.builder.set_position(position, &*settings);
         drop(settings);
         self.push(Block::action(action, self.line));
+    }
+
+    /// Whether an axis has backlash, or exec has been told of one.
+    #[inline(never)]
+    #[small]
+    fn knows_backlash(&self) -> bool {
+        #[cfg(feature = "backlash")]
+        let has = self.has_backlash;
+        #[cfg(not(feature = "backlash"))]
+        let has = false;
+        has || MachineLimits::has_backlash(&*self.links.settings.borrow())
+    }
+
+    /// Tells exec the backlash of the motors, unless there is none and has been none.
+    #[cfg(feature = "backlash")]
+    #[inline(never)]
+    #[small]
+    fn set_backlash(&mut self) {
+        let settings = self.links.settings.borrow();
+        let mut slacks = [Slack::NONE; MOTORS];
+        for (motor, slack) in slacks.iter_mut().enumerate() {
+            *slack = slack_of(&settings, motor);
+        }
+        let has = slacks.iter().any(|slack| slack.width != 0);
+        drop(settings);
+        if core::mem::replace(&mut self.has_backlash, has) || has {
+            self.push_aside(QueuedAction::Backlash(slacks));
+        }
     }
 
     /// Tells exec what the drivers demand, if that has changed.

@@ -13,9 +13,12 @@ use crate::gcode::modal::{Defaults, Distance, PathMode, Plane, Units};
 use crate::gcode::setup::{AxisMode, Setup};
 use crate::hal::{encoder, inputs as pins};
 use crate::kinematics::{self, DIFFERENCE, SUM};
-use crate::motion::dynamics::MachineLimits;
+use crate::motion::backlash::{KEPT, KEPT_VELOCITY, Slack, WIDTH_MOST, pace};
+use crate::motion::block::PARTS_LOG2;
+use crate::motion::dynamics::{MachineLimits, PER_SECOND_SQUARED};
 use crate::motion::line::Motors;
 use crate::motion::pace::Drivers;
+use crate::motion::smooth::SAMPLE_S;
 use crate::status::Status;
 use crate::units::{AXES, Length, PerAxis};
 
@@ -202,16 +205,20 @@ impl Motors for Settings {
 
 impl MachineLimits for Settings {
     fn velocity_max(&self, axis: usize) -> f32 {
-        Settings::velocity_max(self, axis)
+        kept(self, axis, Settings::velocity_max(self, axis), KEPT_VELOCITY)
     }
     fn feedrate_max(&self, axis: usize) -> f32 {
-        Settings::feedrate_max(self, axis)
+        kept(self, axis, Settings::feedrate_max(self, axis), KEPT_VELOCITY)
     }
     fn jerk_max(&self, axis: usize) -> f32 {
-        Settings::jerk_max(self, axis)
+        kept(self, axis, Settings::jerk_max(self, axis), KEPT)
     }
     fn accel_max(&self, axis: usize) -> f32 {
-        Settings::accel_max(self, axis)
+        kept(self, axis, Settings::accel_max(self, axis), KEPT)
+    }
+    #[inline(always)]
+    fn has_backlash(&self) -> bool {
+        Capability::Backlash.is_built_in() && (0..AXES).any(|axis| has_backlash(self, axis))
     }
     fn junction_deviation(&self, axis: usize) -> f32 {
         Settings::junction_deviation(self, axis)
@@ -221,6 +228,42 @@ impl MachineLimits for Settings {
     }
     fn drivers(&self) -> Drivers {
         Drivers { pulse_us: self.step_pulse_us(), setup_us: self.direction_setup_us() }
+    }
+}
+
+/// Returns the `share` of a limit that an axis with backlash has for its path; all of it on another axis.
+#[inline(always)]
+fn kept(settings: &Settings, axis: usize, limit: f32, share: f32) -> f32 {
+    let shares = Capability::Backlash.is_built_in() && has_backlash(settings, axis);
+    if shares { limit * share } else { limit }
+}
+
+/// Whether a motor that an axis turns has backlash.
+#[inline(never)]
+#[small]
+fn has_backlash(settings: &Settings, axis: usize) -> bool {
+    let has = |axis| settings.backlash(axis) != Length::ZERO;
+    let shared = Capability::CoreXy.is_built_in() && axis < 2 && (has(0) || has(1));
+    has(axis)
+        || shared && (0..MOTORS).any(|motor| kinematics::is_shared(settings.motor_axis(motor)))
+}
+
+/// Returns the backlash of a motor. An axis without motor, or an inhibited one, has none.
+#[inline(never)]
+#[small]
+pub fn slack_of(settings: &Settings, motor: usize) -> Slack {
+    let axis = usize::from(kinematics::stands_for(moved_by(settings, motor)));
+    let (width, ratio) = (settings.backlash(axis), settings.step_ratio(motor));
+    if width == Length::ZERO {
+        return Slack::NONE;
+    }
+    let velocity = MachineLimits::velocity_max(settings, axis) * (1.0 / 60.0);
+    let accel = MachineLimits::accel_max(settings, axis) * PER_SECOND_SQUARED;
+    // In 1/16 step: sixteen times the way in a sample.
+    let way = pace(velocity, accel) * (SAMPLE_S * (1 << PARTS_LOG2) as f32 * 1e4);
+    Slack {
+        width: ratio.steps(width).clamp(0, WIDTH_MOST.into()) as u16,
+        pace: ratio.steps(Length(way as i32)).clamp(1, u8::MAX.into()) as u8,
     }
 }
 

@@ -32,8 +32,11 @@ use crate::store::{Log, Memory, record, tables};
 use crate::units::{AXES, Length, PerAxis};
 
 /// How many keys have no record if every setting and every value of all 21 rows on six axes has been set: then a line
-/// is refused with status 34. The settings of drivers add 15 such keys. The program's area could give up the room.
-const LEFT_OUT: u16 = if Capability::Drivers.is_built_in() { 32 } else { 17 };
+/// is refused with status 34. The settings of drivers add 15 such keys, backlash 4. The program's area could give up the
+/// room.
+const LEFT_OUT: u16 = 17
+    + if Capability::Drivers.is_built_in() { 15 } else { 0 }
+    + if Capability::Backlash.is_built_in() { 4 } else { 0 };
 const _: () = assert!(
     kept::KEYS < Eeprom::LOG / record::SIZE + LEFT_OUT,
     "the log of the EEPROM has too few records for what is kept: make `AREA` of src/store/program.rs smaller by 11 bytes for each"

@@ -59,12 +59,18 @@ struct Motion {
     motors: [Motor; MOTORS],
     /// For each axis: its mode and its radius.
     axes: [(i64, f64); AXES.len()],
+    /// The backlash of each axis.
+    backlash: [f64; AXES.len()],
 }
 
 impl Motion {
     /// The settings of a machine.
     fn of(machine: u8) -> Self {
-        let mut motion = Self { motors: Default::default(), axes: [(0, 0.0); AXES.len()] };
+        let mut motion = Self {
+            motors: Default::default(),
+            axes: [(0, 0.0); AXES.len()],
+            backlash: [0.0; AXES.len()],
+        };
         for setting in (0..Setting::NUMBERS).filter_map(Setting::from_number) {
             if matches!(setting.owner(), Owner::Motor(_) | Owner::Axis(_)) {
                 motion.set(setting, setting.value_on(machine).into());
@@ -90,6 +96,9 @@ impl Motion {
                 }
             }
             Owner::Axis(axis) => {
+                if &token[..2] == b"bl" {
+                    self.backlash[usize::from(axis)] = value;
+                }
                 let axis = &mut self.axes[usize::from(axis)];
                 match &token[..2] {
                     b"am" => axis.0 = kept,
@@ -124,10 +133,20 @@ impl Motion {
         if self.motors[motor].axis == axis as i64 { self.ratio(motor) * way } else { 0.0 }
     }
 
-    /// Whether every move is refused, because some motor has too many steps in a unit. A motor counts even if it
-    /// moves no axis.
-    fn is_too_fine(&self) -> bool {
-        (0..MOTORS).any(|motor| self.ratio(motor) > FINEST)
+    /// Returns the steps that a motor makes in addition where an axis turns round; at most 4,095.
+    fn backlash(&self, motor: usize, axis: usize, way: f64) -> f64 {
+        if self.motors[motor].axis != axis as i64 {
+            return 0.0;
+        }
+        (self.ratio(motor) * self.backlash[axis]).abs().min(4_095.0).copysign(way)
+    }
+
+    /// Returns the largest coordinate: smaller if some motor has several steps in 0.0001, and 0 if it has too many. A
+    /// motor counts even if it moves no axis.
+    fn reach(&self) -> f64 {
+        let finest = (0..MOTORS).map(|motor| self.ratio(motor)).fold(0.0, f64::max);
+        let octaves = (finest * 1e-4).log2().ceil().max(0.0);
+        if finest > FINEST { 0.0 } else { FARTHEST / octaves.exp2() }
     }
 }
 
@@ -240,7 +259,8 @@ impl<S: Side> Bench<S> {
         let to = self.side.steps();
         let refused = match status {
             0 => false,
-            110 => self.motion.is_too_fine() || self.motion.way(axis, way).abs() > FARTHEST,
+            // A move may have been made before it.
+            110 => 2.1 * self.motion.way(axis, way).abs() >= self.motion.reach(),
             137 => self.motion.axes[axis].0 == 0,
             _ => false,
         };
@@ -253,7 +273,9 @@ impl<S: Side> Bench<S> {
             let due = if self.motion.motors[motor].turned { due.copysign(made) } else { due };
             // Both ends are rounded, to steps and to 0.0001 of a unit.
             let close = 1.01 + due.abs() * 1e-6 + self.rounding(motor, axis, between);
-            if (made - due).abs() > close {
+            // The direction may be that of the move before.
+            let more = if refused { 0.0 } else { self.motion.backlash(motor, axis, due) };
+            if (made - due).abs() > close && (made - due - more).abs() > close {
                 return Err(format!("{line}: motor {} makes {made} steps of {due}", motor + 1));
             }
         }

@@ -9,6 +9,7 @@ use kerf::gcode::overrides::Change;
 use kerf::hal::ring::{Consumer, Producer, Ring};
 use kerf::kinematics::{self, DIFFERENCE, SUM};
 use kerf::motion::advance;
+use kerf::motion::backlash::{KEPT, KEPT_VELOCITY, Slack, pace};
 use kerf::motion::blend::Blend;
 use kerf::motion::block::{Block, QueuedAction};
 use kerf::motion::dynamics::{Dynamics, MachineLimits};
@@ -16,6 +17,7 @@ use kerf::motion::exec::{Exec, Step, take_heat, take_override};
 use kerf::motion::factors::Factors;
 use kerf::motion::line::{Builder, Built, Line, Motors};
 use kerf::motion::queue::{BlockQueue, BlockSource, BlockStore};
+use kerf::motion::smooth::SAMPLE_S;
 use kerf::motion::snapshot::Snapshot;
 use kerf::units::{AXES, Length, PerAxis};
 
@@ -30,6 +32,8 @@ pub struct Config {
     pub ratio: [StepRatio; MOTORS],
     /// The axes that each motor drives.
     pub drives: [u8; MOTORS],
+    /// The backlash of each motor, steps.
+    pub backlash: [u16; MOTORS],
 }
 
 /// Each motor drives an axis of its own.
@@ -48,7 +52,22 @@ impl Config {
             // 80 steps a mm.
             ratio: [StepRatio { num: 1, den: 125 }; MOTORS],
             drives: STRAIGHT,
+            backlash: [0; MOTORS],
         }
+    }
+
+    /// Returns the share of a limit that the path of an axis has.
+    fn share(&self, axis: usize, kept: f32) -> f32 {
+        if self.backlash.get(axis).is_some_and(|width| *width != 0) { kept } else { 1.0 }
+    }
+
+    /// Returns the backlash of a motor as exec is told of it.
+    pub fn slack(&self, motor: usize) -> Slack {
+        let velocity = MachineLimits::velocity_max(self, motor) / 60.0;
+        let accel = MachineLimits::accel_max(self, motor) / 3_600.0;
+        let way = pace(velocity, accel) * SAMPLE_S * 16.0 * 1e4;
+        let pace = self.ratio[motor].steps(Length(way as i32)).clamp(1, 255) as u8;
+        Slack { width: self.backlash[motor], pace }
     }
 
     /// Returns the position of a motor, in steps, when the axes are at `place`.
@@ -60,16 +79,19 @@ impl Config {
 
 impl MachineLimits for Config {
     fn velocity_max(&self, axis: usize) -> f32 {
-        self.velocity[axis] * 60.0
+        self.velocity[axis] * 60.0 * self.share(axis, KEPT_VELOCITY)
     }
     fn feedrate_max(&self, axis: usize) -> f32 {
-        self.velocity[axis] * 60.0
+        self.velocity[axis] * 60.0 * self.share(axis, KEPT_VELOCITY)
     }
     fn jerk_max(&self, axis: usize) -> f32 {
-        self.jerk[axis] * 216_000.0
+        self.jerk[axis] * 216_000.0 * self.share(axis, KEPT)
     }
     fn accel_max(&self, axis: usize) -> f32 {
-        self.accel[axis] * 3_600.0
+        self.accel[axis] * 3_600.0 * self.share(axis, KEPT)
+    }
+    fn has_backlash(&self) -> bool {
+        self.backlash.iter().any(|width| *width != 0)
     }
     fn junction_deviation(&self, _: usize) -> f32 {
         self.deviation
@@ -204,6 +226,11 @@ impl Rig {
         };
         rig.push(Block::action(smooth, 0));
         rig.turn();
+        if rig.config.has_backlash() {
+            let slacks = core::array::from_fn(|m| rig.config.slack(m));
+            rig.aside(Block::action(QueuedAction::Backlash(slacks), 0));
+            rig.turn();
+        }
         rig
     }
 
@@ -397,7 +424,7 @@ impl Rig {
     /// half a tick, which may be a step, and by the half step of rounding.
     fn check_block(&self) {
         for (m, (travel, target)) in self.travel.iter().zip(self.snapshot.target).enumerate() {
-            if self.leads == Some(m) {
+            if self.leads == Some(m) || self.config.backlash[m] != 0 {
                 continue;
             }
             let short = travel - i64::from(target) * i64::from(STEP);

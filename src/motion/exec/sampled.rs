@@ -3,7 +3,7 @@
 use super::{Exec, Step};
 use crate::capability::Capability;
 use crate::dda::Segment;
-use crate::motion::block::Line;
+use crate::motion::block::{Body, Line};
 use crate::motion::exec::spindle::Follows;
 use crate::motion::float::{below, scaled, size, some};
 use crate::motion::queue::BlockSource;
@@ -95,6 +95,7 @@ impl Exec {
         if let Some(lead) = distances.get_mut(LEAD) {
             *lead = self.prep.lead_more(velocity);
         }
+        self.backlash.feed(&mut distances);
         self.smooth.put(&mut distances);
         let off = velocity - out.velocity;
         let steady = some(velocity) && below(size(off), scaled(velocity, STEADY_LOG2));
@@ -107,6 +108,7 @@ impl Exec {
         self.prep.refine(steady && self.running.long, self.coarse);
         self.prep.set_hurry(self.hurry);
         self.prep.slice(&distances, &mut out.target, segment);
+        self.backlash.deduct(self.smooth.is_empty(), &mut out.target);
     }
 
     /// The path stands still: makes the next segment of a sample in which the means are not empty, then the one in which
@@ -116,11 +118,57 @@ impl Exec {
         if !self.is_sampled() {
             return false;
         }
-        if self.sampler.has_begun() || !self.smooth.is_empty() {
+        self.flows_out(out, segment)
+    }
+
+    /// Makes the next segment of a sample in which the path stands still and motors do not; false if there is none.
+    #[inline(always)]
+    fn flows_out(&mut self, out: &mut Snapshot, segment: &mut Segment) -> bool {
+        if self.sampler.has_begun() || !self.smooth.is_empty() || self.backlash.is_due() {
             self.sampler.pad();
             self.emit(out, segment);
             return true;
         }
         self.prep.finish(segment)
+    }
+
+    /// Before a line that begins at a standstill: makes the next segment in which its motors take up their backlash.
+    /// Returns false, and no segment, if that is done. Motion without the mean that rounds corners borrows it.
+    #[inline(never)]
+    #[small]
+    pub(super) fn takes_up(
+        &mut self,
+        blocks: &BlockSource,
+        out: &mut Snapshot,
+        segment: &mut Segment,
+    ) -> bool {
+        if self.lent.is_none() {
+            if !self.governor.is_at_rest() || self.sampler.has_begun() || !self.smooth.is_empty() {
+                return false;
+            }
+            let due = blocks.look(|block| {
+                let Body::Line(line) = &block.body else { return false };
+                self.backlash.turn(&line.way);
+                self.backlash.is_due()
+            });
+            if due != Some(true) {
+                return false;
+            }
+            self.lent = Some(self.smooth.spans());
+            self.smooth.set(self.smooth.spans().and_corner());
+        }
+        if self.flows_out(out, segment) {
+            return true;
+        }
+        self.give_back();
+        false
+    }
+
+    /// Ends a take-up at a standstill.
+    #[inline(always)]
+    pub(super) fn give_back(&mut self) {
+        if let Some(spans) = self.lent.take() {
+            self.smooth.set(spans);
+        }
     }
 }

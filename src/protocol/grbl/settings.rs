@@ -50,6 +50,9 @@ pub fn number(row: u8, axes: u8) -> Option<u8> {
     match row.checked_sub(BASE) {
         None => NUMBERS.at(row.into()),
         Some(row) if row < 4 * axes => Some(100 + 10 * (row / axes) + row % axes),
+        Some(row) if Capability::Backlash.is_built_in() && row - 4 * axes < axes.min(HOMING) => {
+            Some(160 + row - 4 * axes)
+        }
         Some(_) => None,
     }
 }
@@ -129,11 +132,20 @@ fn mask(machine: &mut impl Machine, token: [u8; 4]) -> i32 {
     bits
 }
 
-/// Splits a number from 100 on: which of the four settings of an axis, and which axis.
+/// What [`split`] returns for the backlash of an axis.
+const BACKLASH: u8 = 6;
+
+/// Splits a number from 100 on: which of the settings of an axis, and which axis.
 #[small]
 fn split(number: u8) -> Option<(u8, u8)> {
     let number = number.checked_sub(100)?;
-    (number < 40 && usize::from(number % 10) < AXES).then_some((number / 10, number % 10))
+    let (what, axis) = (number / 10, number % 10);
+    let exists = match what {
+        0..4 => usize::from(axis) < AXES,
+        BACKLASH => Capability::Backlash.is_built_in() && axis < HOMING,
+        _ => false,
+    };
+    exists.then_some((what, axis))
 }
 
 /// Returns the value of a numbered setting; `None` if there is none.
@@ -183,6 +195,7 @@ fn axis_value(what: u8, axis: u8, machine: &mut impl Machine) -> Fixed {
         0 => Fixed { value: steps(axis, machine), decimals: 3 },
         1 => shown(machine, of_axis(axis, token("vm")), 3),
         2 => shown(machine, of_axis(axis, token("ac")), 3),
+        BACKLASH => shown(machine, of_axis(axis, token("bl")), 3),
         _ => {
             let (low, high) = travel(axis, machine);
             Fixed { value: high.saturating_sub(low), decimals: 4 }.rounded(3)
@@ -392,6 +405,7 @@ fn set_axis(what: u8, axis: u8, to: Number, machine: &mut impl Machine) -> Resul
             put(machine, of_axis(axis, token("fr")), to)
         }
         2 => put(machine, of_axis(axis, token("ac")), to),
+        BACKLASH => put(machine, of_axis(axis, token("bl")), to),
         _ => {
             let length = to.fixed(4, false).ok_or(Status::OutOfRange)?;
             // On an axis whose zero is at the upper end the lower end moves.

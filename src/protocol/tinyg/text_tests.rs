@@ -104,7 +104,7 @@ fn groups_list_what_they_have() {
     assert_eq!(axis, "bam bvm bfr btn btm bjm bjd bra bac");
     assert_eq!(names("$1"), "1ma 1sa 1tr 1mi 1po 1pm 1sp");
     assert_eq!(names("$m").split(' ').count(), 4 * 7);
-    assert_eq!(names("$q").split(' ').count(), 3 * 15 + 16 + 2 * 9);
+    assert_eq!(names("$q").split(' ').count(), 3 * 16 + 17 + 2 * 9);
     let systems = ["g54", "g55", "g56", "g57", "g58", "g59", "g591", "g592", "g593"];
     let places = systems.iter().chain(&["g92", "g28", "g30"]);
     let places: Vec<String> = places.map(|group| names(&std::format!("${group}"))).collect();

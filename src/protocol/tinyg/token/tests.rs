@@ -31,8 +31,8 @@ fn every_token_has_a_name_that_finds_it() {
         count,
         system::COUNT
             + 32
-            + 3 * 15
-            + 18
+            + 3 * 16
+            + 19
             + 2 * 9
             + 44
             + 48
