@@ -6,7 +6,7 @@ use super::{Board, Encoder, Handshake, MotorPins, Pwm, Serial, Timer, USB, Usart
 /// Arduino Mega 2560 with a grbl-style shield.
 pub const MEGA2560_GRBL: Board = Board {
     name: "mega2560-grbl",
-    features: &["dialect-tinyg", "dialect-grbl", "probing", "text"],
+    features: &["dialect-tinyg", "dialect-grbl", "probing", "text", "backlash"],
     dialect: 0,
     clock_hz: 16_000_000,
     motors: &[

@@ -18,6 +18,7 @@ pub const PICO: Board = Board {
         "text",
         "lathe",
         "corexy",
+        "backlash",
     ],
     dialect: 0,
     clock_hz: 128_000_000,

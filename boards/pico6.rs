@@ -18,6 +18,7 @@ pub const PICO6: Board = Board {
         "text",
         "lathe",
         "corexy",
+        "backlash",
     ],
     motors: &[
         MotorPins { step: gp(2), dir: gp(8), enable: None },

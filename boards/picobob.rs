@@ -25,6 +25,7 @@ pub const PICOBOB: Board = Board {
         "text",
         "lathe",
         "corexy",
+        "backlash",
     ],
     motors: &[
         MotorPins { step: gp(17), dir: gp(9), enable: None },

@@ -27,6 +27,7 @@ pub const PICOCNC: Board = Board {
         "text",
         "lathe",
         "corexy",
+        "backlash",
         "sd",
         "card-write",
     ],

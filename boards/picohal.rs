@@ -20,6 +20,7 @@ pub const PICOHAL: Board = Board {
         "text",
         "lathe",
         "corexy",
+        "backlash",
     ],
     motors: &[
         MotorPins { step: gp(16), dir: gp(20), enable: None },

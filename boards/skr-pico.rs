@@ -19,6 +19,7 @@ pub const SKR_PICO: Board = Board {
         "text",
         "lathe",
         "corexy",
+        "backlash",
         "printer",
         "drivers",
         "bed-plane",
