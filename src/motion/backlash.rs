@@ -80,6 +80,15 @@ pub fn pace(velocity: f32, accel: f32) -> f32 {
     if jump > 0.0 && jump < spare { jump } else { spare }
 }
 
+/// The most samples of a take-up, some 8 to 16 s: an axis that is too slow for that exceeds its limits.
+const SAMPLES_MOST: u16 = 4_096;
+
+/// Returns the least pace of a take-up of `width` steps, 1/16 step a sample.
+pub fn least_pace(width: u16) -> u8 {
+    const _: () = assert!((WIDTH_MOST << PARTS_LOG2) / SAMPLES_MOST < u8::MAX as u16);
+    ((width << PARTS_LOG2) / SAMPLES_MOST) as u8 + 1
+}
+
 /// The take-up of a motor, in its present direction.
 #[derive(Clone, Copy, Debug)]
 struct Side {

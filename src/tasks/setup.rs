@@ -13,7 +13,7 @@ use crate::gcode::modal::{Defaults, Distance, PathMode, Plane, Units};
 use crate::gcode::setup::{AxisMode, Setup};
 use crate::hal::{encoder, inputs as pins};
 use crate::kinematics::{self, DIFFERENCE, SUM};
-use crate::motion::backlash::{KEPT, KEPT_VELOCITY, Slack, WIDTH_MOST, pace};
+use crate::motion::backlash::{KEPT, KEPT_VELOCITY, Slack, WIDTH_MOST, least_pace, pace};
 use crate::motion::block::PARTS_LOG2;
 use crate::motion::dynamics::{MachineLimits, PER_SECOND_SQUARED};
 use crate::motion::line::Motors;
@@ -261,10 +261,9 @@ pub fn slack_of(settings: &Settings, motor: usize) -> Slack {
     let accel = MachineLimits::accel_max(settings, axis) * PER_SECOND_SQUARED;
     // In 1/16 step: sixteen times the way in a sample.
     let way = pace(velocity, accel) * (SAMPLE_S * (1 << PARTS_LOG2) as f32 * 1e4);
-    Slack {
-        width: ratio.steps(width).clamp(0, WIDTH_MOST.into()) as u16,
-        pace: ratio.steps(Length(way as i32)).clamp(1, u8::MAX.into()) as u8,
-    }
+    let width = ratio.steps(width).clamp(0, WIDTH_MOST.into()) as u16;
+    let pace = ratio.steps(Length(way as i32)).clamp(least_pace(width).into(), u8::MAX.into());
+    Slack { width, pace: pace as u8 }
 }
 
 /// Returns how far steps can be counted if some motor makes several in the shortest length.
