@@ -19,6 +19,7 @@ pub const PICO: Board = Board {
         "lathe",
         "corexy",
         "backlash",
+        "shaping",
     ],
     dialect: 0,
     clock_hz: 128_000_000,

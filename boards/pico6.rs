@@ -19,6 +19,7 @@ pub const PICO6: Board = Board {
         "lathe",
         "corexy",
         "backlash",
+        "shaping",
     ],
     motors: &[
         MotorPins { step: gp(2), dir: gp(8), enable: None },

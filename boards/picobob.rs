@@ -26,6 +26,7 @@ pub const PICOBOB: Board = Board {
         "lathe",
         "corexy",
         "backlash",
+        "shaping",
     ],
     motors: &[
         MotorPins { step: gp(17), dir: gp(9), enable: None },

@@ -28,6 +28,7 @@ pub const PICOCNC: Board = Board {
         "lathe",
         "corexy",
         "backlash",
+        "shaping",
         "sd",
         "card-write",
     ],

@@ -21,6 +21,7 @@ pub const PICOHAL: Board = Board {
         "lathe",
         "corexy",
         "backlash",
+        "shaping",
     ],
     motors: &[
         MotorPins { step: gp(16), dir: gp(20), enable: None },

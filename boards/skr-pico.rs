@@ -20,6 +20,7 @@ pub const SKR_PICO: Board = Board {
         "lathe",
         "corexy",
         "backlash",
+        "shaping",
         "printer",
         "drivers",
         "bed-plane",

@@ -36,7 +36,8 @@ use crate::tasks::tx::Tx;
 use crate::tasks::view::set_hardware;
 use crate::tasks::wake::{ReporterWake, Wake};
 use crate::tasks::{
-    alarm, control, drivers, exec, heat, parser, planner, power, reader, reporter, spindle, storage,
+    alarm, control, drivers, exec, heat, parser, planner, power, reader, reporter, shaper, spindle,
+    storage,
 };
 
 /// Size of the line pool of the USB port, in bytes.
@@ -237,6 +238,7 @@ fn recall(settings: &mut Settings, storage: &Storage) -> Occasion {
         storage.note_at_start();
     }
     drivers::recall(settings, storage);
+    shaper::recall(settings, storage);
     match memory.is_lost() || log.is_rubbish(&memory) {
         true => Occasion::Defaults,
         false => Occasion::Ready,

@@ -37,11 +37,13 @@ pub enum Capability {
     BedPlane,
     /// Backlash compensation: the settings `xbl` to `abl`.
     Backlash,
+    /// Input shaping for axes that ring: the settings `isx` to `isd`, and M593.
+    Shaping,
 }
 
 impl Capability {
     /// All capabilities.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 15] = [
         Self::Cycles,
         Self::Boring,
         Self::Probing,
@@ -56,6 +58,7 @@ impl Capability {
         Self::Drivers,
         Self::BedPlane,
         Self::Backlash,
+        Self::Shaping,
     ];
 
     /// Whether this image has the capability.
@@ -76,6 +79,7 @@ impl Capability {
             Self::Drivers => cfg!(feature = "drivers"),
             Self::BedPlane => cfg!(feature = "bed-plane"),
             Self::Backlash => cfg!(feature = "backlash"),
+            Self::Shaping => cfg!(feature = "shaping"),
         }
     }
 
@@ -103,6 +107,7 @@ impl Capability {
             Self::Drivers => "drivers",
             Self::BedPlane => "bed-plane",
             Self::Backlash => "backlash",
+            Self::Shaping => "shaping",
         }
     }
 }

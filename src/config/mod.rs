@@ -16,6 +16,7 @@ pub mod number;
 pub mod ratio;
 pub mod rows;
 pub mod setting;
+mod shape;
 pub mod table;
 pub mod words;
 
@@ -32,6 +33,7 @@ use crate::baud;
 use crate::boards::MOTORS;
 use crate::capability::Capability;
 use crate::kinematics;
+use crate::motion::shaper::{Resonances, SHAPED};
 use crate::status::Status;
 use crate::units::{AXES, FIRST_ROTARY};
 use bed::{BEDS, Bed};
@@ -54,6 +56,8 @@ pub struct Settings {
     pub heating: [Heating; heating::PRINTERS],
     /// The configuration of the motor drivers. Empty in an image without configurable drivers.
     pub drives: [Drive; DRIVERS],
+    /// The resonances of the axes.
+    pub resonances: [Resonances; SHAPED],
     /// Why the drivers do not move the motors, or `Ok`. The task of the drivers keeps it up to date.
     pub undriven: [Status; drive::DRIVEN],
     /// The plane of the printer's bed. Empty in an image without bed levelling.
@@ -84,6 +88,7 @@ impl Settings {
             octaves: 0,
             heating: [Heating::NONE; heating::PRINTERS],
             drives: [Drive::DEFAULT; DRIVERS],
+            resonances: [Resonances::NONE; SHAPED],
             undriven: [drive::AT_START; drive::DRIVEN],
             bed: [Bed::NONE; BEDS],
         }
@@ -146,7 +151,7 @@ impl Settings {
         if setting.is_baud() && baud::rate(value).is_none() {
             return Err(Status::OutOfRange);
         }
-        if !setting.suits_driver(value) {
+        if !setting.suits_driver(value) || !self.can_shape(setting, value) {
             return Err(Status::OutOfRange);
         }
         if matches!(setting.owner(), Owner::Motor(_)) && row.is_place(Kind::Small, motor::MA) {

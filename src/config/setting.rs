@@ -3,7 +3,7 @@
 #[cfg(feature = "drivers")]
 use super::groups::driver;
 use super::groups::{
-    axis, bed, coolant, hot_end, job, motor, pwm, spindle, squaring, system, user,
+    axis, bed, coolant, hot_end, job, motor, pwm, shaper, spindle, squaring, system, user,
 };
 use super::machines;
 use super::name::{Name, axis_letter, axis_of, token};
@@ -25,13 +25,17 @@ const FIRST_COOLANT: u8 = FIRST_SPINDLE + spindle::COUNT as u8;
 const FIRST_SQUARING: u8 = FIRST_COOLANT + coolant::COUNT as u8;
 const FIRST_HOT_END: u8 = FIRST_SQUARING + squaring::COUNT as u8;
 const FIRST_BED: u8 = FIRST_HOT_END + HOT_END;
-const FIRST_DRIVER: u8 = FIRST_BED + BED;
+const FIRST_SHAPER: u8 = FIRST_BED + BED;
+const FIRST_DRIVER: u8 = FIRST_SHAPER + SHAPER;
 const FIRST_USER: u8 = FIRST_DRIVER + DRIVER;
 const FIRST_JOB: u8 = FIRST_USER + USERS * user::COUNT as u8;
 
 /// The number of rows for heaters: 0 in an image that cannot print.
 const HOT_END: u8 = if Capability::Printer.is_built_in() { hot_end::COUNT as u8 } else { 0 };
 const BED: u8 = if Capability::Printer.is_built_in() { bed::COUNT as u8 } else { 0 };
+
+/// The number of rows for input shaping: 0 in an image that cannot shape.
+const SHAPER: u8 = if Capability::Shaping.is_built_in() { shaper::COUNT as u8 } else { 0 };
 
 /// The number of rows for motor drivers: 0 in an image without configurable drivers.
 #[cfg(feature = "drivers")]
@@ -63,6 +67,8 @@ pub enum Owner {
     HotEnd,
     /// The bed.
     Bed,
+    /// Input shaping.
+    Shaper,
     /// The drivers of motors.
     #[cfg(feature = "drivers")]
     Drivers,
@@ -86,6 +92,7 @@ impl Owner {
             Owner::Squaring => squaring::COUNT as u8,
             Owner::HotEnd => HOT_END,
             Owner::Bed => BED,
+            Owner::Shaper => SHAPER,
             #[cfg(feature = "drivers")]
             Owner::Drivers => DRIVER,
             Owner::User(_) => user::COUNT as u8,
@@ -105,6 +112,7 @@ impl Owner {
             Owner::Squaring => named(token("sq")),
             Owner::HotEnd => named(token("he1")),
             Owner::Bed => named(token("he3")),
+            Owner::Shaper => named(token("is")),
             #[cfg(feature = "drivers")]
             Owner::Drivers => named(token("dr")),
             Owner::User(group) => named([b'u', b'd', b'a' + group, 0]),
@@ -122,6 +130,7 @@ impl Owner {
             [b's', b'q', ..] => Some(Owner::Squaring),
             [b'h', b'e', b'1', ..] if HOT_END != 0 => Some(Owner::HotEnd),
             [b'h', b'e', b'3', ..] if BED != 0 => Some(Owner::Bed),
+            [b'i', b's', ..] if SHAPER != 0 => Some(Owner::Shaper),
             #[cfg(feature = "drivers")]
             [b'd', b'r', ..] => Some(Owner::Drivers),
             [b'u', b'd', group @ b'a'..=b'd', ..] => Some(Owner::User(group - b'a')),
@@ -161,6 +170,7 @@ impl Owner {
             Owner::Squaring => squaring::ROWS.slice(),
             Owner::HotEnd if HOT_END != 0 => hot_end::ROWS.slice(),
             Owner::Bed if BED != 0 => bed::ROWS.slice(),
+            Owner::Shaper if SHAPER != 0 => shaper::ROWS.slice(),
             #[cfg(feature = "drivers")]
             Owner::Drivers => driver::ROWS.slice(),
             Owner::User(group) if group < USERS => user::ROWS.slice(),
@@ -207,7 +217,8 @@ impl Owner {
             Owner::Squaring => squaring::WORDS.slice(),
             Owner::HotEnd if HOT_END != 0 => hot_end::WORDS.slice(),
             Owner::Bed if BED != 0 => bed::WORDS.slice(),
-            Owner::HotEnd | Owner::Bed => squaring::WORDS.slice(),
+            Owner::Shaper if SHAPER != 0 => shaper::WORDS.slice(),
+            Owner::HotEnd | Owner::Bed | Owner::Shaper => squaring::WORDS.slice(),
             #[cfg(feature = "drivers")]
             Owner::Drivers => driver::WORDS.slice(),
             Owner::User(_) => user::WORDS.slice(),
@@ -273,6 +284,7 @@ const NUMBERS: usize = system::COUNT
     + squaring::COUNT
     + HOT_END as usize
     + BED as usize
+    + SHAPER as usize
     + DRIVER as usize
     + USERS as usize * user::COUNT
     + job::COUNT;
@@ -339,6 +351,7 @@ impl Setting {
             Owner::Squaring => FIRST_SQUARING,
             Owner::HotEnd => FIRST_HOT_END,
             Owner::Bed => FIRST_BED,
+            Owner::Shaper => FIRST_SHAPER,
             #[cfg(feature = "drivers")]
             Owner::Drivers => FIRST_DRIVER,
             Owner::User(group) => FIRST_USER + group * user::COUNT as u8,
@@ -473,8 +486,10 @@ impl Setting {
             Owner::Squaring
         } else if self.0 < FIRST_BED {
             Owner::HotEnd
-        } else if self.0 < FIRST_USER {
+        } else if self.0 < FIRST_SHAPER {
             Owner::Bed
+        } else if self.0 < FIRST_DRIVER {
+            Owner::Shaper
         } else if self.0 < FIRST_JOB {
             Owner::User((self.0 - FIRST_USER) / user::COUNT as u8)
         } else {
@@ -499,6 +514,7 @@ impl Setting {
             Owner::Squaring => self.0 - FIRST_SQUARING,
             Owner::HotEnd => self.0 - FIRST_HOT_END,
             Owner::Bed => self.0 - FIRST_BED,
+            Owner::Shaper => self.0 - FIRST_SHAPER,
             #[cfg(feature = "drivers")]
             Owner::Drivers => self.0 - FIRST_DRIVER,
             Owner::User(_) => (self.0 - FIRST_USER) % user::COUNT as u8,
@@ -550,7 +566,8 @@ impl Setting {
             Owner::Spindle => spindle::DEFAULTS.at(index),
             Owner::HotEnd if HOT_END != 0 => hot_end::DEFAULTS.at(index),
             Owner::Bed if BED != 0 => bed::DEFAULTS.at(index),
-            Owner::HotEnd | Owner::Bed => None,
+            Owner::Shaper if SHAPER != 0 => shaper::DEFAULTS.at(index),
+            Owner::HotEnd | Owner::Bed | Owner::Shaper => None,
             #[cfg(feature = "drivers")]
             Owner::Drivers => driver::DEFAULTS.at(index),
             Owner::Coolant | Owner::Squaring | Owner::User(_) | Owner::Job => None,

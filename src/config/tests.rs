@@ -168,8 +168,9 @@ fn ram_is_accounted_for() {
     // The status and the padding behind it.
     let drives = drive::DRIVERS * 6;
     let bed = bed::BEDS * 48;
+    let shaping = if Capability::Shaping.is_built_in() { 8 } else { 0 };
     let backlash = if Capability::Backlash.is_built_in() { 16 } else { 0 };
-    assert_eq!(size_of::<Settings>(), 436 + heating + drives + bed + backlash);
+    assert_eq!(size_of::<Settings>(), 436 + heating + drives + bed + backlash + shaping);
     assert!(size_of::<SettingRow>() * 52 + (28 + 7 * 4 + 17 * 6) * 4 < 2048);
 }
 

@@ -52,6 +52,8 @@ pub(super) const SENSORS: Text =
 pub(super) const DEGREES: Text = text!(" C");
 #[cfg(feature = "drivers")]
 pub(super) const AMPERES: Text = text!(" A");
+pub(super) const HZ: Text = text!(" Hz");
+pub(super) const SHAPERS: Text = text!(" [0=mean,1=EI]");
 pub(super) const SECONDS: Text = text!(" s");
 pub(super) const NONE: Text = text!("");
 

@@ -6,6 +6,7 @@
 use super::float::{below, greater, lesser, some};
 use super::line::Motors;
 use super::pace::Drivers;
+use super::shaper::{Resonances, SHAPED};
 use super::short::Short;
 use super::smooth::{CORNER_S, Spans};
 use crate::boards::MOTORS;
@@ -43,6 +44,10 @@ pub trait MachineLimits {
     /// Whether an axis has [backlash](super::backlash).
     fn has_backlash(&self) -> bool {
         false
+    }
+    /// The resonances of the axes; none in an image that cannot shape.
+    fn resonances(&self) -> [Resonances; SHAPED] {
+        [Resonances::NONE; SHAPED]
     }
     /// The pulse width and direction set-up time of the drivers.
     fn drivers(&self) -> Drivers {
@@ -163,6 +168,10 @@ impl Dynamics {
         if machine.has_backlash() {
             // The take-up needs a mean, also where no jerk limit has an effect.
             self.spans = self.spans.and_corner();
+        }
+        let resonances = machine.resonances();
+        if resonances.iter().any(Resonances::is_some) {
+            self.spans = self.spans.and_shaper(resonances);
         }
         self.junction = machine.junction_acceleration() * PER_SECOND_SQUARED;
         let drivers = machine.drivers();

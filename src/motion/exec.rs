@@ -684,7 +684,7 @@ impl Exec {
     /// For how many more segments the end of a line that has been prepared goes on.
     #[inline(always)]
     pub fn lag(&self) -> u8 {
-        if self.is_sampled() { self.smooth.spans().lag() } else { 0 }
+        if self.is_sampled() { self.smooth.lag() } else { 0 }
     }
 
     /// The velocity along the path at the end of the queued segments, mm/s.

@@ -30,6 +30,7 @@ pub mod queue;
 mod replan;
 pub mod retract;
 mod sampler;
+pub mod shaper;
 pub mod short;
 pub mod smooth;
 pub mod snapshot;

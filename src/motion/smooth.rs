@@ -18,6 +18,8 @@
 //! often as its mean divides by, so that the sum of what comes out is the sum of what went in, exactly, when as many
 //! samples of no distance have followed as the means are long ([`Smooth::is_empty`]).
 //!
+//! Behind the means is the filter against ringing, if there is one ([`shaper`](super::shaper)).
+//!
 //! All channels have the same means, so that straight lines stay straight. Units: phase units of a motor, in `i32`: a
 //! sum over the longest mean fits at the highest step rate of each chip. Cost on AVR: 700 cycles a sample and motor, 25
 //! for a motor that stands. RAM: 4 bytes for each sample of a mean and channel.
@@ -27,6 +29,7 @@ use kerf_macros::small;
 use super::advance::EXTRUDERS;
 use super::divide::quotient_remainder;
 use super::float::whole;
+use super::shaper::{Resonances, SHAPED, Shaped, Weights};
 use crate::boards::MOTORS;
 use crate::hal::{SAMPLE_MS, TIMER_HZ};
 
@@ -55,13 +58,15 @@ const _: () = assert!(CORNER * SAMPLE_MS == CORNER_MS, "a mean is a whole number
 /// The most samples of the mean that limits jerk.
 pub const JERK_MOST: u8 = if SAMPLE_MS >= 4 { 11 } else { 30 };
 
-/// How many samples the two means cover.
+/// How many samples the two means cover, and the resonances of the filter behind them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Spans {
     /// The mean that rounds corners: 1 for none.
     corner: u8,
     /// The mean that limits jerk: 1 for none.
     jerk: u8,
+    /// The resonances; none in an image that cannot shape.
+    resonances: [Resonances; SHAPED],
 }
 
 impl Default for Spans {
@@ -72,7 +77,7 @@ impl Default for Spans {
 
 impl Spans {
     /// No means: motors follow the path as it is.
-    pub const NONE: Self = Self { corner: 1, jerk: 1 };
+    pub const NONE: Self = Self { corner: 1, jerk: 1, resonances: [Resonances::NONE; SHAPED] };
 
     /// Returns the means for a machine whose acceleration limit builds up in `seconds` at its jerk limit; no means if
     /// that is 0. The time is rounded up to samples, up to [`JERK_MOST`].
@@ -87,13 +92,24 @@ impl Spans {
     #[small]
     pub fn alone(seconds: f32) -> Self {
         let samples = whole(seconds * (1.0 / SAMPLE_S) + 0.98);
-        Self { corner: 1, jerk: samples.clamp(1, JERK_MOST.into()) as u8 }
+        Self { jerk: samples.clamp(1, JERK_MOST.into()) as u8, ..Self::NONE }
     }
 
     /// Returns these means, and the one that rounds corners.
     #[inline(always)]
     pub fn and_corner(self) -> Self {
         Self { corner: CORNER, ..self }
+    }
+
+    /// Returns these means, and the one that rounds corners, with a filter for resonances behind them.
+    #[inline(always)]
+    pub fn and_shaper(self, resonances: [Resonances; SHAPED]) -> Self {
+        Self { resonances, ..self.and_corner() }
+    }
+
+    /// The resonances.
+    pub fn resonances(&self) -> Option<&Resonances> {
+        self.resonances.first()
     }
 
     /// Whether there is a mean.
@@ -113,7 +129,7 @@ impl Spans {
         (self.corner, self.jerk)
     }
 
-    /// For how many samples a distance goes on to come out, after the sample in which it went in.
+    /// For how many samples a distance goes on to come out of the means, after the sample in which it went in.
     #[inline(always)]
     pub fn lag(self) -> u8 {
         self.corner + self.jerk - 2
@@ -151,20 +167,34 @@ impl<const MOST: usize> Mean<MOST> {
 struct Channel {
     jerk: Mean<{ JERK_MOST as usize }>,
     corner: Mean<{ CORNER as usize }>,
+    shaped: Shaped,
     /// How many more samples may have a distance if none goes in.
     left: u8,
 }
 
 impl Channel {
-    const NONE: Self = Self { jerk: Mean::NONE, corner: Mean::NONE, left: 0 };
+    const NONE: Self = Self { jerk: Mean::NONE, corner: Mean::NONE, shaped: Shaped::NONE, left: 0 };
+}
+
+/// The places of samples in the means, and in the filter behind them.
+#[derive(Clone, Copy, Debug)]
+struct Places {
+    corner: u8,
+    jerk: u8,
+    shaped: u8,
+}
+
+impl Places {
+    const FIRST: Self = Self { corner: 0, jerk: 0, shaped: 0 };
 }
 
 /// The means of all channels.
 #[derive(Debug)]
 pub struct Smooth {
     spans: Spans,
+    weights: Weights,
     /// The places of the oldest samples.
-    at: Spans,
+    at: Places,
     channels: [Channel; CHANNELS],
 }
 
@@ -173,7 +203,8 @@ impl Smooth {
     pub const fn new() -> Self {
         Self {
             spans: Spans::NONE,
-            at: Spans { corner: 0, jerk: 0 },
+            weights: Weights::NONE,
+            at: Places::FIRST,
             channels: [Channel::NONE; CHANNELS],
         }
     }
@@ -188,6 +219,9 @@ impl Smooth {
     #[small]
     pub fn set(&mut self, spans: Spans) {
         self.spans = spans;
+        if let Some(resonances) = spans.resonances() {
+            self.weights = Weights::of(resonances);
+        }
         self.clear();
     }
 
@@ -195,11 +229,17 @@ impl Smooth {
     #[inline(never)]
     #[small]
     pub fn clear(&mut self) {
-        self.at = Spans { corner: 0, jerk: 0 };
+        self.at = Places::FIRST;
         // In place: a constant would take a copy on the stack.
         for channel in &mut self.channels {
             *channel = Channel::NONE;
         }
+    }
+
+    /// For how many samples a distance goes on to come out, after the sample in which it went in.
+    #[inline(always)]
+    pub fn lag(&self) -> u8 {
+        self.spans.lag() + self.weights.lag()
     }
 
     /// Whether everything that went in has come out.
@@ -210,10 +250,11 @@ impl Smooth {
     /// Takes in the distances of a sample, and replaces them by their means.
     #[inline(never)]
     pub fn put(&mut self, distances: &mut [i32; CHANNELS]) {
-        let (spans, at) = (self.spans, self.at);
+        let (spans, at, lag) = (&self.spans, self.at, self.lag());
+        let weights = self.weights.parts();
         for (channel, distance) in self.channels.iter_mut().zip(distances) {
             if *distance != 0 {
-                channel.left = spans.lag() + 1;
+                channel.left = lag + 1;
             } else if channel.left == 0 {
                 // All its samples are 0.
                 continue;
@@ -225,13 +266,20 @@ impl Smooth {
             if spans.corner > 1 {
                 *distance = channel.corner.put(*distance, at.corner, spans.corner);
             }
+            if !weights.is_empty() {
+                *distance = channel.shaped.put(*distance, at.shaped, weights);
+            }
             if channel.left == 0 {
                 // The oldest sample would be taken out by the next one, which may not come.
                 *channel = Channel::NONE;
             }
         }
         let next = |at: u8, span: u8| if at + 1 >= span { 0 } else { at + 1 };
-        self.at = Spans { corner: next(at.corner, spans.corner), jerk: next(at.jerk, spans.jerk) };
+        self.at = Places {
+            corner: next(at.corner, spans.corner),
+            jerk: next(at.jerk, spans.jerk),
+            shaped: next(at.shaped, self.weights.lag() + 1),
+        };
     }
 }
 
@@ -274,7 +322,7 @@ mod tests {
 
     fn smooth(corner: u8, jerk: u8) -> Smooth {
         let mut smooth = Smooth::new();
-        smooth.set(Spans { corner, jerk });
+        smooth.set(Spans { corner, jerk, ..Spans::NONE });
         smooth
     }
 
@@ -306,6 +354,21 @@ mod tests {
                 let out = run(&mut smooth, inputs);
                 prop_assert_eq!(out.iter().sum::<i32>(), inputs.iter().sum::<i32>());
                 prop_assert!(out.len() <= inputs.len() + usize::from(smooth.spans.lag()));
+            }
+        }
+
+        #[test]
+        fn what_goes_in_comes_out_of_the_filter(
+            hertz in [0..1_000u16, 0..1_000u16, 0..1_000u16], kind in 0..2u8,
+            inputs in prop::collection::vec(-10_000_000i32..10_000_000, 0..200),
+        ) {
+            let resonances = Resonances { hertz, kind, ..Resonances::NONE };
+            let mut smooth = Smooth::new();
+            smooth.set(Spans::of(0.03).and_shaper([resonances; SHAPED]));
+            for inputs in [&inputs, &inputs] {
+                let out = run(&mut smooth, inputs);
+                prop_assert_eq!(out.iter().sum::<i32>(), inputs.iter().sum::<i32>());
+                prop_assert!(out.len() <= inputs.len() + usize::from(smooth.lag()));
             }
         }
 

@@ -10,6 +10,7 @@ use crate::gcode::tables::TableRow;
 use crate::heat::Standing;
 use crate::heat::tune::Tune;
 use crate::machine::{Alarm, Cycle, Doing};
+use crate::motion::shaper::Resonances;
 use crate::motion::snapshot::Program;
 use crate::status::Status;
 use crate::units::Length;
@@ -201,6 +202,13 @@ pub trait Machine {
     /// is free.
     fn extruder(&mut self, what: Extruder) -> Status {
         let _ = what;
+        Status::NotBuiltIn
+    }
+
+    /// Sets the resonances of the axes until the next start. [`Status::Again`] means what it means for
+    /// [`Self::extruder`].
+    fn shape(&mut self, to: Resonances) -> Status {
+        let _ = to;
         Status::NotBuiltIn
     }
 

@@ -166,8 +166,9 @@ mod tests {
         }
         let heaters = if Capability::Printer.is_built_in() { 16 } else { 0 };
         let drivers = if Capability::Drivers.is_built_in() { 15 } else { 0 };
+        let shaping = if Capability::Shaping.is_built_in() { 5 } else { 0 };
         assert!(keys.len() <= usize::from(KEYS));
-        let cold = 10 + 9 + 2 + 17 + heaters + drivers;
+        let cold = 10 + 9 + 2 + 17 + heaters + drivers + shaping;
         let cold = cold + usize::from(keys.contains_key(&record::CHANGE));
         assert_eq!(keys.len(), items + usize::from(ROWS) * AXES + cold);
     }

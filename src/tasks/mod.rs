@@ -32,6 +32,7 @@ mod realtime;
 pub mod reporter;
 mod row;
 pub mod setup;
+pub mod shaper;
 pub mod spindle;
 mod stop;
 pub mod storage;

@@ -18,6 +18,7 @@ use crate::motion::block::PARTS_LOG2;
 use crate::motion::dynamics::{MachineLimits, PER_SECOND_SQUARED};
 use crate::motion::line::Motors;
 use crate::motion::pace::Drivers;
+use crate::motion::shaper::{Resonances, SHAPED};
 use crate::motion::smooth::SAMPLE_S;
 use crate::status::Status;
 use crate::units::{AXES, Length, PerAxis};
@@ -219,6 +220,10 @@ impl MachineLimits for Settings {
     #[inline(always)]
     fn has_backlash(&self) -> bool {
         Capability::Backlash.is_built_in() && (0..AXES).any(|axis| has_backlash(self, axis))
+    }
+    #[inline(always)]
+    fn resonances(&self) -> [Resonances; SHAPED] {
+        self.resonances
     }
     fn junction_deviation(&self, axis: usize) -> f32 {
         Settings::junction_deviation(self, axis)

@@ -53,6 +53,8 @@ use crate::heat::tune::Tune;
 use crate::jobs::LINE_MAX;
 use crate::machine::{self, Alarm, Cycle, Doing};
 use crate::motion::queue;
+#[cfg(feature = "dialect-reprap")]
+use crate::motion::shaper::Resonances;
 use crate::motion::snapshot::{Moment, Program};
 #[cfg(feature = "bed-plane")]
 use crate::protocol::Level;
@@ -493,6 +495,11 @@ impl Machine for View<'_> {
     #[cfg(feature = "dialect-reprap")]
     fn extruder(&mut self, what: Extruder) -> Status {
         extruder::extruder(self, what)
+    }
+
+    #[cfg(feature = "dialect-reprap")]
+    fn shape(&mut self, to: Resonances) -> Status {
+        extruder::shape(self, to)
     }
 
     #[cfg(feature = "dialect-reprap")]

@@ -68,6 +68,7 @@ fn title(owner: Owner) -> &'static str {
         Owner::Squaring => "Squaring",
         Owner::HotEnd => "Hot end",
         Owner::Bed => "Bed",
+        Owner::Shaper => "Input shaping",
         #[cfg(feature = "drivers")]
         Owner::Drivers => "Drivers",
         Owner::User(_) => "User data",

@@ -7,7 +7,7 @@ use std::vec::Vec;
 #[cfg(feature = "drivers")]
 use super::groups::driver;
 use super::groups::{
-    Meaning, axis, bed, coolant, hot_end, job, motor, pwm, spindle, squaring, system, user,
+    Meaning, axis, bed, coolant, hot_end, job, motor, pwm, shaper, spindle, squaring, system, user,
 };
 use super::name::token;
 use super::table::{CLAMP, HOMING, IDLE, JERK, Kind, MODE, RADIUS, SettingRow};
@@ -102,7 +102,7 @@ refused, the program ends, and an exception report gives the reason at once. Lin
 
 /// Returns the whole text of `docs/settings.md`.
 pub fn markdown() -> String {
-    let groups: [(&str, &str, &[Owner], &[Meaning]); 11 + cfg!(feature = "drivers") as usize] = [
+    let groups: [(&str, &str, &[Owner], &[Meaning]); 12 + cfg!(feature = "drivers") as usize] = [
         (
             "The machine",
             "The group `sys`. The names have no prefix.",
@@ -149,6 +149,12 @@ the spindle is off, and S24000 gives 10 V. Example for a spindle of 12,000 RPM: 
             "The group `he3`: `he3p`. Only images that can print have it.",
             &[Owner::Bed],
             &bed::MEANINGS,
+        ),
+        (
+            "Input shaping",
+            "The group `is`: `isx`. Only images with the capability `shaping` have it, those of boards with an RP2040. They apply from the next line on, at which the machine stops.",
+            &[Owner::Shaper],
+            &shaper::MEANINGS,
         ),
         #[cfg(feature = "drivers")]
         (
@@ -384,6 +390,7 @@ mod tests {
             (Owner::HotEnd, &hot_end::MEANINGS),
             #[cfg(feature = "printer")]
             (Owner::Bed, &bed::MEANINGS),
+            (Owner::Shaper, &shaper::MEANINGS),
             #[cfg(feature = "drivers")]
             (Owner::Drivers, &driver::MEANINGS),
             (Owner::User(0), &user::MEANINGS),

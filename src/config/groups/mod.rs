@@ -25,6 +25,7 @@ mod machine;
 mod motors;
 mod outputs;
 mod sender;
+mod shaping;
 
 pub use axes::axis;
 #[cfg(feature = "drivers")]
@@ -34,6 +35,7 @@ pub use machine::system;
 pub use motors::{motor, squaring};
 pub use outputs::{coolant, pwm, spindle};
 pub use sender::{job, user};
+pub use shaping::shaper;
 
 /// The name of a setting without its group, and its meaning.
 #[cfg(feature = "std")]

@@ -6,7 +6,7 @@ group! {
     /// The group `p1`.
     pwm: i32, PLAIN => {
         FRQ "frq": cold(0), 1_000_000,
-            words(text!("pwm frequency"), text!(" Hz")),
+            words(text!("pwm frequency"), HZ),
             "PWM frequency. A lower value than the hardware can make gives its lowest frequency, 0.12 Hz on an ATmega2560 and 3.8 Hz on an RP2040.";
         CSL "csl": cold(0), 0,
             words(text!("pwm cw speed lo"), TURNS),

@@ -5,16 +5,23 @@
 //! |X| - |t| where that is above 0. If the velocity falls by `a` to the corner and rises behind it, it is off by
 //! a Phi(t) more, where Phi(t) is the integral of phi from t on.
 //!
+//! A filter against ringing is part of the kernel. Where it is not the same from either end, what it does is taken as that of
+//! the mean of both: it puts the path off by a little less.
+//!
 //! Both are even, and fall with the distance. So they are taken as a sum of [`LAYERS`] steps, and what is off is the sum
 //! of the changes of direction within the reach of each step, times its height.
 
-use crate::motion::smooth::{SAMPLE_S, Spans};
+use crate::motion::shaper::{WEIGHTS, Weights};
+use crate::motion::smooth::{CORNER, JERK_MOST, SAMPLE_S, Spans};
 
 /// Steps of the kernel.
 pub const LAYERS: usize = 6;
 
-/// The most samples that the means cover.
-const SAMPLES: usize = 80;
+/// The most samples that the means and the filter cover.
+const SAMPLES: usize = (CORNER + JERK_MOST) as usize + WEIGHTS;
+
+/// The sum of the weights of the filter, as a power of two.
+const FILTER_LOG2: u8 = 10;
 
 /// Distances in time are counted in parts of half a sample. The number of these parts, and how long one is, s.
 const PARTS: usize = LAYERS;
@@ -50,8 +57,7 @@ impl Kernel {
     /// Returns the kernel of these means. Cost: 20,000, in integers.
     pub fn of(spans: Spans) -> Self {
         let (weights, count) = weights(spans);
-        let (a, b) = spans.samples();
-        let all = 1.0 / (f32::from(a) * f32::from(b));
+        let all = 1.0 / weights.iter().sum::<u32>() as f32;
         let reach = 0.5 * count as f32 * SAMPLE_S;
         let mut kernel = Self { reach, ..Self::NONE };
         let step = reach / LAYERS as f32;
@@ -69,9 +75,9 @@ impl Kernel {
         for (n, (passed, height)) in kernel.shape.iter_mut().enumerate() {
             let at = (2 * n + 1) * count / (2 * PLACES);
             let here = weights.get(at).copied().unwrap_or(0);
-            let before: u32 = weights.iter().take(at).map(|weight| u32::from(*weight)).sum();
-            *passed = (2 * before + u32::from(here)) as f32 * (0.5 * all);
-            *height = f32::from(here) * all * (1.0 / SAMPLE_S);
+            let before: u32 = weights.iter().take(at).sum();
+            *passed = (2 * before + here) as f32 * (0.5 * all);
+            *height = here as f32 * all * (1.0 / SAMPLE_S);
         }
         kernel
     }
@@ -83,36 +89,52 @@ impl Kernel {
 }
 
 /// Returns phi at the end of a step, in parts of half a sample, and twice Phi, in their squares, each times all weights.
-/// Step 0 ends in the middle. Both fit: a distance is 480 parts at most, and all weights are 240.
-fn values(weights: &[u16; SAMPLES], count: usize, step: usize) -> (u32, u32) {
+/// Step 0 ends in the middle. Both fit: a distance is 700 parts at most, and all weights are 2^18.
+fn values(weights: &[u32; SAMPLES], count: usize, step: usize) -> (u64, u64) {
     let (mut phi, mut sum) = (0, 0);
     for (n, weight) in weights.iter().enumerate().take(count) {
         // From the middle of all samples to that of this one, less the steps.
         let place = PARTS * (2 * n + 1);
         if let Some(far) = place.checked_sub(PARTS * count + count * step) {
-            let (far, weight) = (far as u32, u32::from(*weight));
-            phi += weight * far;
-            sum += weight * far * far;
+            let far = far as u32;
+            phi += u64::from(weight * far);
+            sum += u64::from(weight * far) * u64::from(far);
         }
     }
     (phi, sum)
 }
 
-/// Returns the parts of a distance that come out in each sample, and the number of samples.
-fn weights(spans: Spans) -> ([u16; SAMPLES], usize) {
+/// Returns the parts of a distance that come out in each sample, the same from either end, and the number of samples.
+fn weights(spans: Spans) -> ([u32; SAMPLES], usize) {
     let mut weights = [0; SAMPLES];
     let (a, b) = spans.samples();
-    let count = usize::from(spans.lag()) + 1;
-    for (n, weight) in weights.iter_mut().enumerate().take(count) {
-        let ends = (n + 1).min(count - n) as u16;
+    let means = usize::from(spans.lag()) + 1;
+    for (n, weight) in weights.iter_mut().enumerate().take(means) {
+        let ends = (n + 1).min(means - n) as u32;
         *weight = ends.min(a.into()).min(b.into());
     }
-    (weights, count)
+    let filter = spans.resonances().map_or(Weights::NONE, Weights::of);
+    if filter.parts().is_empty() { (weights, means) } else { filtered(&weights, means, &filter) }
+}
+
+/// Returns what a filter makes of weights, and their number.
+#[inline(never)]
+fn filtered(weights: &[u32; SAMPLES], means: usize, filter: &Weights) -> ([u32; SAMPLES], usize) {
+    let parts = filter.parts();
+    let mut all = [0; SAMPLES];
+    for (n, weight) in weights.iter().enumerate().take(means) {
+        let both = parts.iter().zip(parts.iter().rev());
+        for (out, (one, other)) in all.iter_mut().skip(n).zip(both) {
+            *out += weight * ((u32::from(*one) + u32::from(*other)) >> (16 - FILTER_LOG2));
+        }
+    }
+    (all, means + parts.len() - 1)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::motion::shaper::{Resonances, SHAPED};
 
     /// The mean of what is above 0, by the definition.
     fn exact(spans: Spans, t: f64) -> (f64, f64) {
@@ -129,6 +151,33 @@ mod tests {
         }
         let all = f64::from(a) * f64::from(b);
         (phi / all, sum / all)
+    }
+
+    /// A filter that is the same from either end: the kernel is that of the means, moved to each of its weights.
+    #[test]
+    fn a_filter_spreads_the_kernel() {
+        let mut resonances = Resonances { hertz: [310, 0, 0], ..Resonances::NONE };
+        for kind in [0, 1] {
+            (resonances.kind, resonances.damping) = (kind, 0);
+            let means = Spans::of(0.03);
+            let (kernel, filter) =
+                (Kernel::of(means.and_shaper([resonances; SHAPED])), Weights::of(&resonances));
+            let middle = f64::from(filter.lag()) / 2.0;
+            let phi = |t: f64| -> f64 {
+                let parts = filter.parts().iter().enumerate();
+                let one = |(n, part): (usize, &u16)| {
+                    let t = t - (n as f64 - middle) * f64::from(SAMPLE_S);
+                    f64::from(*part) / 32_768.0 * exact(means, t).0
+                };
+                parts.map(one).sum()
+            };
+            let step = f64::from(kernel.reach) / LAYERS as f64;
+            for (n, layer) in kernel.layers.iter().enumerate() {
+                let due = phi(n as f64 * step) - phi((n + 1) as f64 * step);
+                let is = f64::from(layer.velocity);
+                assert!((is - due).abs() < 3e-5 + 0.01 * due, "{kind} {n}: {is} {due}");
+            }
+        }
     }
 
     #[test]

@@ -84,7 +84,7 @@ pub fn says_more((letter, number): (u8, u16), block: &[u8]) -> bool {
         (b'M', 0 | 1 | 25 | 226 | 600 | 601) => (true, true),
         (b'G', 10) => (false, has(block, b'P') || has(block, b'L')),
         (b'G', number) => (false, !matches!(number, 4 | 11)),
-        (_, 17 | 18 | 84 | 92 | 201..=208 | 420) => (false, true),
+        (_, 17 | 18 | 84 | 92 | 201..=208 | 420 | 593) => (false, true),
         (_, 569 | 906) => (false, Capability::Drivers.is_built_in()),
         _ => (false, false),
     };

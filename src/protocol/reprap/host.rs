@@ -2,7 +2,7 @@
 
 use super::command::{has, value, words};
 use super::write::{cold, fixed, int, line_end, text};
-use super::{bed, card, names, report, settings, tuning};
+use super::{bed, card, names, report, settings, shaper, tuning};
 use crate::capability::Capability;
 use crate::config::Fixed;
 use crate::gcode::overrides::{Change, Override};
@@ -54,6 +54,7 @@ pub fn of(code: Option<Code>, block: &[u8]) -> Option<Code> {
         (b'G', 10) => !has(block, b'P') && !has(block, b'L'),
         (b'G', 11 | 28 | 161 | 162) => true,
         (b'G', 29) | (b'M', 420) => Capability::BedPlane.is_built_in(),
+        (b'M', 593) => Capability::Shaping.is_built_in(),
         (b'M', 122 | 569 | 906) => Capability::Drivers.is_built_in(),
         (b'M', number) => matches!(
             number,
@@ -143,6 +144,7 @@ pub fn part(
         502 => restore(at, machine),
         503 => settings::list(at, machine, out).map_or(Step::Done, Step::At),
         92 | 201..=206 => settings::set(number, at, block, machine, out),
+        593 => shaper::set(block, machine, out),
         900 => advance(block, machine, out),
         999 => match machine.clear() {
             Status::Again => Step::Later(0),
@@ -181,7 +183,7 @@ fn finished(machine: &mut impl Machine) -> Step {
     }
 }
 
-fn done(status: Status) -> Step {
+pub(super) fn done(status: Status) -> Step {
     if status == Status::Ok { Step::Done } else { Step::Refused(status) }
 }
 

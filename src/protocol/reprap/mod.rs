@@ -38,6 +38,7 @@ mod names;
 mod report;
 mod request;
 mod settings;
+mod shaper;
 mod status;
 mod telling;
 mod translate;

@@ -8,6 +8,7 @@ use crate::gcode::heating::{Heat, Part, Wait};
 use crate::gcode::setup::Setup;
 use crate::hal::eeprom::Eeprom;
 use crate::machine::{self, Alarm};
+use crate::motion::shaper::Resonances;
 use crate::protocol::Extruder;
 use crate::status::Status;
 use crate::store::kept;
@@ -113,4 +114,27 @@ pub(super) fn recall(view: &mut View<'_>) -> Status {
         Ok(()) => Status::Ok,
         Err(status) => status,
     }
+}
+
+/// M593: sets the resonances of the axes. The planner tells exec before the next line.
+pub(super) fn shape(view: &mut View<'_>, to: Resonances) -> Status {
+    let (links, alarm) = (view.links, machine::alarm());
+    if !view.may_feed() {
+        return Status::Muted;
+    }
+    if alarm != Alarm::None {
+        return alarm.status();
+    }
+    if machine::is_checking() {
+        return Status::Ok;
+    }
+    if links.commands_taken.get() || machine::is_flushing() {
+        return Status::Again;
+    }
+    let Some(resonances) = view.settings.resonances.first_mut() else {
+        return Status::NotBuiltIn;
+    };
+    *resonances = to;
+    links.changes.note(Changes::SETTINGS);
+    Status::Ok
 }

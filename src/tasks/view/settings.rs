@@ -12,6 +12,7 @@ use crate::tasks::drivers;
 use crate::tasks::heat;
 use crate::tasks::links::Changes;
 use crate::tasks::setup::limit_velocity;
+use crate::tasks::shaper;
 use crate::tasks::spindle;
 use crate::tasks::storage::{TO_ALL, TO_MACHINE, TO_OFFSETS};
 use crate::tasks::switches;
@@ -31,6 +32,10 @@ pub(super) fn set(view: &mut View<'_>, setting: Setting, value: i32) -> Result<W
             return Err(Status::NotAccepted);
         }
         view.links.storage.set_cold(setting, value)?;
+        if view.settings.set_resonance(setting, value) {
+            view.links.changes.note(Changes::SETTINGS);
+            return Ok(Warning::None);
+        }
         if drivers::set(&mut view.settings, setting, value) {
             set_hardware(view.links.thread, &view.settings);
             return Ok(Warning::None);
@@ -112,6 +117,7 @@ pub(super) fn restore(view: &mut View<'_>, offsets: bool) -> Status {
     view.links.changes.note(Changes::STEPS | Changes::SETTINGS);
     view.links.storage.forget(offsets);
     drivers::recall(&mut view.settings, view.links.storage);
+    shaper::recall(&mut view.settings, view.links.storage);
     spindle::set_all(view.links.thread, view.links.storage);
     heat::set_all(&view.links.heat, &mut view.settings, view.links.storage);
     view.links.storage.own();

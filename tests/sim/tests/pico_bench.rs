@@ -47,6 +47,10 @@ rows! {
     jerk_of_axes = "axes-jerk";
     distance_from_the_path = "axes-off";
     time_of_the_corpus = "axes-time";
+    ringing_behind_a_mean = "ring-mean";
+    ringing_near_the_resonance_behind_a_mean = "ring-mean-near";
+    ringing_behind_three_impulses = "ring-ei";
+    ringing_near_the_resonance_behind_three_impulses = "ring-ei-near";
     pauses_without_a_jerk_limit = "pauses-none";
     pauses_under_a_jerk_limit = "pauses-5000";
 }

@@ -26,9 +26,9 @@ const DRILLING: [&str; 10] = [
     "words",
 ];
 /// Transcripts that only emulated boards can play. No image for this chip has a card in TinyG's dialect, drivers with UART, built-in jobs, help
-/// screens, canned cycles and a second port, cycles that act on the spindle in TinyG's dialect, or both printing hosts and
+/// screens, input shaping, canned cycles and a second port, cycles that act on the spindle in TinyG's dialect, or both printing hosts and
 /// a second port or TinyG's dialect.
-pub const ELSEWHERE: [&str; 20] = [
+pub const ELSEWHERE: [&str; 22] = [
     "actions",
     "card",
     "corexy",
@@ -44,6 +44,8 @@ pub const ELSEWHERE: [&str; 20] = [
     "program.",
     "program-over",
     "reprap-ports",
+    "reprap-shaping",
+    "shaping",
     "text-grbl",
     "text-help",
     "text-in-json",

@@ -48,6 +48,7 @@ fn every_token_has_a_name_that_finds_it() {
             + 5
             + if Capability::Printer.is_built_in() { 16 + 6 } else { 0 }
             + if Capability::Drivers.is_built_in() { 15 + 4 } else { 0 }
+            + if Capability::Shaping.is_built_in() { 5 } else { 0 }
             + if Capability::Sd.is_built_in() { 3 } else { 0 }
     );
     for bad in [

@@ -8,6 +8,7 @@ use kerf::boards::{Board, PICO, PICO6};
 
 use super::Better::{Higher, Lower};
 use super::axes::{self, Measured};
+use super::ringing::{self, Amplitude};
 use super::workload::{How, USUAL_JERK, disturbances, settings};
 use super::{Figure, Row, corpus, ideal, pauses, spiral};
 use crate::emulated::even::{FAST, evenness};
@@ -47,7 +48,7 @@ const fn row(
 }
 
 /// The table.
-pub const ROWS: [Row<PicoBed>; 19] = [
+pub const ROWS: [Row<PicoBed>; 23] = [
     Row {
         target: Some(1e6),
         floor: Some(1e6),
@@ -151,6 +152,34 @@ pub const ROWS: [Row<PicoBed>; 19] = [
         decimals: 1,
         floor: Some(170.0),
         ..row("axes-time", "time of these jobs", "s", axes_time)
+    },
+    Row {
+        better: Lower,
+        decimals: 1,
+        target: Some(1.5),
+        floor: Some(0.6),
+        ..row("ring-mean", "a load rings behind a mean, at the resonance", "%", ring_mean)
+    },
+    Row {
+        better: Lower,
+        decimals: 1,
+        target: Some(8.0),
+        floor: Some(1.6),
+        ..row("ring-mean-near", "a load rings behind a mean, within 20 %", "%", ring_mean_near)
+    },
+    Row {
+        better: Lower,
+        decimals: 1,
+        target: Some(0.7),
+        floor: Some(0.3),
+        ..row("ring-ei", "a load rings behind EI, at the resonance", "%", ring_ei)
+    },
+    Row {
+        better: Lower,
+        decimals: 1,
+        target: Some(2.5),
+        floor: Some(0.7),
+        ..row("ring-ei-near", "a load rings behind EI, within 20 %", "%", ring_ei_near)
     },
     Row {
         better: Lower,
@@ -402,6 +431,51 @@ fn axes_off(bed: &PicoBed) -> Result<Figure> {
 
 fn axes_time(bed: &PicoBed) -> Result<Figure> {
     Ok(axes::time_of(&bed.corpus()?.motion))
+}
+
+fn ring_mean(bed: &PicoBed) -> Result<Figure> {
+    left(bed, 0, |amplitude| amplitude.here)
+}
+
+fn ring_mean_near(bed: &PicoBed) -> Result<Figure> {
+    left(bed, 0, |amplitude| amplitude.near)
+}
+
+fn ring_ei(bed: &PicoBed) -> Result<Figure> {
+    left(bed, 1, |amplitude| amplitude.here)
+}
+
+fn ring_ei_near(bed: &PicoBed) -> Result<Figure> {
+    left(bed, 1, |amplitude| amplitude.near)
+}
+
+/// How much a load rings with a filter, in percent of that without means.
+fn left(bed: &PicoBed, kind: u8, of: fn(&Amplitude) -> f64) -> Result<Figure> {
+    let (exact, means) = (rings(bed, "g61", None)?, rings(bed, "g64", None)?);
+    let value = 100.0 * of(&rings(bed, "g64", Some(kind))?) / of(&exact);
+    let note = format!(
+        "{:.1} um under G61, {:.0} % of it without a filter",
+        1e3 * of(&exact),
+        100.0 * of(&means) / of(&exact)
+    );
+    Ok(Figure { value, note })
+}
+
+/// Returns how much a load rings behind the moves of the job of `ringing`, with a filter of this kind.
+fn rings(bed: &PicoBed, mode: &str, kind: Option<u8>) -> Result<Amplitude> {
+    let mut settings: Vec<_> = ringing::SETTINGS.map(str::to_owned).to_vec();
+    if let Some(kind) = kind {
+        settings.push(format!("{{ist:{kind}}}"));
+        settings.push(format!("{{isx:{}}}", ringing::HERTZ));
+    }
+    let options = Options { settings, ..Options::default() };
+    let mut board = Emulated::load(&bed.elf, &PICO)?;
+    board.begin_recording();
+    let report = job::run(&mut board, &lines_of(&ringing::job(mode)), &options, |_| ())?;
+    ensure!(report.problems.is_empty(), "{}", report.problems.join("; "));
+    let steps = board.end_recording()?.steps(f64::from(PICO.clock_hz));
+    let setup = read_setup(&mut board, &mut Host::new(1))?;
+    Ok(ringing::amplitude(&steps, &setup))
 }
 
 /// Runs all jobs of the corpus.

@@ -17,6 +17,7 @@ mod pauses;
 mod printing;
 mod programmed;
 mod rates;
+mod ringing;
 mod rows;
 mod spirals;
 mod table;
