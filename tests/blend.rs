@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use kerf::config::StepRatio;
 use kerf::motion::exec::Step;
 use kerf::motion::factors::Factors;
+use kerf::motion::shaper::{EXTRA_INSENSITIVE, MEAN, Resonances};
 
 use crate::rig::{Config, Rig, at};
 use crate::seeds::try_all;
@@ -280,6 +281,15 @@ fn jobs_keep_to_acceleration_and_deviation() {
     }
 }
 
+/// One frequency, or those of X and Y.
+fn any_resonances(random: &mut Random) -> Resonances {
+    let mut hertz = || random.within(250.0, 1_000.0) as u16;
+    let (x, y) = (hertz(), hertz());
+    let y = if x < 400 || y < 400 { x } else { y };
+    let kind = if random.next() < 0.5 { MEAN } else { EXTRA_INSENSITIVE };
+    Resonances { hertz: [x, y, 0], damping: 10, kind }
+}
+
 /// Nine in ten thousand random paths take up to 1.12 of the acceleration of an axis, where corners of different kinds are
 /// some 30 ms apart.
 const RARE: f64 = 1.12;
@@ -291,7 +301,10 @@ fn random_paths_with_holds_and_overrides_keep_to_acceleration_and_deviation() {
         let mut random = Random(seed * 77 + 5);
         let last = if random.next() < 0.5 { 100.0 } else { 500.0 };
         let accel = if random.next() < 0.5 { 500.0 } else { 2_000.0 };
-        let config = config([accel, accel, last], BUILD_UP);
+        let mut config = config([accel, accel, last], BUILD_UP);
+        if random.next() < 0.4 {
+            config.resonances = any_resonances(&mut random);
+        }
         let deviation = [0.01, 0.02, 0.05, 0.1, 0.2][(random.next() * 5.0) as usize];
         let meddles = random.next() < 0.5;
         let (mut turns, mut until, mut held) = (0u64, 0u64, false);

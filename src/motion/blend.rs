@@ -51,6 +51,7 @@ use super::block::{Block, Body, Line};
 use super::dynamics::Dynamics;
 use super::float::{below, greater, least};
 use super::junction::{self, STRAIGHT, turn};
+use super::shaper::Resonances;
 use super::smooth::{SAMPLE_S, Spans};
 use crate::hal::{BLEND_S_MIN, STAGE};
 use crate::units::{AXES, PerAxis};
@@ -66,12 +67,16 @@ pub const SPARE: usize = 5;
 
 /// The share of the acceleration that corners may take.
 const SHARE: f32 = 0.8;
-/// The share of P that is used: the deviation is known at corners only.
+/// The share of P that is used: the deviation is known at corners only. With a filter against ringing, the steps of the
+/// kernel are longer.
 const USED: f32 = 0.93;
+const USED_WITH_FILTER: f32 = 0.85;
 /// The share of the acceleration that is left along a curve.
 const ROUND: f32 = 0.6;
 /// The least share of the acceleration that is left along the path, so that a hold can stop there.
 const LEAST_ROOM: f32 = 0.05;
+/// The same where the deviation asks for less.
+const LEAST_SHARE: f32 = 0.02;
 /// The room at the end of a path that has been flushed. The corner that may follow takes as much.
 const HALF: f32 = 0.5;
 /// Axes are alike if the acceleration limits differ by less.
@@ -190,6 +195,8 @@ struct Approach {
 pub struct Blend {
     /// When the planner began to wait for lines that follow, ms, modulo 2^16. The planner's.
     pub since: u16,
+    /// How far the corners of the planner's chain may be off, in units of [`Length`](crate::units::Length).
+    pub chained: u16,
     limits: Limits,
     /// The blocks: a ring.
     entries: [Entry; PLACES],
@@ -222,11 +229,13 @@ impl Blend {
     pub const fn new() -> Self {
         Self {
             since: 0,
+            chained: 0,
             limits: Limits {
                 kernel: Kernel::NONE,
                 spans: [0.0; 2],
                 windows: [0.0; 2],
                 deviation: 0.05,
+                used: USED,
                 accel: 0.0,
                 weights: [0; AXES],
                 accels: [0.0; AXES],
@@ -282,6 +291,8 @@ impl Blend {
             false => 0,
         });
         limits.kernel = Kernel::of(spans);
+        let filters = spans.resonances().is_some_and(Resonances::is_some);
+        limits.used = if filters { USED_WITH_FILTER } else { USED };
         let reach = limits.kernel.reach();
         limits.spans = [PER_MM * reach, 0.5 * PER_MM * reach * reach];
         let (corner, jerk) = spans.samples();

@@ -47,6 +47,7 @@ use crate::gcode::modal::FeedMode;
 use crate::gcode::overrides::Change;
 use crate::gcode::steps::{Step, Steps};
 use crate::hal::event::{Event, is_asked, wait};
+use crate::hal::system;
 use crate::jobs::Job;
 use crate::machine::{self, Cycle};
 #[cfg(feature = "printer")]
@@ -340,7 +341,10 @@ impl Planner {
         self.line = commands.line;
         match self.line(target, feed.copied(), may_merge) {
             Built::Parts(_) => return false,
-            Built::Merge => self.begun = Begun::Chain(Chain::closed(&self.position, target)),
+            Built::Merge => {
+                self.begun = Begun::Chain(Chain::closed(&self.position, target));
+                self.note_deviation();
+            }
             Built::Line(_) | Built::Blended(_) | Built::Nothing => {
                 self.begun = Begun::Nothing;
                 self.moved(&commands);
@@ -561,6 +565,8 @@ impl Planner {
 
     /// Queues a straight move, for which there is room. Queues nothing if the move is to be made in parts or merged.
     fn line(&mut self, target: &PerAxis<Length>, feed: Option<Feed>, may_merge: bool) -> Built {
+        // Before the line is built in the queue: lines that have waited may go there.
+        self.keep_to_deviation();
         let settings = self.links.settings.borrow();
         let curve = match &self.walk {
             Ongoing::Arc(ArcWalk { curve, .. }) => Some(curve),
@@ -587,7 +593,6 @@ impl Planner {
                 self.queue.push_unblended(entry, self.builder.unit(), self.line);
             }
             Built::Blended(begins) => {
-                self.keep_to_deviation();
                 self.waits_from_now();
                 self.queue.blend(self.builder.unit(), self.line, begins);
             }
@@ -722,10 +727,19 @@ impl Planner {
         }
     }
 
-    /// Returns the means for a line: none for one that keeps to its path exactly.
+    /// Returns the means for a line: none for one that keeps to its path exactly. Where corners keep to P, a P of 0 means
+    /// so, too.
     #[inline(always)]
     fn wanted_spans(&self, commands: &Commands) -> Spans {
-        if commands.is_exact_path() { Spans::NONE } else { self.dynamics.spans }
+        let is_exact = commands.is_exact_path() || system::blends() && self.rounded() == 0;
+        if is_exact { Spans::NONE } else { self.dynamics.spans }
+    }
+
+    /// Returns how far corners may be off the path, in units of [`Length`]. The G-code model has interpreted this line and
+    /// no later one.
+    #[inline(always)]
+    fn rounded(&self) -> u16 {
+        self.links.model.borrow().modal().rounded()
     }
 
     /// Tells exec the means, if they have changed or are to be empty. The machine stands still there.
@@ -741,19 +755,24 @@ impl Planner {
         }
     }
 
-    /// Sets how far corners may be off the path from this line on. The G-code model has interpreted this line and no
-    /// later one.
-    #[inline(never)]
-    #[small]
+    /// Sets how far corners may be off the path from this line on. A chain has that of its first line.
+    #[inline(always)]
     fn keep_to_deviation(&mut self) {
-        let deviation = f32::from(self.links.model.borrow().modal().rounded()) * 1e-4;
-        if let Some(stage) = self.queue.stage()
-            && stage.deviation().to_bits() != deviation.to_bits()
-        {
-            self.let_go(false);
-            if let Some(stage) = self.queue.stage() {
-                stage.set_deviation(deviation);
+        let (chains, now) = (self.has_chain(), self.rounded());
+        if let Some(stage) = self.queue.stage() {
+            let units = if chains { stage.chained } else { now };
+            let deviation = f32::from(units) * 1e-4;
+            if stage.deviation().to_bits() != deviation.to_bits() {
+                self.change_deviation(deviation);
             }
+        }
+    }
+
+    #[inline(never)]
+    fn change_deviation(&mut self, deviation: f32) {
+        self.let_go(false);
+        if let Some(stage) = self.queue.stage() {
+            stage.set_deviation(deviation);
         }
     }
 

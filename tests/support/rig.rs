@@ -17,6 +17,7 @@ use kerf::motion::exec::{Exec, Step, take_heat, take_override};
 use kerf::motion::factors::Factors;
 use kerf::motion::line::{Builder, Built, Line, Motors};
 use kerf::motion::queue::{BlockQueue, BlockSource, BlockStore};
+use kerf::motion::shaper::{Resonances, SHAPED};
 use kerf::motion::smooth::SAMPLE_S;
 use kerf::motion::snapshot::Snapshot;
 use kerf::units::{AXES, Length, PerAxis};
@@ -34,6 +35,8 @@ pub struct Config {
     pub drives: [u8; MOTORS],
     /// The backlash of each motor, steps.
     pub backlash: [u16; MOTORS],
+    /// The resonances of the axes.
+    pub resonances: Resonances,
 }
 
 /// Each motor drives an axis of its own.
@@ -53,6 +56,7 @@ impl Config {
             ratio: [StepRatio { num: 1, den: 125 }; MOTORS],
             drives: STRAIGHT,
             backlash: [0; MOTORS],
+            resonances: Resonances::NONE,
         }
     }
 
@@ -92,6 +96,9 @@ impl MachineLimits for Config {
     }
     fn has_backlash(&self) -> bool {
         self.backlash.iter().any(|width| *width != 0)
+    }
+    fn resonances(&self) -> [Resonances; SHAPED] {
+        [self.resonances; SHAPED]
     }
     fn junction_deviation(&self, _: usize) -> f32 {
         self.deviation

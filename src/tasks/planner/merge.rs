@@ -101,10 +101,20 @@ impl Planner {
             && chain.begin(&self.position, target, feed, tolerance)
         {
             self.wait_for_more(commands.line);
+            self.note_deviation();
             return true;
         }
         self.begun = Begun::Nothing;
         false
+    }
+
+    /// Notes how far the corners of the chain that has begun may be off.
+    #[inline(always)]
+    pub(super) fn note_deviation(&mut self) {
+        let deviation = self.rounded();
+        if let Some(stage) = self.queue.stage() {
+            stage.chained = deviation;
+        }
     }
 
     /// Notes that the line with this N word waits for the next one.

@@ -53,8 +53,8 @@ begins and ends. The acceleration and the junction deviation limit the speed. Th
             "Continuous path",
             "Follows the path. The machine stops only where it has to. With a jerk limit it rounds corners, so that the \
 velocity of no axis jumps. On an RP2040 the tool is then off the path by P at most, 0.05 mm without P and 1 mm at most, and no axis exceeds its \
-acceleration. Moves that take less than 0.8 ms each are left out of that: their corners are those of an ATmega2560. A small P makes corners slow: \
-with P0 the machine nearly stops at each, also on a curve of short moves. G61 follows the path without that. On an ATmega2560 the tool is up to \
+acceleration. Moves that take less than 0.8 ms each are left out of that: their corners are those of an ATmega2560. A small P makes corners slow, also \
+those of a curve of short moves; with P0 the machine follows the path as under G61. On an ATmega2560 the tool is up to \
 0.05 mm off at 500 mm/s^2, and more at higher accelerations, whatever P is. Short feed moves of linear axes are merged if they lie on a straight \
 line: on an RP2040 within a quarter of P, 0.0025 mm without P; on an ATmega2560 within P, 0.001 mm without P. A merged move takes at most 12 ms, \
 has at most 3.2 mm, and is off by 0.0254 mm at most; with P0 only exactly collinear moves are merged. On a curve where no moves can be merged, \
