@@ -74,7 +74,8 @@ fn drive(
     let mut ends: Vec<[f64; 3]> = vec![[0.0; 3]];
     for (n, (end, velocity)) in path.iter().enumerate() {
         while rig.free() < 2 {
-            if matches!(rig.turn(), Step::Idle) {
+            // In a hold lines go on to wait.
+            if matches!(rig.turn(), Step::Idle) && !rig.snapshot.held {
                 rig.flush(false);
             }
             meddle(&mut rig, n);

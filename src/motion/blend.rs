@@ -51,7 +51,6 @@ use super::block::{Block, Body, Line};
 use super::dynamics::Dynamics;
 use super::float::{below, greater, least};
 use super::junction::{self, STRAIGHT, turn};
-use super::shaper::Resonances;
 use super::smooth::{SAMPLE_S, Spans};
 use crate::hal::{BLEND_S_MIN, STAGE};
 use crate::units::{AXES, PerAxis};
@@ -67,10 +66,8 @@ pub const SPARE: usize = 5;
 
 /// The share of the acceleration that corners may take.
 const SHARE: f32 = 0.8;
-/// The share of P that is used: the deviation is known at corners only. With a filter against ringing, the steps of the
-/// kernel are longer.
+/// The share of P that is used: the deviation is known at corners only.
 const USED: f32 = 0.93;
-const USED_WITH_FILTER: f32 = 0.85;
 /// The share of the acceleration that is left along a curve.
 const ROUND: f32 = 0.6;
 /// The least share of the acceleration that is left along the path, so that a hold can stop there.
@@ -235,7 +232,6 @@ impl Blend {
                 spans: [0.0; 2],
                 windows: [0.0; 2],
                 deviation: 0.05,
-                used: USED,
                 accel: 0.0,
                 weights: [0; AXES],
                 accels: [0.0; AXES],
@@ -291,8 +287,6 @@ impl Blend {
             false => 0,
         });
         limits.kernel = Kernel::of(spans);
-        let filters = spans.resonances().is_some_and(Resonances::is_some);
-        limits.used = if filters { USED_WITH_FILTER } else { USED };
         let reach = limits.kernel.reach();
         limits.spans = [PER_MM * reach, 0.5 * PER_MM * reach * reach];
         let (corner, jerk) = spans.samples();

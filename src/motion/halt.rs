@@ -9,7 +9,7 @@
 //!
 //! Units: mm, s. Cost on AVR: 2,500 cycles a stretch.
 
-use super::float::{greater, least};
+use super::float::{below, greater, least};
 use super::governor::{Governor, Stretch};
 use crate::math::sqrt;
 
@@ -42,9 +42,12 @@ impl Governor {
                 return Stretch { seconds, distance: left, ends: true };
             }
         }
-        let next = v - accel * nominal;
+        let next = greater(v - accel * nominal, 0.0);
         self.velocity = next;
-        Stretch { seconds: nominal, distance: 0.5 * (v + next) * nominal, ends: false }
+        let distance = 0.5 * (v + next) * nominal;
+        // Rounding may put the end of the stretch at that of the block, or beyond.
+        let ends = !below(distance, left);
+        Stretch { seconds: nominal, distance: if ends { left } else { distance }, ends }
     }
 }
 
@@ -72,6 +75,25 @@ mod tests {
     }
 
     proptest! {
+        /// A stretch whose end is that of the block but for rounding.
+        #[test]
+        fn it_stays_within_the_block(
+            v in 0.01f32..500.0, accel in 20.0f32..5_000.0, nominal in 1e-4f32..4e-3, off in -4i32..4,
+            headroom in prop_oneof![Just(0.0f32), 0.0f32..100.0],
+        ) {
+            let next = (v - accel * nominal).max(0.0);
+            let way = 0.5 * (v + next) * nominal;
+            let left = f32::from_bits(way.to_bits().saturating_add_signed(off));
+            let mut governor = Governor::new();
+            governor.begin(accel);
+            governor.velocity = v;
+            governor.take_exactly(nominal);
+            let stretch = governor.halt(left, headroom);
+            prop_assert!(stretch.distance <= left && stretch.seconds <= nominal, "{stretch:?}");
+            prop_assert!(stretch.ends || stretch.distance < left, "{stretch:?}");
+            prop_assert!((0.0..=v).contains(&governor.velocity));
+        }
+
         #[test]
         fn it_stops_as_soon_as_may_be(v in 0.1f32..500.0, accel in 20.0f32..5_000.0) {
             let mut governor = Governor::new();

@@ -15,8 +15,6 @@ pub(super) struct Limits {
     pub(super) windows: [f32; 2],
     /// P, mm.
     pub(super) deviation: f32,
-    /// The share of P that is used.
-    pub(super) used: f32,
     /// The least acceleration limit of an axis, mm/s^2.
     pub(super) accel: f32,
     /// That over the acceleration limit of each axis, in 2^-8.

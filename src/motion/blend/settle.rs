@@ -1,7 +1,7 @@
 //! Makes corners final when the path that waits is longer than their windows.
 
 use super::limits::{in_lengths, reach, zone};
-use super::{Blend, Entry, LEAST_SHARE, PER_MM};
+use super::{Blend, Entry, LEAST_SHARE, PER_MM, USED};
 use crate::motion::float::{greater, least};
 use crate::motion::junction::STRAIGHT;
 
@@ -65,7 +65,7 @@ impl Blend {
         let accel = greater(self.ahead_of(corner).map_or(0.0, Entry::accel), entry.accel());
         let mean = self.mean_of(corner, accel);
         let mut velocity = least(entry.entry, entry.asked[mean].velocity);
-        let allowed = self.limits.used * self.limits.deviation;
+        let allowed = USED * self.limits.deviation;
         let mut share = 1.0;
         let may_be_off = self.most_off(&entry, velocity, accel) > allowed;
         if may_be_off && self.off(corner, velocity, accel) > allowed {

@@ -74,14 +74,14 @@ impl Exec {
             true => self.governor.halt(before, headroom),
             false => self.governor.part(before, cruise, headroom),
         };
-        if stretch.ends {
+        // What rounding takes from a short stretch in a long line belongs to the next one.
+        let distance = stretch.distance + running.owed;
+        if stretch.ends || !below(distance, before) {
             self.sampler.end(stretch.seconds);
             running.active = false;
             blocks.release();
             return;
         }
-        // What rounding takes from a short stretch in a long line belongs to the next one.
-        let distance = stretch.distance + running.owed;
         running.left = before - distance;
         running.owed = distance - (before - running.left);
         self.sampler.add(stretch.seconds, before, running.left);
