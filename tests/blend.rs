@@ -327,7 +327,9 @@ fn random_paths_with_holds_and_overrides_keep_to_acceleration_and_deviation() {
         let now = run(&config, &random_path(seed, 150), Some(deviation), meddle);
         all.fetch_add(1, Relaxed);
         over.fetch_add((now.over > 1.02).into(), Relaxed);
-        let is_good = now.over <= RARE && now.off <= f64::from(deviation) + 2.0 / STEPS;
+        // The filter for three impulses is not quite the same from either end.
+        let steps = if config.resonances.is_some() { 3.0 } else { 2.0 };
+        let is_good = now.over <= RARE && now.off <= f64::from(deviation) + steps / STEPS;
         let told = || format!("{:.3} of A, {:.1} um of {deviation} mm", now.over, 1e3 * now.off);
         if is_good { Ok(()) } else { Err(told()) }
     });

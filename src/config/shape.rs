@@ -4,7 +4,7 @@ use super::groups::shaper;
 use super::table::row_of;
 use super::{Owner, Setting, Settings};
 use crate::capability::Capability;
-use crate::motion::shaper::Resonances;
+use crate::motion::shaper::{HERTZ, RINGING, Resonances};
 
 /// The value of a frequency, in 0.1 Hz.
 const TENTH: i32 = 100;
@@ -27,8 +27,16 @@ impl Settings {
         now.is_none_or(|now| {
             let mut then = *now;
             put(&mut then, setting, value);
-            then.fits()
+            let is_low = setting.is_frequency() && (1..TENTH * i32::from(HERTZ.0)).contains(&value);
+            then.fits() && !is_low
         })
+    }
+}
+
+impl Setting {
+    /// Whether this is the frequency of a resonance.
+    fn is_frequency(self) -> bool {
+        usize::from(self.index()) < RINGING
     }
 }
 

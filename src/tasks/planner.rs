@@ -567,6 +567,7 @@ impl Planner {
     fn line(&mut self, target: &PerAxis<Length>, feed: Option<Feed>, may_merge: bool) -> Built {
         // Before the line is built in the queue: lines that have waited may go there.
         self.keep_to_deviation();
+        self.note_rest();
         let settings = self.links.settings.borrow();
         let curve = match &self.walk {
             Ongoing::Arc(ArcWalk { curve, .. }) => Some(curve),
@@ -765,6 +766,19 @@ impl Planner {
             if stage.deviation().to_bits() != deviation.to_bits() {
                 self.change_deviation(deviation);
             }
+        }
+    }
+
+    /// Where lines are blended: notes that the next one has no corner, if the machine has come to rest.
+    #[inline(always)]
+    fn note_rest(&mut self) {
+        let thread = self.links.thread;
+        if let Some(stage) = self.queue.stage()
+            && stage.is_empty()
+            && queue::used_here() == 0
+            && !common::with(thread, |common| common.motion.running)
+        {
+            stage.stop();
         }
     }
 

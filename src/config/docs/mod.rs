@@ -152,7 +152,7 @@ the spindle is off, and S24000 gives 10 V. Example for a spindle of 12,000 RPM: 
         ),
         (
             "Input shaping",
-            "The group `is`: `isx`. Only images with the capability `shaping` have it, those of boards with an RP2040. They apply from the next line on, at which the machine stops.",
+            "The group `is`: `isx`. Only images with the capability `shaping` have it, those of boards with an RP2040. M593 of printing hosts changes them in motion.",
             &[Owner::Shaper],
             &shaper::MEANINGS,
         ),

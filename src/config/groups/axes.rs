@@ -53,7 +53,7 @@ group! {
         AC "ac": fixed(1, 1, 0).with(UNIT), [0; 6],
             length(text!("acceleration maximum"), text!("/s^2 (0 is none)")),
             "Maximum acceleration. 0: no limit, only the jerk limits the ramps. If `jm` reaches `ac` within 1 ms, `jm` has no effect, and a message says so.";
-        BL "bl": if crate::capability::Capability::Backlash.is_built_in() { up_to(fixed(4, 3, 0), 2_0000).with(UNIT | RANGE | HOMING | IDLE) } else { constant(3).with(HOMING) }, [0; 6],
+        BL "bl": if crate::capability::Capability::Backlash.is_built_in() { up_to(fixed(4, 3, 0), 2_0000).with(UNIT | HOMING | IDLE) } else { constant(3).with(HOMING) }, [0; 6],
             length(text!("backlash"), NONE),
             "Backlash: how far the motor turns before the axis follows, when it reverses; at most 4,095 steps. Kerf adds this distance at each reversal, without a stop. The axis then has 3/4 of `ac`, `jm` and `jh`, and 15/16 of `vm` and `fr`, for its path. Under G61 only reversals at which the machine stops are compensated. On a CoreXY machine X is for the motor that drives X + Y, and Y for the other one.";
     }

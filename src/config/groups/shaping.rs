@@ -14,7 +14,7 @@ group! {
         Z "z": frequency(), 0,
             words(text!("z resonance"), HZ),
             "Frequency at which Z rings.";
-        T "t": whole(cold(0), 1), 0,
+        T "t": whole(cold(0), 1).with(IDLE), 0,
             words(text!("shaper type"), SHAPERS),
             "How to shape. 0: a mean over a period. 1: EI, three impulses over a period, which also work if the resonance is up to 20 % off, and round corners more.";
         D "d": damping(), 100,
