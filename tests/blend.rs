@@ -6,9 +6,9 @@ use std::f64::consts::{PI, TAU};
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 use kerf::config::StepRatio;
+use kerf::config::shape::{EXTRA_INSENSITIVE, MEAN, Resonances};
 use kerf::motion::exec::Step;
 use kerf::motion::factors::Factors;
-use kerf::motion::shaper::{EXTRA_INSENSITIVE, MEAN, Resonances};
 
 use crate::rig::{Config, Rig, at};
 use crate::seeds::try_all;

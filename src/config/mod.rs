@@ -16,7 +16,7 @@ pub mod number;
 pub mod ratio;
 pub mod rows;
 pub mod setting;
-mod shape;
+pub mod shape;
 pub mod table;
 pub mod words;
 
@@ -33,7 +33,6 @@ use crate::baud;
 use crate::boards::MOTORS;
 use crate::capability::Capability;
 use crate::kinematics;
-use crate::motion::shaper::{Resonances, SHAPED};
 use crate::status::Status;
 use crate::units::{AXES, FIRST_ROTARY};
 use bed::{BEDS, Bed};
@@ -41,6 +40,7 @@ use drive::{DRIVERS, Drive};
 use groups::motor;
 use heating::Heating;
 use setting::{LARGES, SMALLS, large_of, small_of};
+use shape::{Resonances, SHAPED};
 use table::{CLAMP, JERK, Kind, MODE, RADIUS, RANGE, SettingRow, UNIT};
 
 /// The current values of the settings.

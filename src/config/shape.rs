@@ -1,10 +1,66 @@
-//! The resonances of the axes. Kept beside the settings, because the planner reads them.
+//! The resonances of the axes, and how to shape for them. Kept beside the settings, because the planner reads them.
 
 use super::groups::shaper;
 use super::table::row_of;
 use super::{Owner, Setting, Settings};
 use crate::capability::Capability;
-use crate::motion::shaper::{HERTZ, RINGING, Resonances};
+
+/// 1 in an image that can shape, else 0.
+pub const SHAPED: usize = Capability::Shaping.is_built_in() as usize;
+
+/// The axes that have a resonance: X Y Z.
+pub const RINGING: usize = 3;
+
+/// The lowest and the highest resonance, 0.1 Hz.
+pub const HERTZ: (u16, u16) = (200, 1_000);
+
+/// The most that the periods of different resonances take together, ms.
+pub const PERIODS_MS: usize = 100;
+
+/// The largest damping ratio, percent.
+pub const DAMPING_MOST: u8 = 30;
+
+/// A mean over a period.
+pub const MEAN: u8 = 0;
+/// Three impulses.
+pub const EXTRA_INSENSITIVE: u8 = 1;
+
+/// The resonances of the axes, and how to shape for them.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Resonances {
+    /// The frequency of each axis, 0.1 Hz; 0 for none.
+    pub hertz: [u16; RINGING],
+    /// The damping ratio, percent.
+    pub damping: u8,
+    /// [`MEAN`] or [`EXTRA_INSENSITIVE`].
+    pub kind: u8,
+}
+
+impl Resonances {
+    /// No resonance. Damping and kind are the defaults of the settings.
+    pub const NONE: Self = Self { hertz: [0; RINGING], damping: 10, kind: MEAN };
+
+    /// Whether an axis has a resonance.
+    pub fn is_some(&self) -> bool {
+        self.hertz != [0; RINGING]
+    }
+
+    /// The different frequencies, 0.1 Hz.
+    pub fn different(&self) -> impl Iterator<Item = u16> {
+        let hertz = self.hertz;
+        hertz.into_iter().enumerate().filter_map(move |(n, one)| {
+            let known = hertz.iter().take(n).any(|other| *other == one);
+            ((HERTZ.0..=HERTZ.1).contains(&one) && !known).then_some(one)
+        })
+    }
+
+    /// Whether each frequency is in range or 0, and their periods are not too long together.
+    pub fn fits(&self) -> bool {
+        let known = |hertz: &u16| *hertz == 0 || (HERTZ.0..=HERTZ.1).contains(hertz);
+        let periods: u32 = self.different().map(|hertz| 100_000_000 / u32::from(hertz)).sum();
+        self.hertz.iter().all(known) && periods <= PERIODS_MS as u32 * 10_000
+    }
+}
 
 /// The value of a frequency, in 0.1 Hz.
 const TENTH: i32 = 100;

@@ -6,8 +6,8 @@
 use super::groups::{axis, motor, system};
 use super::machines;
 use super::name::token;
+use super::shape;
 use crate::boards::{ACTIVE, MOTORS};
-use crate::motion::shaper;
 use crate::units::AXES;
 use crate::{named, progmem};
 
@@ -124,12 +124,12 @@ pub(super) const fn seconds(most: i32) -> SettingRow {
 
 /// A row for the frequency of a resonance, in EEPROM only; 0 for none.
 pub(super) const fn frequency() -> SettingRow {
-    up_to(cold(1), shaper::HERTZ.1 as i32 * 100).with(IDLE)
+    up_to(cold(1), shape::HERTZ.1 as i32 * 100).with(IDLE)
 }
 
 /// A row for a damping ratio, in EEPROM only.
 pub(super) const fn damping() -> SettingRow {
-    up_to(cold(2), shaper::DAMPING_MOST as i32 * 10).with(IDLE)
+    up_to(cold(2), shape::DAMPING_MOST as i32 * 10).with(IDLE)
 }
 
 /// A row for the current of a driver, in amperes with three decimals, in EEPROM only.

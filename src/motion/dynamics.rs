@@ -6,11 +6,11 @@
 use super::float::{below, greater, lesser, some};
 use super::line::Motors;
 use super::pace::Drivers;
-use super::shaper::{Resonances, SHAPED};
 use super::short::Short;
 use super::smooth::{CORNER_S, Spans};
 use crate::boards::MOTORS;
 use crate::config::StepRatio;
+use crate::config::shape::{Resonances, SHAPED};
 use crate::kinematics;
 use crate::math::sqrt;
 use crate::units::PerAxis;

@@ -5,7 +5,7 @@
 //! acceleration. A filter whose response is small there leaves little to ring:
 //!
 //! - [`MEAN`]: a mean over one period of the resonance. It needs no damping ratio.
-//! - [`EXTRA_INSENSITIVE`]: three impulses, half a period apart, so weighted that 5 % is left at the resonance and less
+//! - [`EXTRA_INSENSITIVE`](crate::config::shape::EXTRA_INSENSITIVE): three impulses, half a period apart, so weighted that 5 % is left at the resonance and less
 //!   than that near it (Singhose, Seering, Singer: residual vibration reduction using vector diagrams, 1990). So it still
 //!   works if the resonance is up to 20 % off.
 //!
@@ -22,25 +22,10 @@
 //! 30,000 for a change. RAM: 4 bytes for each weight and channel.
 
 use super::smooth::SAMPLE_S;
-use crate::capability::Capability;
+use crate::config::shape::{MEAN, PERIODS_MS, RINGING, Resonances, SHAPED};
 use crate::hal::SAMPLE_MS;
 use crate::math::{round, sqrt};
 use kerf_macros::small;
-
-/// 1 in an image that can shape, else 0.
-pub const SHAPED: usize = Capability::Shaping.is_built_in() as usize;
-
-/// The axes that have a resonance: X Y Z.
-pub const RINGING: usize = 3;
-
-/// The lowest and the highest resonance, 0.1 Hz.
-pub const HERTZ: (u16, u16) = (200, 1_000);
-
-/// The most that the periods of different resonances take together, ms.
-const PERIODS_MS: usize = 100;
-
-/// The largest damping ratio, percent.
-pub const DAMPING_MOST: u8 = 30;
 
 /// The most weights: damping makes periods up to 1.05 times as long, and each filter ends within a sample.
 pub const WEIGHTS: usize = SHAPED * (PERIODS_MS * 21 / 20 / SAMPLE_MS as usize + 2 * RINGING);
@@ -49,50 +34,8 @@ pub const WEIGHTS: usize = SHAPED * (PERIODS_MS * 21 / 20 / SAMPLE_MS as usize +
 const ONE: u16 = 1 << ONE_LOG2;
 const ONE_LOG2: u8 = 15;
 
-/// What is left of a vibration at the resonance behind an [`EXTRA_INSENSITIVE`] filter.
+/// What is left of a vibration at the resonance behind a filter of three impulses.
 const LEFT: f32 = 0.05;
-
-/// A mean over a period.
-pub const MEAN: u8 = 0;
-/// Three impulses.
-pub const EXTRA_INSENSITIVE: u8 = 1;
-
-/// The resonances of the axes, and how to shape for them.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Resonances {
-    /// The frequency of each axis, 0.1 Hz; 0 for none.
-    pub hertz: [u16; RINGING],
-    /// The damping ratio, percent.
-    pub damping: u8,
-    /// [`MEAN`] or [`EXTRA_INSENSITIVE`].
-    pub kind: u8,
-}
-
-impl Resonances {
-    /// No resonance. Damping and kind are the defaults of the settings.
-    pub const NONE: Self = Self { hertz: [0; RINGING], damping: 10, kind: MEAN };
-
-    /// Whether an axis has a resonance.
-    pub fn is_some(&self) -> bool {
-        self.hertz != [0; RINGING]
-    }
-
-    /// The different frequencies, 0.1 Hz.
-    fn different(&self) -> impl Iterator<Item = u16> {
-        let hertz = self.hertz;
-        hertz.into_iter().enumerate().filter_map(move |(n, one)| {
-            let known = hertz.iter().take(n).any(|other| *other == one);
-            ((HERTZ.0..=HERTZ.1).contains(&one) && !known).then_some(one)
-        })
-    }
-
-    /// Whether each frequency is in range or 0, and their periods are not too long together.
-    pub fn fits(&self) -> bool {
-        let known = |hertz: &u16| *hertz == 0 || (HERTZ.0..=HERTZ.1).contains(hertz);
-        let periods: u32 = self.different().map(|hertz| 100_000_000 / u32::from(hertz)).sum();
-        self.hertz.iter().all(known) && periods <= PERIODS_MS as u32 * 10_000
-    }
-}
 
 /// The weights of a filter: what part of a distance comes out in each sample.
 #[derive(Clone, Copy, Debug)]
@@ -252,6 +195,7 @@ impl Shaped {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::config::shape::{DAMPING_MOST, EXTRA_INSENSITIVE, HERTZ};
     use proptest::prelude::*;
     use std::f64::consts::TAU;
     use std::vec::Vec;

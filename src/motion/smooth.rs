@@ -29,8 +29,9 @@ use kerf_macros::small;
 use super::advance::EXTRUDERS;
 use super::divide::quotient_remainder;
 use super::float::whole;
-use super::shaper::{Resonances, SHAPED, Shaped, Weights};
+use super::shaper::{Shaped, Weights};
 use crate::boards::MOTORS;
+use crate::config::shape::{Resonances, SHAPED};
 use crate::hal::{SAMPLE_MS, TIMER_HZ};
 
 /// Duration of a sample, s.

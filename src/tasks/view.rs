@@ -38,6 +38,8 @@ use crate::capability::Capability;
 use crate::card::{Entry, NAME_MAX, Op};
 #[cfg(feature = "bed-plane")]
 use crate::config::bed::Bed;
+#[cfg(feature = "dialect-reprap")]
+use crate::config::shape::Resonances;
 use crate::config::{Setting, Settings};
 use crate::gcode::command::Motion;
 use crate::gcode::overrides::Change;
@@ -53,8 +55,6 @@ use crate::heat::tune::Tune;
 use crate::jobs::LINE_MAX;
 use crate::machine::{self, Alarm, Cycle, Doing};
 use crate::motion::queue;
-#[cfg(feature = "dialect-reprap")]
-use crate::motion::shaper::Resonances;
 use crate::motion::snapshot::{Moment, Program};
 #[cfg(feature = "bed-plane")]
 use crate::protocol::Level;

@@ -3,6 +3,7 @@
 use avr_embassy::host::Runtime;
 use kerf::boards::MOTORS;
 use kerf::config::StepRatio;
+use kerf::config::shape::{Resonances, SHAPED};
 use kerf::dda::{Dda, PHASE_MARGIN, Pins, SEGMENTS, STEP, Segment};
 use kerf::gcode::command::Feed;
 use kerf::gcode::overrides::Change;
@@ -17,7 +18,6 @@ use kerf::motion::exec::{Exec, Step, take_heat, take_override};
 use kerf::motion::factors::Factors;
 use kerf::motion::line::{Builder, Built, Line, Motors};
 use kerf::motion::queue::{BlockQueue, BlockSource, BlockStore};
-use kerf::motion::shaper::{Resonances, SHAPED};
 use kerf::motion::smooth::SAMPLE_S;
 use kerf::motion::snapshot::Snapshot;
 use kerf::units::{AXES, Length, PerAxis};

@@ -134,7 +134,7 @@ fn filtered(weights: &[u32; SAMPLES], means: usize, filter: &Weights) -> ([u32; 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::motion::shaper::{Resonances, SHAPED};
+    use crate::config::shape::{Resonances, SHAPED};
 
     /// The mean of what is above 0, by the definition.
     fn exact(spans: Spans, t: f64) -> (f64, f64) {

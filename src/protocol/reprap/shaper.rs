@@ -4,7 +4,7 @@ use super::command::{has, value};
 use super::host::{Step, done};
 use super::write::{fixed, line_end, text};
 use crate::config::Fixed;
-use crate::motion::shaper::{DAMPING_MOST, RINGING, Resonances};
+use crate::config::shape::{DAMPING_MOST, RINGING, Resonances};
 use crate::protocol::{Machine, Out};
 use crate::status::Status;
 use crate::text;

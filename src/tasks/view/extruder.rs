@@ -3,12 +3,12 @@
 use kerf_macros::small;
 
 use super::{View, set_hardware};
+use crate::config::shape::Resonances;
 use crate::gcode::command::Motion;
 use crate::gcode::heating::{Heat, Part, Wait};
 use crate::gcode::setup::Setup;
 use crate::hal::eeprom::Eeprom;
 use crate::machine::{self, Alarm};
-use crate::motion::shaper::Resonances;
 use crate::protocol::Extruder;
 use crate::status::Status;
 use crate::store::kept;
