@@ -65,7 +65,7 @@ fn with_machine<T: Send>(what: impl FnOnce(&mut Host) -> T + Send) -> T {
     })
 }
 
-const CHANGES: [&str; 12] = [
+const CHANGES: [&str; 13] = [
     "{mch:1}",
     "{1tr:39.5,1po:1,4ma:1}",
     "{x:{vm:3210,fr:1234.5,tn:-1.5,tm:287.25}}",
@@ -78,6 +78,7 @@ const CHANGES: [&str; 12] = [
     "g28.3 x12.5 y7 z-3",
     "g28.1",
     "{psw:0,gun:0}",
+    "{isx:42.5,ist:1,isd:0.05,drr1:0.7,xbl:0.05}",
 ];
 
 fn saved_machine(more: &[&str]) -> Json {
@@ -173,11 +174,11 @@ fn a_machine_that_does_not_rest_is_left_alone() {
 
 #[test]
 fn what_cannot_be_set_is_told() {
-    let file =
-        Json::parse(r#"{"x":{"vm":-1,"fr":900,"nn":1},"sys":{"fb":1,"st":1}}"#).expect("JSON");
+    let file = Json::parse(r#"{"6":{"mi":8},"x":{"vm":-1,"fr":900,"nn":1},"sys":{"fb":1,"st":1}}"#)
+        .expect("JSON");
     let wrong = with_machine(|host| load(host, &file).expect("it can be loaded"));
     let text = wrong.join("\n");
     assert!(text.contains("x vm:-1 is refused with status 108"), "{text}");
-    assert!(text.contains("there is no x nn"), "{text}");
+    assert!(text.contains("there is no x nn") && text.contains("there is no 6"), "{text}");
     assert!(!text.contains("fr:") && !text.contains("sys"), "{text}");
 }

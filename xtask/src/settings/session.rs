@@ -20,12 +20,12 @@ const LINE: usize = 200;
 const KEPT: usize = 2_000;
 
 /// The groups of settings, in the order in which they are loaded.
-const GROUPS: [&str; 21] = [
-    "1", "2", "3", "4", "x", "y", "z", "a", "b", "c", "p1", "sp", "co", "sq", "he1", "he3", "uda",
-    "udb", "udc", "udd", "sys",
+const GROUPS: [&str; 25] = [
+    "1", "2", "3", "4", "5", "6", "x", "y", "z", "a", "b", "c", "p1", "sp", "co", "sq", "he1",
+    "he3", "dr", "is", "uda", "udb", "udc", "udd", "sys",
 ];
 /// Groups that an image may lack.
-const HEATERS: [&str; 2] = ["he1", "he3"];
+const OPTIONAL: [&str; 6] = ["5", "6", "he1", "he3", "dr", "is"];
 const UNKNOWN: f64 = 100.0;
 /// Coordinate systems.
 const SYSTEMS: [&str; 9] = ["g54", "g55", "g56", "g57", "g58", "g59", "g591", "g592", "g593"];
@@ -127,7 +127,7 @@ pub fn save(line: &mut impl Line) -> Result<Json, String> {
     for group in groups() {
         let request = format!("{{{group}:n}}");
         let body = match exchange(line, &request)? {
-            (_, UNKNOWN) if HEATERS.contains(&group.as_str()) => continue,
+            (_, UNKNOWN) if OPTIONAL.contains(&group.as_str()) => continue,
             (body, 0.0) => body,
             (_, status) => return Err(format!("{request} is refused with status {status}")),
         };
@@ -225,6 +225,12 @@ pub fn load(line: &mut impl Line, file: &Json) -> Result<Vec<String>, String> {
     let names: Vec<_> = groups().filter(|group| !is_stored(group)).collect();
     for group in &names {
         let Some(members) = file.get(group) else { continue };
+        if OPTIONAL.contains(&group.as_str())
+            && exchange(line, &format!("{{{group}:n}}"))?.1 == UNKNOWN
+        {
+            wrong.push(format!("there is no {group}"));
+            continue;
+        }
         let is_meant = |(name, _): &&(String, Json)| {
             let name = name.as_str();
             let others = [&FIXED[..], &TALK, &STOPPING, &[PROFILE]].concat();
