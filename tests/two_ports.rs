@@ -153,6 +153,20 @@ impl Two {
         }
     }
 
+    /// Whether a port has room for a line after so many: not all are answered. Waits for it for a second.
+    fn has_room(&mut self, port: usize, sent: usize) -> bool {
+        let room = [8, 3][port];
+        (0..100).any(|_| {
+            let tongue = self.tongues[port];
+            let answered = self.heard[port].iter().filter_map(|line| tongue.answer(line)).count();
+            let has = sent < answered + room;
+            if !has {
+                self.run(10);
+            }
+            has
+        })
+    }
+
     /// Takes what a port has heard: the statuses of answers, and how often it was told of an alarm.
     fn take(&mut self, port: usize) -> (Vec<String>, usize) {
         let (tongue, heard) = (self.tongues[port], core::mem::take(&mut self.heard[port]));
@@ -702,8 +716,10 @@ fn each_line_is_answered_whatever_both_ports_do() {
                         continue;
                     }
                 };
-                two.send(port, line);
-                sent[port] += 1;
+                if two.has_room(port, sent[port]) {
+                    two.send(port, line);
+                    sent[port] += 1;
+                }
                 let ms = two.random(12) as u64;
                 two.run(ms);
             }
@@ -726,7 +742,8 @@ fn each_line_is_answered_whatever_both_ports_do() {
             }
             for port in 0..2 {
                 two.send(port, "G1F600X0.1");
-                two.run(500);
+                // The move may be a few mm long.
+                two.run(2_000);
                 let (answers, _) = two.take(port);
                 if answers != ["0"] {
                     return two.fails(&format!("port {port} does not go on: {answers:?}"));
