@@ -31,7 +31,6 @@ pub use words::Words;
 
 use crate::baud;
 use crate::boards::MOTORS;
-use crate::capability::Capability;
 use crate::kinematics;
 use crate::status::Status;
 use crate::units::{AXES, FIRST_ROTARY};
@@ -133,11 +132,8 @@ impl Settings {
     #[small]
     pub fn check(&self, setting: Setting, number: Number, inches: bool) -> Result<i32, Status> {
         let row = setting.row();
-        if !Capability::Backlash.is_built_in() && setting.is_backlash() {
-            return Err(Status::NotBuiltIn);
-        }
         if matches!(row.kind, Kind::Constant | Kind::Text) {
-            return Err(Status::ReadOnly);
+            return Err(setting.refusal());
         }
         if row.stored == 0 && !number.is_integer() {
             return Err(Status::BadNumber);

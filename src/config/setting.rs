@@ -12,6 +12,7 @@ use super::words::Words;
 use crate::boards::{ACTIVE, MOTORS};
 use crate::capability::Capability;
 use crate::progmem::{Slice, Text};
+use crate::status::Status;
 use crate::text;
 use crate::units::{AXES, FIRST_ROTARY};
 
@@ -395,8 +396,14 @@ impl Setting {
         matches!(self.owner(), Owner::Motor(_)) || self.row().is(IDLE)
     }
 
+    /// Why this constant cannot be set.
+    pub fn refusal(self) -> Status {
+        let lacks = !Capability::Backlash.is_built_in() && self.is_backlash();
+        if lacks { Status::NotBuiltIn } else { Status::ReadOnly }
+    }
+
     /// Whether this is `bl`, the backlash of an axis.
-    pub fn is_backlash(self) -> bool {
+    fn is_backlash(self) -> bool {
         matches!(self.owner(), Owner::Axis(_))
             && self.index() == const { row_of(&axis::LIST, "bl") }
     }

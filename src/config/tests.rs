@@ -1,6 +1,7 @@
 //! Setting and showing values.
 
 use super::*;
+use crate::capability::Capability;
 use crate::units::Length;
 use proptest::prelude::*;
 use std::string::String;

@@ -103,7 +103,7 @@ impl Request {
                 let value = bits(pair, c.line)?;
                 return c.machine.set(setting, value).map(|_| ());
             }
-            table::Kind::Constant | table::Kind::Text => return Err(Status::ReadOnly),
+            table::Kind::Constant | table::Kind::Text => return Err(setting.refusal()),
         };
         let value = match pair.kind {
             Kind::Number => number(pair, c.line)?,

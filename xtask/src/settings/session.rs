@@ -41,8 +41,8 @@ const TALK: [&str; 12] = ["ej", "js", "tv", "ec", "ee", "ex", "rxm", "sv", "si",
 const STOPPING: [&str; 2] = ["saf", "est"];
 /// The machine profile. It overwrites motors and axes, so it is sent first.
 const PROFILE: &str = "mch";
-/// The status of a value that cannot be set.
-const READ_ONLY: f64 = 104.0;
+/// The statuses of a value that cannot be set. [`differ`] tells if it is another one.
+const CONSTANT: [f64; 2] = [104.0, 118.0];
 
 /// Sends a line. Returns the body and the status of the answer.
 fn exchange(line: &mut impl Line, request: &str) -> Result<(Json, f64), String> {
@@ -178,7 +178,7 @@ fn put(
         // Sends them one by one to find the refused one.
         for member in some {
             let (_, status) = exchange(line, &request(std::slice::from_ref(member)))?;
-            if status != 0.0 && status != READ_ONLY {
+            if status != 0.0 && !CONSTANT.contains(&status) {
                 refused.push(format!("{group} {} is refused with status {status}", pair(member)));
             }
         }
