@@ -164,17 +164,18 @@ fn falls(x: f32) -> f32 {
 pub struct Shaped {
     last: [i32; WEIGHTS],
     /// The remainder of the last sum, in 2^-15.
-    rest: u16,
+    rest: [u16; SHAPED],
 }
 
 impl Shaped {
     /// No distance.
-    pub const NONE: Self = Self { last: [0; WEIGHTS], rest: 0 };
+    pub const NONE: Self = Self { last: [0; WEIGHTS], rest: [0; SHAPED] };
 
     /// Takes in the distance of a sample at the place `at` of the ring, and returns what comes out.
     #[inline(always)]
     pub fn put(&mut self, new: i32, at: u8, weights: &[u16]) -> i32 {
         let at = usize::from(at);
+        let Some(rest) = self.rest.first_mut() else { return new };
         let Some(ring) = self.last.get_mut(..weights.len()) else { return new };
         let Some(place) = ring.get_mut(at) else { return new };
         *place = new;
@@ -186,8 +187,8 @@ impl Shaped {
             upper += (sample >> 16) * i32::from(*weight);
             lower += (*sample as u16 as u32) * u32::from(*weight);
         }
-        let sum = (i64::from(upper) << 16) + i64::from(lower) + i64::from(self.rest);
-        self.rest = (sum & i64::from(ONE - 1)) as u16;
+        let sum = (i64::from(upper) << 16) + i64::from(lower) + i64::from(*rest);
+        *rest = (sum & i64::from(ONE - 1)) as u16;
         (sum >> ONE_LOG2) as i32
     }
 }
@@ -248,7 +249,7 @@ mod tests {
                 at = if at == weights.lag() { 0 } else { at + 1 };
             }
             prop_assert_eq!(sum, inputs.iter().sum::<i32>());
-            prop_assert_eq!(shaped.rest, 0);
+            prop_assert_eq!(shaped.rest, [0; SHAPED]);
         }
     }
 
