@@ -101,6 +101,12 @@ impl Owner {
         }
     }
 
+    /// Returns the owner's settings.
+    #[inline(always)]
+    pub fn settings(self) -> impl Iterator<Item = Setting> {
+        (0..self.rows()).filter_map(move |row| Setting::of(self, row))
+    }
+
     /// Returns the name of the owner's group, which is the prefix of its settings' names. Empty for the system.
     pub fn prefix(self) -> Name {
         match self {

@@ -12,6 +12,7 @@ use crate::config::{Setting, Settings};
 #[cfg(feature = "drivers")]
 use crate::{
     boards::ACTIVE,
+    config::Owner,
     config::drive::DRIVERS,
     drivers::registers,
     drivers::watch::{State, news},
@@ -113,7 +114,7 @@ pub fn set(settings: &mut Settings, setting: Setting, value: i32) -> bool {
 /// Takes over all settings of drivers, as they have been saved.
 #[cfg(feature = "drivers")]
 pub fn recall(settings: &mut Settings, storage: &Storage) {
-    for setting in (Setting::WARM..Setting::COLD).filter_map(Setting::from_number) {
+    for setting in Owner::Drivers.settings() {
         settings.set_drive(setting, storage.cold(setting));
     }
 }

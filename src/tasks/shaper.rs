@@ -2,13 +2,13 @@
 
 use super::storage::Storage;
 use crate::capability::Capability;
-use crate::config::{Setting, Settings};
+use crate::config::{Owner, Settings};
 
 /// Takes over the resonances, as they have been saved. The planner finds the change before the next line.
 #[inline(always)]
 pub fn recall(settings: &mut Settings, storage: &Storage) {
     if Capability::Shaping.is_built_in() {
-        for setting in (Setting::WARM..Setting::COLD).filter_map(Setting::from_number) {
+        for setting in Owner::Shaper.settings() {
             settings.set_resonance(setting, storage.cold(setting));
         }
     }
