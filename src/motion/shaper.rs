@@ -5,9 +5,9 @@
 //! acceleration. A filter whose response is small there leaves little to ring:
 //!
 //! - [`MEAN`]: a mean over one period of the resonance. It needs no damping ratio.
-//! - [`EXTRA_INSENSITIVE`](crate::config::shape::EXTRA_INSENSITIVE): three impulses, half a period apart, so weighted that 5 % is left at the resonance and less
-//!   than that near it (Singhose, Seering, Singer: residual vibration reduction using vector diagrams, 1990). So it still
-//!   works if the resonance is up to 20 % off.
+//! - [`EXTRA_INSENSITIVE`](crate::config::shape::EXTRA_INSENSITIVE): three impulses, half a period apart, so weighted
+//!   that 5 % is left at the resonance and less than that near it (Singhose, Seering, Singer: residual vibration
+//!   reduction using vector diagrams, 1990). So it still works if the resonance is up to 20 % off.
 //!
 //! **All axes have the same filter**, the product of the filters of all resonances: straight lines stay straight, and
 //! motors that turn X and Y together need no filter of their own. Weights are not negative, and their sum is exactly 1.
@@ -66,39 +66,42 @@ impl Weights {
             MEAN => mean(&mut parts, period),
             _ => impulses(&mut parts, period, f32::from(resonances.damping) * 0.01),
         };
-        let mut weights = Self { parts: [0; WEIGHTS], len };
-        // Each weight is the difference of two rounded sums, so that the sum of all is exactly 1.
-        let (mut sum, mut last) = (0.0, 0);
-        let all: f32 = parts.iter().sum();
-        for (weight, part) in weights.parts.iter_mut().zip(parts) {
+        let (mut sum, all) = (0.0, parts.iter().sum::<f32>());
+        let sums = parts.map(|part| {
             sum += part;
-            let rounded = round(sum / all * f32::from(ONE));
-            *weight = (rounded - last) as u16;
-            last = rounded;
+            round(sum / all * f32::from(ONE)) as u16
+        });
+        Self::of_sums(&sums, len)
+    }
+
+    /// Returns the weights whose sums up to each of them are these: so the sum of all is exactly 1, however they are
+    /// rounded.
+    fn of_sums(sums: &[u16; WEIGHTS], len: u8) -> Self {
+        let (mut parts, mut last) = ([0; WEIGHTS], 0);
+        for (part, sum) in parts.iter_mut().zip(sums) {
+            *part = sum - last;
+            last = *sum;
         }
-        weights
+        Self { parts, len }
     }
 
     /// Returns the product with another filter; this one if there is no room for it.
     fn and(&self, other: &Self) -> Self {
-        let Some((first, len)) = self.parts().split_first().zip(self.joined(other)) else {
+        let Some(len) = self.joined(other) else {
             return if self.len > 1 { *self } else { *other };
         };
-        let mut sums = [0u32; WEIGHTS];
-        for (n, one) in core::iter::once(first.0).chain(first.1).enumerate() {
-            for (sum, two) in sums.iter_mut().skip(n).zip(other.parts()) {
-                *sum += u32::from(*one) * u32::from(*two);
+        let mut products = [0u32; WEIGHTS];
+        for (n, one) in self.parts().iter().enumerate() {
+            for (product, two) in products.iter_mut().skip(n).zip(other.parts()) {
+                *product += u32::from(*one) * u32::from(*two);
             }
         }
-        let mut product = Self { parts: [0; WEIGHTS], len };
-        let (mut sum, mut last) = (0u32, 0);
-        for (weight, part) in product.parts.iter_mut().zip(sums) {
-            sum += part;
-            let rounded = (sum + (1 << (ONE_LOG2 - 1))) >> ONE_LOG2;
-            *weight = (rounded - last) as u16;
-            last = rounded;
-        }
-        product
+        let mut sum = 1 << (ONE_LOG2 - 1);
+        let sums = products.map(|product| {
+            sum += product;
+            (sum >> ONE_LOG2) as u16
+        });
+        Self::of_sums(&sums, len)
     }
 
     /// Returns the number of weights of the product with another filter, if both are some and there is room.
