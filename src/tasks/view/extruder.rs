@@ -14,7 +14,7 @@ use crate::status::Status;
 use crate::store::kept;
 use crate::tasks::heat;
 use crate::tasks::lent::LENT;
-use crate::tasks::links::Changes;
+use crate::tasks::links::{Changes, Links};
 
 /// How much hotter than its target a heater may get in an autotune, eighths of a degree.
 const OVERSHOOT: u16 = 80;
@@ -23,19 +23,17 @@ const OVERSHOOT: u16 = 80;
 #[small]
 #[inline(always)]
 pub(super) fn extruder(view: &mut View<'_>, what: Extruder) -> Status {
-    let (links, alarm) = (view.links, machine::alarm());
+    let links = view.links;
     if !view.may_feed() {
         return Status::Muted;
     }
     let mut model = links.model.borrow_mut();
-    match what {
-        Extruder::Relative(relative) => model.set_relative(relative),
-        Extruder::Flow(flow) => model.set_flow(flow),
-        Extruder::LeaveOut => model.leave_out(true),
-        _ if alarm != Alarm::None => return alarm.status(),
-        _ if machine::is_checking() => {}
-        _ if links.commands_taken.get() || machine::is_flushing() => return Status::Again,
-        Extruder::Advance(time) => {
+    match (what, not_now(links)) {
+        (Extruder::Relative(relative), _) => model.set_relative(relative),
+        (Extruder::Flow(flow), _) => model.set_flow(flow),
+        (Extruder::LeaveOut, _) => model.leave_out(true),
+        (_, Some(status)) => return status,
+        (Extruder::Advance(time), None) => {
             let Some(heating) = view.settings.heating.first_mut() else {
                 return Status::NotBuiltIn;
             };
@@ -43,7 +41,7 @@ pub(super) fn extruder(view: &mut View<'_>, what: Extruder) -> Status {
             // The planner tells exec before the next line.
             links.changes.note(Changes::SETTINGS);
         }
-        Extruder::Move { by, feed } => {
+        (Extruder::Move { by, feed }, None) => {
             heat::has_extruder(&mut view.settings);
             if let Err(status) = Setup::extrudes(&*view.settings) {
                 return status;
@@ -118,23 +116,27 @@ pub(super) fn recall(view: &mut View<'_>) -> Status {
 
 /// M593: sets the resonances of the axes. The planner tells exec before the next line.
 pub(super) fn shape(view: &mut View<'_>, to: Resonances) -> Status {
-    let (links, alarm) = (view.links, machine::alarm());
     if !view.may_feed() {
         return Status::Muted;
     }
-    if alarm != Alarm::None {
-        return alarm.status();
-    }
-    if machine::is_checking() {
-        return Status::Ok;
-    }
-    if links.commands_taken.get() || machine::is_flushing() {
-        return Status::Again;
+    if let Some(status) = not_now(view.links) {
+        return status;
     }
     let Some(resonances) = view.settings.resonances.first_mut() else {
         return Status::NotBuiltIn;
     };
     *resonances = to;
-    links.changes.note(Changes::SETTINGS);
+    view.links.changes.note(Changes::SETTINGS);
     Status::Ok
+}
+
+/// Returns the answer to what the planner is to carry out, if it cannot do so now: an alarm, a check of lines, or a line
+/// before it that the planner has not taken.
+fn not_now(links: &Links) -> Option<Status> {
+    match machine::alarm() {
+        Alarm::None if machine::is_checking() => Some(Status::Ok),
+        Alarm::None if links.commands_taken.get() || machine::is_flushing() => Some(Status::Again),
+        Alarm::None => None,
+        alarm => Some(alarm.status()),
+    }
 }
