@@ -11,7 +11,7 @@ use kerf::units::Length;
 use proptest::prelude::*;
 
 use crate::cases::cases;
-use crate::jobs::{Job, any_job};
+use crate::jobs::{Job, Player, any_job};
 use crate::rig::{Config, Rig, at};
 
 /// Most turns of exec that a stop takes.
@@ -76,7 +76,7 @@ fn any_trial(most: u16) -> impl Strategy<Value = Trial> {
     })
 }
 
-struct Player {
+struct Tracker {
     rig: Rig,
     axes: [Axis; MOTORS],
     seen: usize,
@@ -84,7 +84,7 @@ struct Player {
     next: Option<(u16, Event)>,
 }
 
-impl Player {
+impl Tracker {
     fn new(trial: &Trial) -> Self {
         let mut rig = Rig::new(trial.job.config.clone());
         rig.keep = false;
@@ -98,22 +98,6 @@ impl Player {
         let mut events = trial.events.clone().into_iter();
         let next = events.next();
         Self { rig, axes, seen: 0, events, next }
-    }
-
-    fn turn(&mut self) -> Step {
-        match &mut self.next {
-            Some((0, event)) => {
-                let event = *event;
-                self.next = self.events.next();
-                self.happen(event);
-            }
-            Some((left, _)) => *left -= 1,
-            None => {}
-        }
-        let step = self.rig.turn();
-        self.rig.replan();
-        self.follow();
-        step
     }
 
     fn follow(&mut self) {
@@ -188,31 +172,31 @@ impl Player {
             assert!((-self.axes[m].gap..=0).contains(&off), "motor {m} is off by {off}");
         }
     }
+}
 
-    fn play(&mut self, job: &Job) {
-        for (n, step) in job.moves.iter().enumerate() {
-            while self.rig.free() == 0 {
-                self.turn();
+impl Player for Tracker {
+    fn rig(&mut self) -> &mut Rig {
+        &mut self.rig
+    }
+
+    fn turn(&mut self) -> Step {
+        match &mut self.next {
+            Some((0, event)) => {
+                let event = *event;
+                self.next = self.events.next();
+                self.happen(event);
             }
-            let mut to = self.rig.position;
-            for (to, way) in to.iter_mut().zip(step.way) {
-                to.0 += way;
-            }
-            if step.stop {
-                self.rig.stop();
-            }
-            self.rig.line(to, step.velocity, n as u32 + 1);
-            for _ in 0..step.turns {
-                if self.turn() == Step::Idle {
-                    break;
-                }
-            }
+            Some((left, _)) => *left -= 1,
+            None => {}
         }
-        while self.next.is_some() {
-            self.turn();
-        }
-        self.rig.finish();
+        let step = self.rig.turn();
+        self.rig.replan();
         self.follow();
+        step
+    }
+
+    fn is_due(&self) -> bool {
+        self.next.is_some()
     }
 }
 
@@ -223,8 +207,9 @@ proptest! {
     /// direction, and not at all in the other.
     #[test]
     fn axes_are_where_positions_say(trial in any_trial(60)) {
-        let mut player = Player::new(&trial);
+        let mut player = Tracker::new(&trial);
         player.play(&trial.job);
+        player.follow();
         let target = player.rig.snapshot.target.map(i64::from);
         prop_assert_eq!(target, player.rig.target());
         player.check_axes();

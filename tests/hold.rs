@@ -8,7 +8,7 @@ use kerf::motion::exec::Step;
 use proptest::prelude::*;
 
 use crate::cases::cases;
-use crate::jobs::{Job, any_job, plan_held};
+use crate::jobs::{Job, Player, any_job, plan_held};
 use crate::keeps::check_limits;
 use crate::rig::{Config, Rig, at};
 
@@ -26,30 +26,17 @@ fn any_holds(drops: bool) -> impl Strategy<Value = Holds> {
 }
 
 /// Runs a job with holds.
-struct Player {
+struct Holder {
     rig: Rig,
     holds: std::vec::IntoIter<(u16, bool)>,
     next: Option<(u16, bool)>,
 }
 
-impl Player {
+impl Holder {
     fn new(job: &Job, holds: &Holds) -> Self {
         let mut holds = holds.clone().into_iter();
         let next = holds.next();
-        Player { rig: Rig::new(job.config.clone()), holds, next }
-    }
-
-    fn turn(&mut self) -> Step {
-        match &mut self.next {
-            Some((0, drop)) => {
-                let drop = *drop;
-                self.next = self.holds.next();
-                self.hold(drop);
-            }
-            Some((left, _)) => *left -= 1,
-            None => {}
-        }
-        self.rig.turn()
+        Self { rig: Rig::new(job.config.clone()), holds, next }
     }
 
     fn hold(&mut self, drop: bool) {
@@ -75,31 +62,33 @@ impl Player {
     }
 }
 
-fn run(job: &Job, holds: &Holds) -> Rig {
-    let mut player = Player::new(job, holds);
-    for (n, step) in job.moves.iter().enumerate() {
-        while player.rig.free() == 0 {
-            player.turn();
-        }
-        let mut to = player.rig.position;
-        for (to, way) in to.iter_mut().zip(step.way) {
-            to.0 += way;
-        }
-        if step.stop {
-            player.rig.stop();
-        }
-        player.rig.line(to, step.velocity, n as u32 + 1);
-        for _ in 0..step.turns {
-            if player.turn() == Step::Idle {
-                break;
+impl Player for Holder {
+    fn rig(&mut self) -> &mut Rig {
+        &mut self.rig
+    }
+
+    fn turn(&mut self) -> Step {
+        match &mut self.next {
+            Some((0, drop)) => {
+                let drop = *drop;
+                self.next = self.holds.next();
+                self.hold(drop);
             }
+            Some((left, _)) => *left -= 1,
+            None => {}
         }
+        self.rig.turn()
     }
-    while player.next.is_some() {
-        player.turn();
+
+    fn is_due(&self) -> bool {
+        self.next.is_some()
     }
-    player.rig.finish();
-    player.rig
+}
+
+fn run(job: &Job, holds: &Holds) -> Rig {
+    let mut holder = Holder::new(job, holds);
+    holder.play(job);
+    holder.rig
 }
 
 /// Runs a job that is stopped by force: after some turns of exec, with some segments queued, some ticks later.

@@ -27,6 +27,41 @@ pub struct Move {
     pub turns: u8,
 }
 
+/// What runs a job, and does something meanwhile.
+pub trait Player {
+    fn rig(&mut self) -> &mut Rig;
+    /// Runs exec once.
+    fn turn(&mut self) -> Step;
+    /// Whether something is still to be done.
+    fn is_due(&self) -> bool;
+
+    /// Runs a job to its end.
+    fn play(&mut self, job: &Job) {
+        for (n, step) in job.moves.iter().enumerate() {
+            while self.rig().free() == 0 {
+                self.turn();
+            }
+            let mut to = self.rig().position;
+            for (to, way) in to.iter_mut().zip(step.way) {
+                to.0 += way;
+            }
+            if step.stop {
+                self.rig().stop();
+            }
+            self.rig().line(to, step.velocity, n as u32 + 1);
+            for _ in 0..step.turns {
+                if self.turn() == Step::Idle {
+                    break;
+                }
+            }
+        }
+        while self.is_due() {
+            self.turn();
+        }
+        self.rig().finish();
+    }
+}
+
 pub fn decades(low: f32, high: f32) -> impl Strategy<Value = f32> {
     (0u16..=10_000).prop_map(move |n| low * (high / low).powf(f32::from(n) * 1e-4))
 }
