@@ -14,11 +14,19 @@ const PAUSES: [&str; 2] = ["pauses-none", "pauses-5000"];
 /// The bed of the rows that measure all jobs of the corpus once.
 static CORPUS: LazyLock<Mutex<PicoBed>> = LazyLock::new(|| Mutex::new(PicoBed::new(&image(&PICO))));
 
+/// The bed of the rows of ringing.
+static RINGING: LazyLock<Mutex<PicoBed>> =
+    LazyLock::new(|| Mutex::new(PicoBed::new(&image(&PICO))));
+
 fn keeps_to_its_floor(name: &str) {
     if PAUSES.contains(&name) && !share_of(&PAUSES, 2).any(|due| *due == name) {
         return;
     }
     let row = named(name).unwrap();
+    if name.starts_with("ring") {
+        let bed = RINGING.lock().unwrap_or_else(PoisonError::into_inner);
+        return row.keep_to_floor(&bed).unwrap();
+    }
     if name.starts_with("axes") || name.starts_with("segment") {
         let bed = CORPUS.lock().unwrap_or_else(PoisonError::into_inner);
         return row.keep_to_floor(&bed).unwrap();
