@@ -72,7 +72,7 @@ const USED: f32 = 0.93;
 const ROUND: f32 = 0.6;
 /// The least share of the acceleration that is left along the path, so that a hold can stop there.
 const LEAST_ROOM: f32 = 0.05;
-/// The same where the deviation asks for less.
+/// The least share of the acceleration that is left about a corner that would otherwise be off by more than P.
 const LEAST_SHARE: f32 = 0.005;
 /// The room at the end of a path that has been flushed. The corner that may follow takes as much.
 const HALF: f32 = 0.5;

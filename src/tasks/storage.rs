@@ -32,8 +32,8 @@ use crate::store::{Log, Memory, record, tables};
 use crate::units::{AXES, Length, PerAxis};
 
 /// How many keys have no record if every setting and every value of all 21 rows on six axes has been set: then a line
-/// is refused with status 34. The settings of drivers add 15 such keys, those of shaping 5, backlash 4. The program's area could give up the
-/// room.
+/// is refused with status 34. The settings of drivers add 15 such keys, those of shaping 5, backlash 4. The program's
+/// area could give up the room.
 const LEFT_OUT: u16 = 17
     + if Capability::Drivers.is_built_in() { 15 } else { 0 }
     + if Capability::Shaping.is_built_in() { 5 } else { 0 }

@@ -41,7 +41,7 @@ const TALK: [&str; 12] = ["ej", "js", "tv", "ec", "ee", "ex", "rxm", "sv", "si",
 const STOPPING: [&str; 2] = ["saf", "est"];
 /// The machine profile. It overwrites motors and axes, so it is sent first.
 const PROFILE: &str = "mch";
-/// The statuses of a value that cannot be set. [`differ`] tells if it is another one.
+/// The statuses of a value that this machine cannot change. [`differ`] tells if it is not that of the file.
 const CONSTANT: [f64; 2] = [104.0, 118.0];
 
 /// Sends a line. Returns the body and the status of the answer.
