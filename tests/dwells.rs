@@ -309,6 +309,18 @@ fn lines_of_a_printing_host_wait_behind_a_pause() {
         assert_eq!(sender.heard, "echo:busy: processing\n".repeat(2));
         sender.run_ms(200);
         assert!(sender.heard.ends_with("\nok\n"), "{}", sender.heard);
+        sender.heard.clear();
+        // OctoPrint sets the period once it has heard that the board is busy.
+        sender.send("M113 S1");
+        sender.send("G4 S5");
+        sender.run_ms(4_900);
+        assert_eq!(sender.heard, format!("ok\n{}", "echo:busy: processing\n".repeat(4)));
+        sender.run_ms(200);
+        sender.heard.clear();
+        sender.send("M113 S0");
+        sender.send("G4 S5");
+        sender.run_ms(5_100);
+        assert_eq!(sender.heard, "ok\nok\n");
     });
 }
 

@@ -81,6 +81,9 @@ fn numbers_that_are_no_good_are_refused() {
         ("M155 S-1", range),
         ("M155 S99999999999", range),
         ("M155 Sx", range),
+        ("M113 S-1", range),
+        ("M113 S99999999999", range),
+        ("M113 Sx", range),
         ("M220 S99999999999", range),
         ("M220 Sx", range),
         ("M221 S99999999999", range),
@@ -101,6 +104,7 @@ fn numbers_that_are_no_good_are_refused() {
         assert!(answer.ends_with(&format!("{why}\nok\n")), "{line}: {answer}");
     }
     assert_eq!(host.ask("M155 S0"), "ok\n");
+    assert_eq!(host.ask("M113"), "echo:M113 S2\nok\n");
     // The number of the line counts as that of any other.
     assert_eq!(host.send(0, "M110 N0"), "ok\n");
     assert!(host.send(1, "M110 N99999999999").contains("out of range"));

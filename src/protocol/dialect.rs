@@ -13,6 +13,14 @@ use crate::config::Settings;
 use crate::machine::Alarm;
 use crate::status::Status;
 
+/// Seconds from one message to the next that a host did not request; 0 for none.
+pub struct Intervals {
+    /// Of [`Notice::Temperatures`].
+    pub temperatures_s: u8,
+    /// Of [`Notice::Busy`].
+    pub busy_s: u8,
+}
+
 /// A way to speak to senders. All of it runs in thread mode. Lines are passed without their line ends.
 pub trait Dialect {
     /// How a port is spoken to, where the dialect has several ways; kept per port. The default applies until the
@@ -99,10 +107,10 @@ pub trait Dialect {
         None
     }
 
-    /// Returns the seconds from one [`Notice::Temperatures`] to the next; 0 for none.
-    fn interval_s(memory: &Self::Memory) -> u8 {
+    /// Returns how often the host is told what it has not requested.
+    fn intervals(memory: &Self::Memory) -> Intervals {
         let _ = memory;
-        0
+        Intervals { temperatures_s: 0, busy_s: 0 }
     }
 
     /// Starts to send a notice about the present state of the machine.
@@ -366,12 +374,12 @@ macro_rules! dialects {
                 }
             }
 
-            /// See [`Dialect::interval_s`].
+            /// See [`Dialect::intervals`].
             #[inline(always)]
-            pub fn interval_s(self, memory: &Memory) -> u8 {
+            pub fn intervals(self, memory: &Memory) -> Intervals {
                 match self {
                     $(#[cfg(feature = $feature)]
-                    Self::$name(_) => <$dialect>::interval_s(&memory.$field),)+
+                    Self::$name(_) => <$dialect>::intervals(&memory.$field),)+
                 }
             }
 

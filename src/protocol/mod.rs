@@ -45,8 +45,8 @@ mod write;
 
 pub use checksum::Checksum;
 pub use dialect::{
-    Answers, Dialect, Memory, Remembers, Request, Speech, Telling, Tells, asks_alarm, ends_alarm,
-    is_control, jog, may_be_control,
+    Answers, Dialect, Intervals, Memory, Remembers, Request, Speech, Telling, Tells, asks_alarm,
+    ends_alarm, is_control, jog, may_be_control,
 };
 pub use line::{Ending, Next, Span, is_joined};
 pub use machine::{Cold, Extruder, Hold, Level, Machine, STARTUP_MAX, Store, Warning};

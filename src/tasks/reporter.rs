@@ -38,9 +38,6 @@ use crate::status::Status;
 const POLL_MS: u64 = 10;
 /// Polling period at a standstill for a printing host, ms.
 const LOOK_MS: u64 = 100;
-#[cfg(feature = "dialect-reprap")]
-/// Period of the busy messages to a printing host while a line takes long, ms.
-const BUSY_MS: u32 = 2_000;
 /// Number of attempts to get room on another port than the usual one.
 const PATIENCE: u8 = 20;
 /// How many times a report ends its line early for an answer. Each line of a report costs the serial line some time
@@ -189,15 +186,18 @@ impl Clock {
         if heat::takes_news(&links.heat) {
             return Some(Notice::Tuning);
         }
-        let interval_ms = u32::from(speech.interval_s(&links.report.borrow())) * 1_000;
-        if interval_ms != 0 && now.wrapping_sub(self.told) >= interval_ms {
+        let intervals = speech.intervals(&links.report.borrow());
+        let is_due = |since, seconds: u8| {
+            seconds != 0 && now.wrapping_sub(since) >= u32::from(seconds) * 1_000
+        };
+        if is_due(self.told, intervals.temperatures_s) {
             self.told = now;
             return Some(Notice::Temperatures);
         }
         if lines != self.lines || !port.lines.borrow().has_data() {
             (self.lines, self.since) = (lines, now);
         }
-        if now.wrapping_sub(self.since) < BUSY_MS {
+        if !is_due(self.since, intervals.busy_s) {
             return None;
         }
         self.since = now;

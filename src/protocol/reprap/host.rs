@@ -58,7 +58,7 @@ pub fn of(code: Option<Code>, block: &[u8]) -> Option<Code> {
         (b'M', 122 | 569 | 906) => Capability::Drivers.is_built_in(),
         (b'M', number) => matches!(
             number,
-            17 | 18 | 82..=84 | 92 | 105 | 108 | 110..=112 | 114 | 115 | 117..=119 | 130..=134 | 155
+            17 | 18 | 82..=84 | 92 | 105 | 108 | 110..=115 | 117..=119 | 130..=134 | 155
                 | 201..=208 | 220 | 221 | 301..=304 | 400 | 500..=503 | 900 | 999
         ),
         (b'T' | b'$', _) => true,
@@ -109,6 +109,7 @@ pub fn part(
             machine.alarm(Alarm::Shutdown, Status::ShutDown);
             Step::Done
         }
+        113 => busy(block, machine, out),
         114 => listed(report::position(at, machine, out)),
         115 => listed(report::identity(at, out)),
         118 => echo(at, block, out),
@@ -116,12 +117,12 @@ pub fn part(
         #[cfg(feature = "drivers")]
         122 | 569 | 906 => super::drivers::part(number, at, block, machine, out),
         130..=132 => tuning::set_teacup(number, at, block, machine, out),
-        155 => match u32::try_from(value(block, b'S', 0).unwrap_or(0)) {
+        155 => match interval(value(block, b'S', 0).unwrap_or(0)) {
             Ok(seconds) => {
-                machine.memory().reprap.interval_s = seconds.min(60) as u8;
+                machine.memory().reprap.interval_s = seconds;
                 Step::Done
             }
-            Err(_) => Step::Refused(Status::OutOfRange),
+            Err(status) => Step::Refused(status),
         },
         207 => set_retraction(block, machine),
         208 => {
@@ -309,6 +310,30 @@ fn motors_off(block: &[u8], machine: &mut impl Machine) -> Step {
         }
     }
     Step::Done
+}
+
+/// M113: sets the seconds from one message that a line takes long to the next, 0 for none; without S reports them.
+#[small]
+fn busy(block: &[u8], machine: &mut impl Machine, out: &mut impl Out) -> Step {
+    let Some(seconds) = value(block, b'S', 0) else {
+        text(out, text!("echo:M113 S"));
+        int(out, machine.memory().reprap.busy_s.into());
+        line_end(out);
+        return Step::Done;
+    };
+    match interval(seconds) {
+        Ok(seconds) => {
+            machine.memory().reprap.busy_s = seconds;
+            Step::Done
+        }
+        Err(status) => Step::Refused(status),
+    }
+}
+
+/// Returns the period of messages of S seconds, at most a minute.
+fn interval(seconds: i32) -> Result<u8, Status> {
+    const LONGEST_S: i32 = 60;
+    if seconds < 0 { Err(Status::OutOfRange) } else { Ok(seconds.min(LONGEST_S) as u8) }
 }
 
 /// M118: sends the text back, after `//` for `A1` and after `echo:` for `E1`. `P0`, the port, is left out.

@@ -45,7 +45,7 @@ mod translate;
 mod tuning;
 mod write;
 
-use super::{Dialect, Ending, Machine, Notice, Out, Remembers, Rewritten, Span};
+use super::{Dialect, Ending, Intervals, Machine, Notice, Out, Remembers, Rewritten, Span};
 use crate::config::Settings;
 use crate::machine::Alarm;
 use crate::plain;
@@ -58,6 +58,9 @@ pub use telling::Telling;
 
 /// The value of [`Settings::dialect_of`] for a port that begins in this dialect.
 const CHOSEN: u8 = 4;
+
+/// Period of the messages that a line takes long, until M113 sets another, s.
+const BUSY_S: u8 = 2;
 
 /// The dialect.
 pub struct RepRap;
@@ -74,6 +77,8 @@ pub struct Retraction {
     retracted: bool,
     /// M155 S: seconds from one report of temperatures to the next; 0 for none.
     interval_s: u8,
+    /// M113 S: seconds from one message that a line takes long to the next; 0 for none.
+    busy_s: u8,
     /// Whether a line that homes is to be answered with a failure, of which the port is told as well.
     homes: bool,
 }
@@ -86,6 +91,7 @@ impl Remembers for Retraction {
             feed: 2_100,
             retracted: false,
             interval_s: 0,
+            busy_s: BUSY_S,
             homes: false,
         }
     }
@@ -201,8 +207,8 @@ impl Dialect for RepRap {
         command::is_clear(&Frame::of(line), line)
     }
 
-    fn interval_s(kept: &Retraction) -> u8 {
-        kept.interval_s
+    fn intervals(kept: &Retraction) -> Intervals {
+        Intervals { temperatures_s: kept.interval_s, busy_s: kept.busy_s }
     }
 
     fn activity(session: Session) -> Option<u8> {
