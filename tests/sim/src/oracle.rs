@@ -6,6 +6,7 @@
 //! zero.
 
 mod exact;
+mod swings;
 mod words;
 
 use std::f64::consts::FRAC_1_SQRT_2;
@@ -16,6 +17,7 @@ use kerf::boards::MOTORS;
 use crate::pauses::Travel;
 
 pub use exact::{Decimal, Exact, divide};
+use swings::Swings;
 pub use words::{Word, split};
 
 /// Axes, X Y Z A B C.
@@ -27,6 +29,8 @@ const UNITS_PER_INCH: i128 = 254_000;
 const FIRST_ROTARY: usize = 3;
 /// Coordinate systems, and one that is not used.
 const SYSTEMS: usize = 10;
+/// How far the firmware may stay away from a corner, whatever P of G64 says, in units.
+const CUT: i64 = UNITS as i64 / 10;
 const LETTERS: [char; AXES] = ['X', 'Y', 'Z', 'A', 'B', 'C'];
 
 /// A motor's settings.
@@ -125,6 +129,8 @@ pub struct Outcome {
     pub position: [i64; AXES],
     /// Steps up minus steps down of each motor.
     pub steps: Vec<i64>,
+    /// The least steps of each motor in both directions together.
+    pub least: Vec<u64>,
     /// Longest dwell, in milliseconds.
     pub longest_dwell_ms: u64,
 }
@@ -203,6 +209,10 @@ struct Reader<'a> {
     /// The position from which steps count; G28.3 moves it.
     origin: [i64; AXES],
     steps: Vec<i64>,
+    /// The steps at the end of each line.
+    places: Vec<Vec<i64>>,
+    /// The greatest P of G64, in units; [`CUT`] at least.
+    cut: i64,
     moving: bool,
     inches: bool,
     diameters: bool,
@@ -222,6 +232,8 @@ impl<'a> Reader<'a> {
             rests: [0; AXES],
             origin: [0; AXES],
             steps: vec![0; setup.motors.len()],
+            places: Vec::new(),
+            cut: CUT,
             moving: true,
             inches: false,
             diameters: false,
@@ -242,6 +254,10 @@ impl<'a> Reader<'a> {
         for word in &words {
             match word.letter {
                 'G' => self.g_code(word.value.tenths(), &mut once, &mut machine_coordinates)?,
+                'P' if words.iter().any(Word::is_path_mode) => {
+                    let unit = if self.inches { UNITS_PER_INCH } else { UNITS };
+                    self.cut = self.cut.max(word.value.scaled(unit));
+                }
                 'M' => end |= self.m_code(word.value.tenths())?,
                 c if self.is_on_a_radius(c) => return Err(format!("{c} in radius mode")),
                 c if LETTERS.contains(&c) || "DEFHIJKLNOPQRST".contains(c) => {}
@@ -260,6 +276,7 @@ impl<'a> Reader<'a> {
         if end {
             self.program_end();
         }
+        self.places.push(self.steps_here());
         Ok(())
     }
 
@@ -431,10 +448,24 @@ impl<'a> Reader<'a> {
         here.collect()
     }
 
+    /// Returns the least steps of each motor.
+    fn least(&self) -> Vec<u64> {
+        let of = |(m, motor): (usize, &MotorSetup)| {
+            // A motor that drives two axes is cut short on both.
+            let axes = 1 + motor.besides.abs();
+            let cut = motor.steps(self.cut * axes).unsigned_abs() + 1;
+            let mut swings = Swings::default();
+            self.places.iter().for_each(|places| swings.go_to(places[m], cut));
+            swings.least(cut)
+        };
+        self.setup.motors.iter().enumerate().map(of).collect()
+    }
+
     fn finish(mut self) -> Outcome {
         self.count_steps();
         Outcome {
             position: self.position,
+            least: self.least(),
             steps: self.steps,
             longest_dwell_ms: self.longest_dwell_ms,
         }

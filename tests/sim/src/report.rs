@@ -77,6 +77,8 @@ pub struct MotorReport {
     pub steps: i64,
     /// The steps that the oracle expects.
     pub expected: Option<i64>,
+    /// The least steps in both directions together, by the oracle.
+    pub least: Option<u64>,
     /// Steps in both directions.
     pub total: u64,
     /// Highest step rate, from the shortest time between two steps.
@@ -305,10 +307,17 @@ impl Report {
     }
 
     fn wrong_motors(&self) -> impl Iterator<Item = String> {
-        self.motors.iter().filter_map(|m| {
-            let expected = m.expected.filter(|e| *e != m.steps)?;
-            Some(format!("motor {} is at {} steps instead of {expected}", m.motor, m.steps))
-        })
+        let wrong = |m: &MotorReport| {
+            let MotorReport { motor, steps, total, .. } = *m;
+            let is_elsewhere = m.expected.filter(|expected| *expected != steps);
+            let elsewhere = is_elsewhere
+                .map(|expected| format!("motor {motor} is at {steps} steps instead of {expected}"));
+            let is_short = m.least.filter(|least| *least > total);
+            let short =
+                is_short.map(|least| format!("motor {motor} makes {total} steps of {least}"));
+            elsewhere.into_iter().chain(short)
+        };
+        self.motors.iter().flat_map(wrong)
     }
 }
 
@@ -358,6 +367,7 @@ fn motor_report(
         axis: AXIS_NAMES[setup.axis.max(usize::from(setup.besides < 0))],
         steps: if setup.inverted { -motor.position } else { motor.position },
         expected: expected.map(|e| e.steps[index]),
+        least: expected.map(|e| e.least[index]),
         total: motor.steps,
         highest_rate_hz: motor.min_interval.map(|c| 1.0 / machine.seconds(c)),
         pulse_us: motor.pulse.map(|(a, b)| (us(a), us(b))),

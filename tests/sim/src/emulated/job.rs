@@ -27,6 +27,8 @@ pub struct Report {
 struct Motor {
     steps: i64,
     expected: Option<i64>,
+    /// The least steps in both directions together.
+    least: Option<u64>,
     total: u64,
     highest_hz: Option<f64>,
 }
@@ -123,6 +125,7 @@ fn motors(
     let motor = |(m, setup): (usize, &MotorSetup)| Motor {
         steps: if setup.inverted { -steps[m] } else { steps[m] },
         expected: expected.as_ref().ok().map(|outcome| outcome.steps[m]),
+        least: expected.as_ref().ok().map(|outcome| outcome.least[m]),
         total: totals[m],
         highest_hz: gaps[m].map(|gap| 1.0 / gap),
     };
@@ -135,6 +138,10 @@ impl Report {
             if let Some(expected) = motor.expected.filter(|expected| *expected != motor.steps) {
                 let (m, at) = (m + 1, motor.steps);
                 self.problems.push(format!("motor {m} is at {at} steps instead of {expected}"));
+            }
+            if let Some(least) = motor.least.filter(|least| *least > motor.total) {
+                let (m, total) = (m + 1, motor.total);
+                self.problems.push(format!("motor {m} makes {total} steps of {least}"));
             }
         }
     }

@@ -17,6 +17,11 @@ impl Word {
         let (up, down) = self.value.ratio();
         up as f64 / down as f64
     }
+
+    /// Whether the word is G64, whose P says how far the path may stay away from a corner.
+    pub fn is_path_mode(&self) -> bool {
+        self.letter == 'G' && self.value.tenths() == 640
+    }
 }
 
 /// Returns the words of a line. A line that is blank, deleted, a comment, or no G-code at all has none.

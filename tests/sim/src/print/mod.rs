@@ -206,6 +206,8 @@ impl Run<'_> {
         Ok(Outcome {
             position: corners.last().map(|corner| corner.position).unwrap_or_default(),
             steps: steps.to_vec(),
+            // The whole path is compared.
+            least: vec![0; MOTORS],
             longest_dwell_ms: 0,
         })
     }
