@@ -6,7 +6,7 @@ use kerf_macros::small;
 
 use core::cell::{Cell, RefCell};
 
-use avr_embassy::{Interrupt, InterruptEnd, Thread, interrupt};
+use avr_embassy::{Boot, Interrupt, InterruptEnd, Thread, interrupt};
 use embassy_executor::Spawner;
 use embassy_sync::mutex::Mutex;
 use heapless::Vec;
@@ -100,11 +100,11 @@ struct Earlier {
 impl Earlier {
     #[inline(never)]
     #[small]
-    fn place() -> Self {
+    fn place(thread: Thread) -> Self {
         Self {
-            storage: place!(Storage, Storage::new(Log::open(&Eeprom::take()))),
+            storage: place!(Storage, Storage::new(thread, Log::open(&Eeprom::of(thread)))),
             #[cfg(feature = "sd")]
-            card: place_card(),
+            card: place_card(thread),
         }
     }
 }
@@ -113,8 +113,8 @@ impl Earlier {
 #[cfg(feature = "sd")]
 #[inline(never)]
 #[small]
-fn place_card() -> &'static RefCell<crate::card::Card> {
-    place!(RefCell<crate::card::Card>, RefCell::new(crate::card::Card::new()))
+fn place_card(thread: Thread) -> &'static RefCell<crate::card::Card> {
+    place!(RefCell<crate::card::Card>, RefCell::new(crate::card::Card::new(thread)))
 }
 
 /// Creates the stage in its static place, if this chip blends. Constant: the stack has no room for another one.
@@ -131,18 +131,19 @@ fn place_planner(links: &'static Links, queue: BlockQueue) -> &'static planner::
     place!(planner::Shared, Mutex::new(Planner::new(links, queue)))
 }
 
-/// Starts the firmware. `main` is the thread-mode executor and `thread` is its token. The exec task has the interrupt
+/// Starts the firmware. `main` is the thread-mode executor and `thread` is its token; `boot` shows that
+/// nothing runs yet. The exec task has the interrupt
 /// executor to itself.
 ///
 /// Call it with interrupts off. Returns `None` if the firmware has been started before.
 #[inline(never)]
 #[small]
-pub fn start(main: Spawner, thread: Thread, rate: u32) -> Option<()> {
-    let segments = stepper::start()?;
+pub fn start(main: Spawner, thread: Thread, boot: &Boot, rate: u32) -> Option<()> {
+    let segments = stepper::start(boot)?;
     let queue = queue::store().queue(thread, place_stage())?;
-    let (links, received, aux) = connect(thread, rate)?;
+    let (links, received, aux) = connect(thread, boot, rate)?;
     links.report.borrow_mut().restore();
-    let occasion = recall(&mut links.settings.borrow_mut(), links.storage);
+    let occasion = recall(thread, &mut links.settings.borrow_mut(), links.storage);
     set_hardware(thread, &links.settings.borrow());
     spindle::set_all(thread, links.storage);
     heat::set_all(&links.heat, &mut links.settings.borrow_mut(), links.storage);
@@ -201,16 +202,20 @@ impl crate::hal::imp::Machine {
     /// Creates the machine and boots the firmware at `baud`. The millisecond count begins at `ms`, so that tests can
     /// make it wrap. Returns `None` for a second machine in a thread.
     pub fn boot_at(baud: u32, ms: u64) -> Option<Self> {
-        Self::start(ms, |main, thread| start(main, thread, baud))
+        Self::start(ms, |main, thread, boot| start(main, thread, boot, baud))
     }
 }
 
 /// Starts the ports and creates the links. Not inlined, for the reason given at [`place()`].
 #[inline(never)]
 #[small]
-fn connect(thread: Thread, rate: u32) -> Option<(&'static Links, Received, Option<Received>)> {
-    let earlier = Earlier::place();
-    let AllEnds { usb: (received, outgoing), aux } = uart::start(rate)?;
+fn connect(
+    thread: Thread,
+    boot: &Boot,
+    rate: u32,
+) -> Option<(&'static Links, Received, Option<Received>)> {
+    let earlier = Earlier::place(thread);
+    let AllEnds { usb: (received, outgoing), aux } = uart::start(thread, boot, rate)?;
     let mut ports = Vec::<Port, PORTS>::new();
     ports
         .push(Port::new(USB, line_bytes!(LINES_USB), Tx::new(thread, outgoing, USB, rate)))
@@ -229,8 +234,8 @@ fn connect(thread: Thread, rate: u32) -> Option<(&'static Links, Received, Optio
 /// Sets all settings to their defaults, then loads those that EEPROM holds. Returns `Occasion::Defaults` if the log in
 /// EEPROM, or a part of it, is unreadable.
 #[inline(never)]
-fn recall(settings: &mut Settings, storage: &Storage) -> Occasion {
-    let (log, memory) = (storage.log(), Eeprom::take());
+fn recall(thread: Thread, settings: &mut Settings, storage: &Storage) -> Occasion {
+    let (log, memory) = (storage.log(), Eeprom::of(thread));
     settings.set_defaults();
     storage.resume(kept::load(&log, &memory, settings));
     // Power may have failed between a setting and the velocities that it has lowered.

@@ -192,7 +192,7 @@ impl Encoder {
         self.seen & COUNT > turns
     }
 
-    /// Notes that the spindle is about to reverse, or does so (G33.1). Exec.
+    /// Notes that the spindle is about to reverse, or does so (G33.1).
     pub fn note_turning(&mut self) {
         self.seen |= ROUND;
     }
@@ -215,7 +215,7 @@ impl Encoder {
         !self.tells() || backwards.is_none_or(|backwards| backwards == turns_back)
     }
 
-    /// Begins the way back of G33.1, on which the sync pulses count the other way. Exec.
+    /// Begins the way back of G33.1, on which the sync pulses count the other way.
     pub fn turn_pass(&mut self) {
         if self.tells() {
             self.seen ^= MIRRORS;
@@ -243,7 +243,7 @@ impl Encoder {
         is_new
     }
 
-    /// Records how far the axes of a pass are ahead of the spindle at an index, mm. Exec.
+    /// Records how far the axes of a pass are ahead of the spindle at an index, mm.
     pub fn note_error(&mut self, mm: f32) {
         self.error = (mm * 1e3) as i16;
         self.seen |= NEWS;

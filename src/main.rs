@@ -3,7 +3,7 @@
 
 #[cfg(target_arch = "avr")]
 mod image {
-    use avr_embassy::Executor;
+    use avr_embassy::{Boot, Executor};
     use kerf::baud;
     use kerf::hal::event;
     use kerf::hal::imp::{gpio, inputs, panic, time, watchdog};
@@ -14,16 +14,18 @@ mod image {
     #[avr_device::entry]
     fn main() -> ! {
         static MAIN: StaticCell<Executor> = StaticCell::new();
-        watchdog::begin();
-        gpio::start();
-        inputs::start();
+        // SAFETY: nothing runs yet, and `run_with` drops the token with the closure before it polls a task.
+        let boot = unsafe { Boot::assume() };
+        watchdog::begin(&boot);
+        gpio::start(&boot);
+        inputs::start(&boot);
         MAIN.init(Executor::new()).run_with(
-            |main, thread| {
-                if kerf::app::start(main, thread, baud::DEFAULT).is_none() {
+            move |main, thread| {
+                if kerf::app::start(main, thread, &boot, baud::DEFAULT).is_none() {
                     panic::halt();
                 }
-                time::start();
-                watchdog::start();
+                time::start(&boot);
+                watchdog::start(&boot);
             },
             event::turn,
         )
@@ -32,7 +34,7 @@ mod image {
 
 #[cfg(all(target_arch = "arm", target_os = "none"))]
 mod image {
-    use avr_embassy::Executor;
+    use avr_embassy::{Boot, Executor};
     use kerf::baud;
     use kerf::hal::event;
     use kerf::hal::imp::{self, panic};
@@ -41,13 +43,15 @@ mod image {
     #[cortex_m_rt::entry]
     fn main() -> ! {
         static MAIN: StaticCell<Executor> = StaticCell::new();
-        imp::begin();
+        // SAFETY: nothing runs yet, and `run_with` drops the token with the closure before it polls a task.
+        let boot = unsafe { Boot::assume() };
+        imp::begin(&boot);
         MAIN.init(Executor::new()).run_with(
-            |main, thread| {
-                if kerf::app::start(main, thread, baud::DEFAULT).is_none() {
+            move |main, thread| {
+                if kerf::app::start(main, thread, &boot, baud::DEFAULT).is_none() {
                     panic::halt();
                 }
-                imp::start();
+                imp::start(&boot);
             },
             event::turn,
         )

@@ -133,7 +133,7 @@ pub use baton::Baton;
 pub use event::{Event, Waiter};
 #[cfg(target_os = "none")]
 pub use executor::Executor;
-pub use level::{Ceiling, Interrupt, Thread};
+pub use level::{Boot, Ceiling, Exclusive, Interrupt, Level, Thread};
 pub use shared::{InterruptEnd, Place, Shared};
 
 /// Runs `act`, which takes a few cycles, with interrupts off. Any level. Cost: 3 cycles.

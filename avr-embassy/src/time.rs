@@ -142,7 +142,7 @@ fn count() -> [u8; 5] {
     crate::mask(|| unsafe { MILLIS })
 }
 
-/// Milliseconds since reset, modulo 2^32: they wrap after 49.7 days. Thread mode and interrupt mode. Cost: 24 cycles.
+/// Milliseconds since reset, modulo 2^32: they wrap after 49.7 days. Any level. Cost: 24 cycles.
 pub fn millis() -> u32 {
     let [a, b, c, d, _] = count();
     u32::from_le_bytes([a, b, c, d])

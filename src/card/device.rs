@@ -5,7 +5,7 @@
 //! has to be called again for this block. The card stays selected meanwhile. A block that is written has been sent when
 //! the function returns; the card is busy with it for up to 250 ms, and the next command waits for that.
 
-use crate::hal::{card, time::millis};
+use crate::hal::{Thread, card, time::millis};
 
 /// Why a block is not available.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -63,8 +63,8 @@ pub struct Blocks {
 #[small]
 impl Blocks {
     /// Returns a card to which no command has been sent.
-    pub const fn new() -> Self {
-        Self { device: Device::new(), patient: true, number: None, bytes: [0; BLOCK] }
+    pub const fn new(thread: Thread) -> Self {
+        Self { device: Device::new(thread), patient: true, number: None, bytes: [0; BLOCK] }
     }
 
     /// Makes one attempt to initialize the card. Returns whether it is ready.
@@ -134,6 +134,7 @@ impl Blocks {
 
 /// The card.
 struct Device {
+    thread: Thread,
     stage: Stage,
     /// Whether addresses count blocks, not bytes.
     is_high: bool,
@@ -145,8 +146,8 @@ struct Device {
 
 #[small]
 impl Device {
-    const fn new() -> Self {
-        Self { stage: Stage::Fresh, is_high: false, awaited: None, writes: None }
+    const fn new(thread: Thread) -> Self {
+        Self { thread, stage: Stage::Fresh, is_high: false, awaited: None, writes: None }
     }
 
     /// Makes one attempt to initialize the card. Returns whether it is ready.
@@ -159,7 +160,7 @@ impl Device {
             self.stage = Stage::Fresh;
         }
         if done != Ok(true) {
-            card::release();
+            card::release(self.thread);
         }
         done
     }
@@ -167,15 +168,15 @@ impl Device {
     fn reset(&mut self) -> Result<bool, Fault> {
         let _ = self.rest(true);
         self.awaited = None;
-        card::release();
-        card::set_fast(false);
+        card::release(self.thread);
+        card::set_fast(self.thread, false);
         // 80 clock cycles while no device is selected; the card needs 74.
-        (0..10).for_each(|_| _ = card::exchange(0xFF));
-        if !(0..TRIES).any(|_| command(0, 0) == IDLE) {
+        (0..10).for_each(|_| _ = card::exchange(self.thread, 0xFF));
+        if !(0..TRIES).any(|_| command(self.thread, 0, 0) == IDLE) {
             return Err(Fault::Failed);
         }
-        let version_2 = command(8, 0x1AA) & ILLEGAL == 0;
-        if version_2 && word() & 0xFFF != 0x1AA {
+        let version_2 = command(self.thread, 8, 0x1AA) & ILLEGAL == 0;
+        if version_2 && word(self.thread) & 0xFFF != 0x1AA {
             return Err(Fault::Failed);
         }
         self.stage = Stage::Wakes(millis(), version_2);
@@ -183,18 +184,19 @@ impl Device {
     }
 
     fn wake(&mut self, since: u32, version_2: bool) -> Result<bool, Fault> {
-        command(55, 0);
-        match command(41, u32::from(version_2) << 30) {
+        command(self.thread, 55, 0);
+        match command(self.thread, 41, u32::from(version_2) << 30) {
             0 => {}
             IDLE if millis().wrapping_sub(since) < READY_MS => return Ok(false),
             _ => return Err(Fault::Failed),
         }
-        self.is_high = version_2 && command(58, 0) == 0 && word() & 1 << 30 != 0;
-        if !self.is_high && command(16, BLOCK as u32) != 0 {
+        self.is_high =
+            version_2 && command(self.thread, 58, 0) == 0 && word(self.thread) & 1 << 30 != 0;
+        if !self.is_high && command(self.thread, 16, BLOCK as u32) != 0 {
             return Err(Fault::Failed);
         }
-        card::release();
-        card::set_fast(true);
+        card::release(self.thread);
+        card::set_fast(self.thread, true);
         self.stage = Stage::Ready;
         Ok(true)
     }
@@ -206,11 +208,11 @@ impl Device {
     /// Waits until the card has written its last block, at most 250 ms. Not `patient`: returns [`Fault::Later`] instead.
     fn rest(&mut self, patient: bool) -> Result<(), Fault> {
         let Some(since) = self.writes else { return Ok(()) };
-        card::select();
+        card::select(self.thread);
         // A selected card shows that it is busy from the second byte on.
-        card::exchange(0xFF);
+        card::exchange(self.thread, 0xFF);
         let done = loop {
-            if card::exchange(0xFF) == 0xFF {
+            if card::exchange(self.thread, 0xFF) == 0xFF {
                 break Ok(());
             }
             if millis().wrapping_sub(since) > WRITE_MS {
@@ -220,7 +222,7 @@ impl Device {
                 break Err(Fault::Later);
             }
         };
-        card::release();
+        card::release(self.thread);
         if done != Err(Fault::Later) {
             self.writes = None;
         }
@@ -232,12 +234,12 @@ impl Device {
         if let Some((_, since)) = self.awaited {
             return Ok(since);
         }
-        if !patient && card::is_wanted() {
+        if !patient && card::is_wanted(self.thread) {
             // A sensor on the SPI has priority.
             return Err(Fault::Later);
         }
         self.rest(patient)?;
-        if self.stage != Stage::Ready || command(17, self.address(block)) != 0 {
+        if self.stage != Stage::Ready || command(self.thread, 17, self.address(block)) != 0 {
             return Err(Fault::Failed);
         }
         let now = millis();
@@ -250,7 +252,7 @@ impl Device {
         // Nobody may have looked for a long time, so the last looks come after it.
         let mut looks = LAST_LOOKS;
         loop {
-            match (0..LOOKS).map(|_| card::exchange(0xFF)).find(|byte| *byte != 0xFF) {
+            match (0..LOOKS).map(|_| card::exchange(self.thread, 0xFF)).find(|byte| *byte != 0xFF) {
                 Some(START) => break,
                 Some(_) => return Err(Fault::Failed),
                 None if millis().wrapping_sub(since) > BLOCK_MS => {
@@ -260,23 +262,24 @@ impl Device {
                 None => {}
             }
         }
-        card::read(place);
+        card::read(self.thread, place);
         // The checksum, which is not checked.
-        card::exchange(0xFF);
-        card::exchange(0xFF);
+        card::exchange(self.thread, 0xFF);
+        card::exchange(self.thread, 0xFF);
         Ok(())
     }
 
     fn put(&mut self, block: u32, from: &[u8; BLOCK]) -> Result<(), Fault> {
-        if self.stage != Stage::Ready || command(24, self.address(block)) != 0 {
+        if self.stage != Stage::Ready || command(self.thread, 24, self.address(block)) != 0 {
             return Err(Fault::Failed);
         }
-        card::exchange(0xFF);
-        card::exchange(START);
-        from.iter().for_each(|byte| _ = card::exchange(*byte));
-        card::exchange(0xFF);
-        card::exchange(0xFF);
-        let taken = (0..ANSWER).map(|_| card::exchange(0xFF)).find(|byte| *byte != 0xFF);
+        card::exchange(self.thread, 0xFF);
+        card::exchange(self.thread, START);
+        from.iter().for_each(|byte| _ = card::exchange(self.thread, *byte));
+        card::exchange(self.thread, 0xFF);
+        card::exchange(self.thread, 0xFF);
+        let taken =
+            (0..ANSWER).map(|_| card::exchange(self.thread, 0xFF)).find(|byte| *byte != 0xFF);
         if taken.is_none_or(|byte| byte & 0x1F != 5) {
             return Err(Fault::Failed);
         }
@@ -288,7 +291,7 @@ impl Device {
     fn end(&mut self, done: Result<(), Fault>) -> Result<(), Fault> {
         if done != Err(Fault::Later) {
             self.awaited = None;
-            card::release();
+            card::release(self.thread);
         }
         done
     }
@@ -315,22 +318,25 @@ impl Device {
 /// Sends a command. Returns the first byte of its answer, 0xFF if none comes.
 #[inline(never)]
 #[small]
-fn command(number: u8, argument: u32) -> u8 {
-    card::select();
-    card::exchange(0xFF);
-    card::exchange(0x40 | number);
-    argument.to_be_bytes().iter().for_each(|byte| _ = card::exchange(*byte));
+fn command(thread: Thread, number: u8, argument: u32) -> u8 {
+    card::select(thread);
+    card::exchange(thread, 0xFF);
+    card::exchange(thread, 0x40 | number);
+    argument.to_be_bytes().iter().for_each(|byte| _ = card::exchange(thread, *byte));
     // The checksum counts only until the card is in SPI mode.
-    card::exchange(match number {
-        0 => 0x95,
-        8 => 0x87,
-        _ => 0x01,
-    });
-    (0..ANSWER).map(|_| card::exchange(0xFF)).find(|byte| *byte & 0x80 == 0).unwrap_or(0xFF)
+    card::exchange(
+        thread,
+        match number {
+            0 => 0x95,
+            8 => 0x87,
+            _ => 0x01,
+        },
+    );
+    (0..ANSWER).map(|_| card::exchange(thread, 0xFF)).find(|byte| *byte & 0x80 == 0).unwrap_or(0xFF)
 }
 
 /// Reads the other four bytes of an answer.
 #[small]
-fn word() -> u32 {
-    (0..4).fold(0, |word, _| word << 8 | u32::from(card::exchange(0xFF)))
+fn word(thread: Thread) -> u32 {
+    (0..4).fold(0, |word, _| word << 8 | u32::from(card::exchange(thread, 0xFF)))
 }

@@ -10,6 +10,7 @@ use super::{Entry, NAME_MAX, PRINTS, REST, use_byte};
 #[cfg(feature = "card-write")]
 use super::{WRITES, writes};
 use crate::capability::Capability;
+use crate::hal::Thread;
 use crate::status::Status;
 
 /// The longest line, without what is behind a `;`.
@@ -63,10 +64,10 @@ pub struct Card {
 #[small]
 impl Card {
     /// Returns a card that has not been initialized.
-    pub fn new() -> Self {
+    pub fn new(thread: Thread) -> Self {
         use_byte().set(REST);
         Self {
-            blocks: Blocks::new(),
+            blocks: Blocks::new(thread),
             volume: None,
             file: None,
             skips: false,
@@ -404,13 +405,6 @@ impl Card {
         if is_kept && line.push(byte).is_err() {
             (self.skips, self.is_long) = (true, true);
         }
-    }
-}
-
-#[small]
-impl Default for Card {
-    fn default() -> Self {
-        Self::new()
     }
 }
 

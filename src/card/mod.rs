@@ -37,17 +37,17 @@ const PRINTS: u8 = 1;
 /// Lines are written to a file.
 const WRITES: u8 = 2;
 
-/// Whether lines of the selected file are being taken. Thread mode, 10 cycles.
+/// Whether lines of the selected file are being taken. Any level. Cost: 10 cycles.
 pub fn prints() -> bool {
     cfg!(feature = "sd") && use_byte().get() == PRINTS
 }
 
-/// Whether lines are written to a file, and not run. Thread mode, 10 cycles.
+/// Whether lines are written to a file, and not run. Any level. Cost: 10 cycles.
 pub fn writes() -> bool {
     cfg!(feature = "card-write") && use_byte().get() == WRITES
 }
 
-/// Whether a file is in use: lines are taken from it, or written to it. Thread mode, 20 cycles.
+/// Whether a file is in use: lines are taken from it, or written to it. Any level. Cost: 20 cycles.
 pub fn is_in_use() -> bool {
     prints() || writes()
 }

@@ -11,12 +11,12 @@
 //! stage one of the three owns the record ([`Baton`]), and only the owner passes it on to the next stage. A second
 //! contact is ignored until the planner has taken the first. RAM: 27 bytes.
 
-use avr_embassy::Baton;
+use avr_embassy::ring::Producer;
+use avr_embassy::{Baton, Interrupt, Thread};
 
 use super::step_replay::StepReplay;
 use super::{Dda, SEGMENTS, Segment};
 use crate::boards::MOTORS;
-use avr_embassy::ring::Producer;
 
 /// No contact. The sampling interrupt owns the record.
 const NONE: u8 = 0;
@@ -70,32 +70,32 @@ pub fn is_noted() -> bool {
 }
 
 /// Replays the segments that have been pushed since the contact's segment. At most one of them was pushed after the
-/// contact. Exec only, before it pushes another.
+/// contact. Call it before another is pushed.
 #[inline(never)]
 #[small]
-pub fn catch_up(segments: &Producer<Segment, SEGMENTS>) {
+pub fn catch_up(_: Interrupt, segments: &Producer<Segment, SEGMENTS>) {
     contact().pass(NOTED, FOLLOWED, |contact| {
         segments.behind(contact.tail).for_each(|segment| contact.replay.run(segment));
     });
 }
 
-/// Replays a segment that is about to be pushed. Exec only, before the push: after the push the generator may take
-/// the segment at once.
+/// Replays a segment that is about to be pushed, before the push: after it the generator may take the segment at
+/// once.
 #[inline(never)]
 #[small]
-pub fn pushed(segment: &Segment) {
+pub fn pushed(_: Interrupt, segment: &Segment) {
     contact().pass(FOLLOWED, FOLLOWED, |contact| contact.replay.run(segment));
 }
 
 /// Returns where the motors were at the contact, given that they have stopped at `at`, and forgets the contact. `None`
-/// if exec has not caught up. Thread mode, when exec has dropped its blocks because of the contact.
+/// if exec has not caught up. Call it when exec has dropped its blocks because of the contact.
 #[small]
-pub fn take(at: &[i32; MOTORS]) -> Option<[i32; MOTORS]> {
+pub fn take(_: Thread, at: &[i32; MOTORS]) -> Option<[i32; MOTORS]> {
     contact().pass(FOLLOWED, NONE, |contact| contact.replay.before(at))
 }
 
-/// Forgets the contact. Thread mode, when exec has dropped its blocks or no switch is armed.
+/// Forgets the contact. Call it when exec has dropped its blocks or no switch is armed.
 #[inline(always)]
-pub fn clear() {
+pub fn clear(_: Thread) {
     contact().set_stage(NONE);
 }

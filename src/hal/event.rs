@@ -5,7 +5,7 @@
 use core::future::poll_fn;
 use core::task::{Poll, Waker};
 
-use avr_embassy::{Thread, Waiter};
+use avr_embassy::{Interrupt, Thread, Waiter};
 
 use super::byte::SharedByte;
 use super::imp;
@@ -59,8 +59,8 @@ pub fn is_unheard() -> bool {
 /// Whether other tasks should have their turn before the next line is executed: because of a real-time character or a
 /// switch, or because bytes have come ([`is_unheard`]) that the reader has to see before that line (`calls_reader`).
 #[inline(always)]
-pub fn is_wanted() -> bool {
-    imp::flags::has(Event::Realtime) || is_unheard() && imp::uart::calls_reader()
+pub fn is_wanted(thread: Thread) -> bool {
+    imp::flags::has(Event::Realtime) || is_unheard() && imp::uart::calls_reader(thread)
 }
 
 /// After this many segments without a turn of the main loop, received bytes are treated as a question that waits for
@@ -79,26 +79,26 @@ machine_static! {
 }
 
 /// Sets the ports, as bits, on which bytes may act without the end of a line. While any byte waits on such a port,
-/// there is an [`Event::Received`] each [`EAGER_MS`]. Thread mode.
-pub fn set_eager(ports: u8) {
+/// there is an [`Event::Received`] each [`EAGER_MS`].
+pub fn set_eager(_: Thread, ports: u8) {
     eager().set(eager().get() & !EAGER_PORTS | ports);
 }
 
 /// Sets whether a sender waits for an answer that thread mode works on. Exec then leaves more of the CPU to thread
 /// mode.
-pub fn set_asked(waits: bool) {
+pub fn set_asked(_: Thread, waits: bool) {
     asked().set(waits.into());
 }
 
 /// Whether a sender waits for an answer, or may wait for one: bytes have come, and the main loop has had no turn since
-/// the last segment. Exec and thread mode.
+/// the last segment. Any level.
 #[inline(always)]
 pub fn is_asked() -> bool {
     asked().get() != 0 || (passed_over().get() >= UNHEARD && is_unheard())
 }
 
-/// Counts one more segment since the last turn of the main loop. Returns how many there have been. Exec only.
-pub fn pass_over() -> u8 {
+/// Counts one more segment since the last turn of the main loop. Returns how many there have been.
+pub fn pass_over(_: Interrupt) -> u8 {
     let count = passed_over().get().saturating_add(1);
     passed_over().set(count);
     count
@@ -163,24 +163,24 @@ fn looked(eager: u8, ms: u8) -> Option<u8> {
 
 /// Whether it is time for a look, and a byte waits on a port where bytes may act without the end of a line.
 #[inline(never)]
-fn is_eager() -> bool {
+fn is_eager(thread: Thread) -> bool {
     let Some(now) = looked(eager().get(), imp::time::millis() as u8) else { return false };
     eager().set(now);
-    (0..PORTS as u8).any(|port| now & 1 << port != 0 && imp::uart::newest(port).is_some())
+    (0..PORTS as u8).any(|port| now & 1 << port != 0 && imp::uart::newest(thread, port).is_some())
 }
 
 /// Runs work that is too small for a task, in each turn of the main loop. `bits` are the events since the last turn.
 pub fn turn(thread: Thread, bits: u8) {
     passed_over().set(0);
     if NATIVE {
-        imp::uart::go_on();
+        imp::uart::go_on(thread);
     }
     if PORTS > 1 && Event::Transmitted.is_in(bits) {
         transmitted().wake(thread);
     }
     if Event::Tick.is_in(bits) {
-        imp::uart::look();
-        if is_eager() {
+        imp::uart::look(thread);
+        if is_eager(thread) {
             super::flags::set(Event::Received);
         }
     }

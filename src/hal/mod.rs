@@ -6,7 +6,7 @@
 //! [`contract`] and [`primitives`] say what each of them provides. All other code calls those functions, for example
 //! `hal::stepper::go()`, and does not know which chip it runs on.
 
-pub use avr_embassy::{Ceiling, Interrupt, Thread, byte, ring};
+pub use avr_embassy::{Boot, Ceiling, Exclusive, Interrupt, Level, Thread, byte, ring};
 
 #[macro_use]
 mod place;

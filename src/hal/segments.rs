@@ -19,7 +19,7 @@ impl Segments {
     }
 
     /// Changes a segment queued earlier; `back` 0 is the newest. Returns `false` if the interrupt has taken it, or
-    /// takes another one just then. Interrupts are off while `change` runs, so it has to be short. Exec.
+    /// takes another one just then. Interrupts are off while `change` runs, so it has to be short.
     #[inline(always)]
     pub fn amend(&mut self, back: usize, change: impl FnOnce(&mut Segment)) -> bool {
         // SAFETY: by the contract of `new` nobody reads a segment while interrupts are off.

@@ -162,16 +162,18 @@ mod tests {
     use crate::gcode::command::Commands;
     use crate::gcode::setup::Usual;
     use crate::hal::eeprom::Eeprom;
+    use avr_embassy::host::Runtime;
     use std::string::String;
 
     #[test]
     fn all_jobs_are_good_programs_but_for_what_they_show() {
+        let thread = Runtime::new().thread();
         let mut lines = 0;
         for number in (1..=u8::MAX).filter(|number| *number != STORED) {
             let Some(mut job) = Job::new(number) else { continue };
             let (mut state, mut out) = (Interpreter::new(), Commands::default());
             let (mut last, mut line) = (String::new(), Vec::new());
-            while job.next_line(&Eeprom::take(), &mut line) {
+            while job.next_line(&Eeprom::of(thread), &mut line) {
                 assert!(line.len() < LINE_MAX, "{number}");
                 let done = state.interpret(&line, &Usual, &mut out);
                 last = String::from_utf8(line.to_vec()).unwrap();

@@ -28,7 +28,7 @@ pub enum Doing {
 }
 
 /// Returns what the machine is doing. `works` says whether anything is queued or runs. It is called only if its answer
-/// matters. Thread mode.
+/// matters. Any level.
 #[inline(always)]
 pub fn doing(works: impl Fn() -> bool) -> Doing {
     if machine::is_alarmed() {
@@ -47,7 +47,7 @@ pub fn doing(works: impl Fn() -> bool) -> Doing {
 }
 
 /// Whether senders are shown a hold. The short hold of a kill at standstill, which lasts until the waiting lines are
-/// dropped, is not shown. Thread mode.
+/// dropped, is not shown. Any level.
 #[inline(always)]
 pub fn shows_hold(works: impl Fn() -> bool) -> bool {
     let rests = || !works() || machine::is_stopped();

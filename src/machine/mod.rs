@@ -84,7 +84,7 @@ pub use signs::Signs;
 
 use crate::hal::byte::SharedByte;
 use crate::hal::event::Event::BlockDone;
-use crate::hal::{exec, flags};
+use crate::hal::{Interrupt, Thread, exec, flags};
 use crate::progmem;
 
 /// The state of the machine.
@@ -141,7 +141,7 @@ pub fn alarm() -> Alarm {
     Alarm::from_bits(alarm_byte().get())
 }
 
-/// Returns what the machine carries out. Thread mode.
+/// Returns what the machine carries out. Any level.
 pub fn cycle() -> Cycle {
     Cycle::from_bits(cycle_byte().get())
 }
@@ -165,7 +165,7 @@ pub fn is_held() -> bool {
     hold_byte().get() != Hold::Off as u8
 }
 
-/// Whether lines or the queue are being dropped: [`Hold::flushes`]. Thread mode.
+/// Whether lines or the queue are being dropped: [`Hold::flushes`]. Any level.
 #[inline(always)]
 pub fn is_flushing() -> bool {
     hold_byte().get() >= Hold::Flush as u8
@@ -177,38 +177,38 @@ pub fn is_dropping() -> bool {
     hold_byte().get() >= Hold::Drop as u8
 }
 
-/// Whether the program ends once the queue has been dropped: [`Hold::kills`]. Thread mode.
+/// Whether the program ends once the queue has been dropped: [`Hold::kills`]. Any level.
 #[inline(always)]
 pub fn is_killing() -> bool {
     hold_byte().get() >= Hold::Kill as u8
 }
 
-/// Whether the reader has to drop the lines that have arrived. Thread mode.
+/// Whether the reader has to drop the lines that have arrived. Any level.
 #[inline(always)]
 pub fn is_to_cut() -> bool {
     hold_byte().get() | 1 == Hold::FlushDoor as u8
 }
 
-/// Whether the machine stands at a program stop. Thread mode.
+/// Whether the machine stands at a program stop. Any level.
 #[inline(always)]
 pub fn is_stopped() -> bool {
     cycle_byte().get() == Cycle::Stopped as u8
 }
 
-/// Whether lines are only checked and not carried out. Thread mode.
+/// Whether lines are only checked and not carried out. Any level.
 #[inline(always)]
 pub fn is_checking() -> bool {
     cycle_byte().get() == Cycle::Check as u8
 }
 
-/// Whether the door is open. Thread mode.
+/// Whether the door is open. Any level.
 #[inline(always)]
 pub fn has_open_door() -> bool {
     let byte = hold_byte().get();
     byte > Hold::Resuming as u8 && byte & 1 != 0
 }
 
-/// Whether motion is not held, or resumes by itself after it has come to rest. Thread mode.
+/// Whether motion is not held, or resumes by itself after it has come to rest. Any level.
 #[inline(always)]
 pub fn goes_on() -> bool {
     hold_byte().get() <= Hold::Resuming as u8
@@ -220,17 +220,17 @@ pub fn is_resuming() -> bool {
     hold_byte().get() == Hold::Resuming as u8
 }
 
-/// Whether a `~` may resume what is held or what waits at a program stop. Thread mode.
+/// Whether a `~` may resume what is held or what waits at a program stop. Any level.
 #[inline(always)]
 pub fn may_resume() -> bool {
     hold_byte().get() < Hold::Door as u8
 }
 
 /// Applies an event to the [`Hold`], and makes exec run. For events that concern only the [`Hold`]. (`Dropped` concerns
-/// the [`Cycle`] too: call [`dropped`] for it.) Thread mode.
+/// the [`Cycle`] too: call [`dropped`] for it.)
 #[inline(never)]
 #[small]
-pub fn take(event: Event) {
+pub fn take(_: Thread, event: Event) {
     let before = hold_byte().get();
     let at = usize::from(before) * Event::OF_HOLD + event as usize;
     // An unchanged state is not written, because exec may have written the byte meanwhile.
@@ -240,41 +240,40 @@ pub fn take(event: Event) {
     exec::pend();
 }
 
-/// Applies an event that concerns only the [`Cycle`]. Thread mode.
+/// Applies an event that concerns only the [`Cycle`].
 #[inline(never)]
 #[small]
-pub fn carry_out(event: Event) {
+pub fn carry_out(_: Thread, event: Event) {
     cycle_byte().set(cycle().after(event, is_dropping(), is_alarmed()) as u8);
 }
 
 /// Applies the event `Dropped`: the queue has been dropped. Returns the cycle that has been interrupted, and whether
-/// the program has to end. Thread mode.
+/// the program has to end.
 #[inline(always)]
-pub fn dropped() -> (Cycle, bool) {
+pub fn dropped(thread: Thread) -> (Cycle, bool) {
     let before = (cycle(), is_killing());
     cycle_byte().set(before.0.after(Event::Dropped, true, true) as u8);
-    take(Event::Dropped);
+    take(thread, Event::Dropped);
     before
 }
 
 /// Begins an alarm and drops the queue, unless an equally bad or worse alarm is on. Calls `first` before exec sees the
-/// alarm. Returns whether the alarm has begun. Thread mode.
+/// alarm. Returns whether the alarm has begun.
 #[inline(always)]
-pub fn raise(alarm: Alarm, first: impl FnOnce()) -> bool {
+pub fn raise(thread: Thread, alarm: Alarm, first: impl FnOnce()) -> bool {
     let counts = self::alarm().is_exceeded_by(alarm);
     if counts {
         first();
         // In this order, so that exec never takes what is to be dropped for what is queued in the alarm.
-        take(Event::Cut);
+        take(thread, Event::Cut);
         alarm_byte().set(alarm as u8);
     }
     counts
 }
 
 /// Ends the alarm. Returns false if it cannot end: during a panic, or while lines or the queue are being dropped.
-/// Thread mode.
 #[inline(always)]
-pub fn clear() -> bool {
+pub fn clear(_: Thread) -> bool {
     let ends = !is_flushing() && alarm_byte().get() != Alarm::Panic as u8;
     if ends {
         alarm_byte().set(Alarm::None as u8);
@@ -284,13 +283,13 @@ pub fn clear() -> bool {
 
 /// Puts the machine into [`State::AFTER_FAULT`], after an unwanted reset, or after a reset by the sender during motion.
 /// Call it when nothing is queued.
-pub fn start_alarmed() {
+pub fn start_alarmed(_: Thread) {
     alarm_byte().set(State::AFTER_FAULT.alarm as u8);
 }
 
-/// Records that the machine has come to rest in a hold. Returns whether motion resumes. Exec only.
+/// Records that the machine has come to rest in a hold. Returns whether motion resumes.
 #[inline(always)]
-pub fn rested() -> bool {
+pub fn rested(_: Interrupt) -> bool {
     let resumes = is_resuming();
     if resumes {
         hold_byte().set(Hold::Resuming.after(Event::Rested) as u8);
@@ -299,21 +298,20 @@ pub fn rested() -> bool {
 }
 
 /// Makes exec drop its blocks. Exec sets `Event::BlockDone` of the [events](crate::hal::event) when it has done so; see
-/// [`has_dropped_blocks`]. Thread mode.
-pub fn drop_blocks() {
+/// [`has_dropped_blocks`].
+pub fn drop_blocks(_: Thread) {
     drop_wanted().set(1);
     exec::pend();
 }
 
-/// Whether exec has dropped its blocks. Thread mode.
+/// Whether exec has dropped its blocks. Any level.
 pub fn has_dropped_blocks() -> bool {
     drop_wanted().get() == 0
 }
 
 /// Calls `drop_all` if the planner wants exec's blocks dropped, and reports that to the planner. Call it at standstill.
-/// Exec only.
 #[inline(always)]
-pub fn drop_if_wanted(drop_all: impl FnOnce()) {
+pub fn drop_if_wanted(_: Interrupt, drop_all: impl FnOnce()) {
     if drop_wanted().get() != 0 {
         drop_all();
         drop_wanted().set(0);

@@ -1,6 +1,7 @@
 //! Tests every event in every state: against tables in this file, with the functions of the image, and for general
 //! properties.
 
+use avr_embassy::host::Runtime;
 use std::collections::BTreeSet;
 use std::vec::Vec;
 
@@ -121,36 +122,38 @@ fn set(state: State) {
 }
 
 /// Raises an event as the tasks do.
-fn happen(event: Event) {
+fn happen(runtime: &Runtime, event: Event) {
+    let (thread, exec) = (runtime.thread(), runtime.interrupt());
     match event {
         Event::Dropped => {
-            dropped();
+            dropped(thread);
         }
         Event::Rested => {
-            rested();
+            rested(exec);
         }
         Event::Stopped | Event::Probe | Event::Homing | Event::Jog | Event::Check | Event::Done => {
-            carry_out(event)
+            carry_out(thread, event)
         }
         Event::Cleared => {
-            clear();
+            clear(thread);
         }
         _ => match event.alarm() {
             Some(alarm) => {
-                raise(alarm, || ());
+                raise(thread, alarm, || ());
             }
-            None => take(event),
+            None => take(thread, event),
         },
     }
 }
 
 #[test]
 fn every_event_in_every_state() {
+    let runtime = Runtime::new();
     for (state, event) in all().flat_map(|state| Event::ALL.map(|event| (state, event))) {
         let expected = written(state, event);
         assert_eq!(state.after(event), expected, "{event:?} in {state:?}");
         set(state);
-        happen(event);
+        happen(&runtime, event);
         assert_eq!(now(), expected, "the image's functions: {event:?} in {state:?}");
     }
 }

@@ -45,7 +45,7 @@ pub fn raise_by(links: &Links, alarm: Alarm, reason: Status, by: u8) {
             links.model.borrow_mut().forget_homes();
         }
     };
-    if !machine::raise(alarm, stop) {
+    if !machine::raise(links.thread, alarm, stop) {
         return;
     }
     hold::abandon(links);
@@ -78,7 +78,7 @@ pub fn announce(links: &Links, reason: Status, by: u8) {
 #[inline(never)]
 #[small]
 pub fn wake_up_in(links: &Links, reason: Status) {
-    machine::start_alarmed();
+    machine::start_alarmed(links.thread);
     // The reporter checks this before it waits.
     links.notices.exception.set(Some(reason));
 }
@@ -91,16 +91,16 @@ pub fn clear(links: &Links, settings: &Settings) -> Status {
     let alarm = machine::alarm();
     match alarm {
         Alarm::None => return Status::Ok,
-        Alarm::Shutdown if switches::is_stopped(settings) => return alarm.status(),
+        Alarm::Shutdown if switches::is_stopped(links.thread, settings) => return alarm.status(),
         _ => {}
     }
-    if !machine::clear() {
+    if !machine::clear(links.thread) {
         return if alarm == Alarm::Panic { alarm.status() } else { Status::Again };
     }
     links.notices.limits_hit.set(0);
     hold::refuse_others(links);
     // A limit that was hit meanwhile has stopped steps while nothing moved.
-    stepper::release();
+    stepper::release(links.thread);
     links.reporter_wake.notify_now();
     Status::Ok
 }

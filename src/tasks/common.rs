@@ -5,8 +5,8 @@
 
 use crate::encoder::Encoder;
 use crate::gcode::overrides::Overrides;
-use crate::hal::Thread;
 use crate::hal::exec;
+use crate::hal::{Exclusive, Thread};
 use crate::heat::{Orders, PRINTERS};
 use crate::motion::snapshot::Snapshot;
 use crate::motors::Motors;
@@ -60,6 +60,18 @@ avr_embassy::shared_static! {
 #[inline(always)]
 pub fn with<R>(thread: Thread, act: impl FnOnce(&mut State) -> R + Send) -> R {
     exec::lock(thread, |ceiling| Common.with(ceiling, act))
+}
+
+/// As [`with`], for what switches outputs besides: `act` also gets the proof that exec cannot run.
+#[inline(always)]
+pub fn with_outputs<R>(
+    thread: Thread,
+    act: impl FnOnce(&mut State, Exclusive<'_>) -> R + Send,
+) -> R {
+    exec::lock(thread, |ceiling| {
+        let alone = ceiling.exclusive();
+        Common.with(ceiling, move |state| act(state, alone))
+    })
 }
 
 /// Returns the motion snapshot.

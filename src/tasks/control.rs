@@ -20,7 +20,7 @@ pub async fn run(links: &'static Links) -> ! {
         overrides::serve(links);
         overrides::tell(links);
         switches::serve(links);
-        if uart::take_opened() {
+        if uart::take_opened(links.thread) {
             links.open_anew();
         }
         next(links.thread, Event::Realtime).await;

@@ -9,6 +9,7 @@
 use super::links::Links;
 use super::storage::Storage;
 use crate::config::{Setting, Settings};
+use crate::hal::Thread;
 #[cfg(feature = "drivers")]
 use crate::{
     boards::ACTIVE,
@@ -31,8 +32,8 @@ const START_MS: u32 = 500;
 
 /// Why moves are refused because of the driver of a motor; `Ok` if they are not.
 #[cfg(feature = "drivers")]
-fn refusal(motor: usize, settings: &Settings) -> Status {
-    let state = drivers::watch(motor as u8).state();
+fn refusal(thread: Thread, motor: usize, settings: &Settings) -> Status {
+    let state = drivers::watch(thread, motor as u8).state();
     let axis = moved_by(settings, motor);
     let is_in_use = axis != NOTHING && settings.mode(axis) != AxisMode::Disabled;
     match state {
@@ -65,7 +66,7 @@ pub fn look(links: &Links) {
     }
     let runs = common::snapshot(links.thread).running;
     let refused = take_refusal(links);
-    let news = (0..DRIVERS).find_map(|motor| told(drivers::take_news(motor as u8)));
+    let news = (0..DRIVERS).find_map(|motor| told(drivers::take_news(links.thread, motor as u8)));
     match (news, refused) {
         (Some(fault @ (Status::DriverReset | Status::DriverOff)), _) | (_, Some(fault)) => {
             links.model.borrow_mut().forget_homes();
@@ -81,7 +82,7 @@ pub fn look(links: &Links) {
 #[inline(never)]
 fn take_refusal(links: &Links) -> Option<Status> {
     let mut settings = links.settings.borrow_mut();
-    let reasons = (0..DRIVERS).map(|motor| refusal(motor, &settings));
+    let reasons = (0..DRIVERS).map(|motor| refusal(links.thread, motor, &settings));
     let now = reasons.max_by_key(|status| *status as u8).filter(|status| *status != Status::Ok);
     let now = now.unwrap_or(Status::Ok);
     let before = settings.undriven.first_mut()?;
@@ -121,9 +122,9 @@ pub fn recall(settings: &mut Settings, storage: &Storage) {
 
 /// Sends all settings to the drivers. Cost: eight divisions of floats.
 #[cfg(feature = "drivers")]
-pub fn tell(settings: &Settings) {
+pub fn tell(thread: Thread, settings: &Settings) {
     for motor in 0..DRIVERS {
-        drivers::tell(motor as u8, &registers(settings, motor));
+        drivers::tell(thread, motor as u8, &registers(settings, motor));
     }
 }
 
@@ -142,7 +143,7 @@ pub fn recall(_settings: &mut Settings, _storage: &Storage) {}
 /// Without drivers, does nothing.
 #[cfg(not(feature = "drivers"))]
 #[inline(always)]
-pub fn tell(_settings: &Settings) {}
+pub fn tell(_thread: Thread, _settings: &Settings) {}
 
 /// Without drivers, does nothing.
 #[cfg(not(feature = "drivers"))]

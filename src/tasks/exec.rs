@@ -12,11 +12,10 @@ use avr_embassy::InterruptEnd;
 use crate::dda::contact;
 use crate::dda::{SEGMENTS, Segment};
 use crate::encoder::Encoder;
-use crate::hal::Interrupt;
 use crate::hal::arithmetic::product;
 use crate::hal::event::{self, Event};
 use crate::hal::segments::Segments;
-use crate::hal::{TIMER_HZ, encoder as sensors, exec, flags, stepper, uart};
+use crate::hal::{Interrupt, TIMER_HZ, encoder as sensors, exec, flags, stepper, uart};
 use crate::machine::{self, Alarm};
 use crate::motion::exec::{Exec, Step, take_heat, take_override};
 use crate::motion::finished::Finished;
@@ -53,15 +52,15 @@ pub fn run(
     async move {
         // A separate variable: otherwise it would be built on the stack and copied.
         let mut machine = Exec::new();
-        let mut task = Task::new(common, blocks, segments, &mut machine);
+        let mut task = Task::new(level, common, blocks, segments, &mut machine);
         loop {
             match exec::wait(level, || task.go_on()).await {
                 Next::Idle => exec::pend_when_idle(),
                 Next::Room => exec::note_idle(),
-                Next::Block | Next::Turn => links::wait_for_block(true),
+                Next::Block | Next::Turn => links::wait_for_block(level, true),
             }
             exec_asked_again(level).await;
-            links::wait_for_block(false);
+            links::wait_for_block(level, false);
         }
     }
 }
@@ -84,6 +83,8 @@ enum Next {
 
 /// The state that the task owns.
 struct Runner<'a> {
+    /// The proof that the runner is in interrupt mode.
+    level: Interrupt,
     waiting: Waiting,
     finished: Finished,
     /// The machine stands still at the end of what has been queued.
@@ -106,6 +107,7 @@ impl<'a> Task<'a> {
     #[inline(never)]
     #[small]
     fn new(
+        level: Interrupt,
         common: InterruptEnd<Common>,
         blocks: BlockSource,
         segments: Segments,
@@ -113,7 +115,7 @@ impl<'a> Task<'a> {
     ) -> Self {
         let (waiting, finished) = (Waiting::new(), Finished::new());
         let (rests, asked) = (true, false);
-        let runner = Runner { waiting, finished, rests, asked, segments, blocks, machine };
+        let runner = Runner { level, waiting, finished, rests, asked, segments, blocks, machine };
         Self { runner, common }
     }
 
@@ -138,7 +140,7 @@ impl Runner<'_> {
     /// Returns the room in the ring. `None` if there is no room for a segment and the steppers have not been stopped.
     #[inline(always)]
     fn is_due(&mut self) -> Option<Room> {
-        health::answer(Sign::Exec);
+        health::answer(self.level, Sign::Exec);
         self.waiting.update(self.segments.used());
         let room = self.waiting.room();
         let due = room != Room::None || stepper::is_stopped();
@@ -152,11 +154,11 @@ impl Runner<'_> {
     /// Takes one turn, which is one step of the machine. Returns what the task waits for next.
     #[inline(always)]
     fn turn(&mut self, room: Room, common: &mut InterruptEnd<Common>) -> Next {
-        uart::stop_late();
+        uart::stop_late(self.level);
         let released = self.blocks.released();
         let rested = self.rests;
         if contact::is_noted() {
-            contact::catch_up(&self.segments);
+            contact::catch_up(self.level, &self.segments);
         }
         let standstill = !stepper::running();
         self.machine.set_long(room == Room::Long);
@@ -172,10 +174,10 @@ impl Runner<'_> {
                 if standstill && let Some(thread) = self.machine.thread() {
                     common.with(|common| start_thread(thread, &common.encoder));
                 }
-                stepper::go();
+                stepper::go(self.level);
                 self.next_turn(passed_over)
             }
-            Step::Held if machine::rested() => Next::Turn,
+            Step::Held if machine::rested(self.level) => Next::Turn,
             Step::Idle | Step::Standstill | Step::Held => Next::Block,
             Step::Again | Step::Leaves | Step::Switched | Step::Override | Step::Heat => Next::Turn,
         }
@@ -198,14 +200,14 @@ impl Runner<'_> {
         }
         let left =
             Capability::Lathe.is_built_in() && (has_left.is_some() || encoder.pass == Status::Noop);
-        let holds = hold::is_wanted(out.running) || contact::is_noted() || left;
+        let holds = hold::is_wanted(self.level, out.running) || contact::is_noted() || left;
         self.machine.set_hold(holds, out);
         // An output that was paused in a hold is switched on again before motion resumes.
         if out.outputs != spindle::on() {
             if !machine::is_held() {
                 spindle.go_on();
             }
-            let ms = spindle::switch(spindle, out, false);
+            let ms = spindle::switch(self.level.exclusive(), spindle, out, false);
             // Within G33.1 the axes follow the encoder and do not wait.
             if !self.machine.needs_spindle() {
                 self.machine.wait(ms, out);
@@ -223,7 +225,7 @@ impl Runner<'_> {
             Step::Segment => self.finished.queue(),
             Step::Override => {
                 let change = take_override(&mut self.blocks);
-                overrides::change_in_stream(overrides, change, &mut self.blocks)
+                overrides::change_in_stream(self.level, overrides, change, &mut self.blocks)
             }
             Step::Heat if Capability::Printer.is_built_in() => {
                 if let (Some(orders), Some(wanted)) =
@@ -238,7 +240,9 @@ impl Runner<'_> {
             }
             Step::Held => self.held(out, spindle),
             Step::Leaves if Capability::Lathe.is_built_in() => self.lead(out, motors),
-            Step::Switched => self.machine.wait(spindle::switch(spindle, out, true), out),
+            Step::Switched => {
+                self.machine.wait(spindle::switch(self.level.exclusive(), spindle, out, true), out)
+            }
             Step::Again | Step::Leaves | Step::Idle | Step::Standstill | Step::Heat => {}
         }
         // A standstill lasts until a segment ends it, because `out.velocity` is ahead of the segments.
@@ -258,14 +262,14 @@ impl Runner<'_> {
         };
         let step = self.machine.step(&mut self.blocks, standstill, out, &mut slot);
         if step == Step::Segment {
-            power::segment(motors, slot.moving);
+            power::segment(self.level.exclusive(), motors, slot.moving);
             let cycles = product(slot.ticks, slot.period);
             self.waiting.push(cycles);
             if let Some(thread) = self.machine.thread() {
                 thread.queued(cycles, standstill);
             }
             if contact::is_noted() {
-                contact::pushed(&slot);
+                contact::pushed(self.level, &slot);
             }
             slot.publish();
         }
@@ -277,9 +281,9 @@ impl Runner<'_> {
     #[small]
     fn held(&mut self, out: &mut Snapshot, spindle: &mut Spindle) {
         if !self.machine.needs_spindle() {
-            spindle::switch(spindle, out, false);
+            spindle::switch(self.level.exclusive(), spindle, out, false);
         }
-        machine::drop_if_wanted(|| {
+        machine::drop_if_wanted(self.level, || {
             // When a program is dropped, a paused output stays off. A kill switches off all outputs here, because the
             // end of the program, which would do so too, may have to wait for a door. The remainder of a pass is
             // dropped as well, but its program goes on.
@@ -289,10 +293,10 @@ impl Runner<'_> {
                     out.speed = 0.0;
                 }
                 spindle.go_on();
-                spindle::switch(spindle, out, false);
+                spindle::switch(self.level.exclusive(), spindle, out, false);
             }
             let held = self.machine.drop_all(&mut self.blocks, out);
-            stepper::settle(held, &mut out.target);
+            stepper::settle(self.level, held, &mut out.target);
             if Capability::Lathe.is_built_in() && machine::is_dropping() {
                 self.machine.end_pass();
             }
@@ -317,7 +321,7 @@ impl Runner<'_> {
             8 => 3,
             _ => return,
         };
-        power::segment(motors, leaving);
+        power::segment(self.level.exclusive(), motors, leaving);
         let mut back = segments.used();
         while back > 0 {
             back -= 1;
@@ -348,16 +352,16 @@ impl Runner<'_> {
     #[inline(always)]
     fn queued(&mut self, rested: bool) -> u8 {
         let Self { waiting, segments, rests, .. } = self;
-        health::moves(waiting.count);
+        health::moves(self.level, waiting.count);
         waiting.update(segments.used());
         let short = waiting.is_short(*rests);
-        let passed_over = event::pass_over();
+        let passed_over = event::pass_over(self.level);
         // While an answer is due, a ramp in stretches of the usual length would delay it by 9 ms.
         let asked = event::is_asked();
         waiting.coarse = short || asked || passed_over > PATIENCE || waiting.is_busy();
         self.machine.set_coarse(waiting.coarse, short);
         if !rested {
-            health::look_for_starvation();
+            health::look_for_starvation(self.level);
         }
         passed_over
     }

@@ -16,7 +16,7 @@
 use kerf_macros::small;
 
 use crate::hal::byte::SharedByte;
-use crate::hal::{exec, stepper, watchdog};
+use crate::hal::{Interrupt, Thread, exec, stepper, watchdog};
 
 /// A sign of life.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -45,16 +45,16 @@ machine_static! {
     fn patience() -> SharedByte = SharedByte::new(0);
 }
 
-/// Notes a sign of life of exec. Exec only.
+/// Notes a sign of life of exec.
 #[inline(always)]
-pub fn answer(sign: Sign) {
+pub fn answer(_: Interrupt, sign: Sign) {
     signs().set(signs().get() | sign as u8);
 }
 
-/// Notes that exec has queued a segment, the `count`th. Exec only.
+/// Notes that exec has queued a segment, the `count`th.
 #[inline(always)]
-pub fn moves(count: u8) {
-    answer(Sign::Segment);
+pub fn moves(exec: Interrupt, count: u8) {
+    answer(exec, Sign::Segment);
     if count.is_multiple_of(OFTEN) {
         let left = patience().get();
         if left > 0 {
@@ -70,10 +70,10 @@ machine_static! {
 }
 
 /// Counts a starvation: a segment follows one that ended at speed, but the steppers stand still, so they have waited
-/// for it. Exec only.
+/// for it.
 #[inline(never)]
 #[small]
-pub fn look_for_starvation() {
+pub fn look_for_starvation(_: Interrupt) {
     if !stepper::running() && !stepper::is_stopped() {
         late().set(late().get().saturating_add(1));
     }
@@ -85,8 +85,8 @@ pub fn starvations() -> u8 {
     late().get()
 }
 
-/// Feeds the watchdog if all is well, and asks exec for new signs of life. Thread mode.
-pub fn look() {
+/// Feeds the watchdog if all is well, and asks exec for new signs of life.
+pub fn look(_: Thread) {
     let rests = if stepper::running() && !stepper::is_stopped() { 0 } else { Sign::Segment as u8 };
     if signs().get() | rests == ALL {
         signs().set(0);

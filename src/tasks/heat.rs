@@ -34,9 +34,8 @@ use crate::config::groups::hot_end;
 use crate::config::{Owner, Setting, Settings};
 use crate::gcode::heating::{Heat, Part, Wait};
 use crate::gcode::printing::EXTRUDER;
-use crate::hal::Thread;
 use crate::hal::event::Event;
-use crate::hal::{flags, heaters};
+use crate::hal::{Thread, flags, heaters};
 use crate::heat::control::{FULL, level};
 use crate::heat::cooler;
 use crate::heat::heater::{Heater, Seen, in_units};
@@ -124,12 +123,12 @@ impl Parts {
     }
 
     /// Switches the fan of the heatbreak by a reading of the hot end.
-    fn turn_cooler(&self, reading: Option<u16>, orders: &Orders) {
+    fn turn_cooler(&self, thread: Thread, reading: Option<u16>, orders: &Orders) {
         let Some(cools) = self.cools.first() else { return };
         let ([hot_end, _], [to, _]) = (&*self.heaters.borrow(), orders.to);
         let turns = cooler::turns(cools.get(), to, hot_end.feels(reading));
         cools.set(turns);
-        heaters::cool(turns);
+        heaters::cool(thread, turns);
     }
 
     /// Whether the awaited temperatures have been reached.
@@ -252,7 +251,7 @@ pub fn stop(links: &Links) {
         return;
     }
     forget_orders(links.thread);
-    heaters::drive([0; 3]);
+    heaters::drive(links.thread, [0; 3]);
     if let Some(parts) = links.heat.parts.first() {
         for heater in parts.heaters.borrow_mut().iter_mut() {
             heater.stop();
@@ -330,15 +329,15 @@ pub fn look(links: &Links) {
     let Some(parts) = links.heat.parts.first() else { return };
     let orders = orders(links.thread);
     let number = parts.next.replace(parts.next.get() ^ 1);
-    let reading = heaters::reading();
-    heaters::begin(parts.next.get());
+    let reading = heaters::reading(links.thread);
+    heaters::begin(links.thread, parts.next.get());
     if COOLS && number == 0 {
-        parts.turn_cooler(reading, &orders);
+        parts.turn_cooler(links.thread, reading, &orders);
     }
-    let seen = look_at(parts, number, reading, &orders);
+    let seen = look_at(links.thread, parts, number, reading, &orders);
     let fan = parts.turn_fan(orders.fan);
     let [hot_end, bed] = parts.heaters.borrow().each_ref().map(Heater::level);
-    heaters::drive([hot_end, bed, fan]);
+    heaters::drive(links.thread, [hot_end, bed, fan]);
     parts.end_idle_wait(&orders);
     if parts.tuned.get() != 0 {
         see_to_tune(links, parts, &orders);
@@ -358,6 +357,7 @@ pub fn look(links: &Links) {
 #[inline(never)]
 #[small]
 fn look_at(
+    thread: Thread,
     parts: &Parts,
     number: u8,
     reading: Option<u16>,
@@ -369,7 +369,7 @@ fn look_at(
     let mut tune = parts.tune.borrow_mut();
     let tune = Some(&mut *tune).filter(|_| parts.tuned.get() == number + 1);
     let (heater, to) = if number == 0 { (hot_end, first) } else { (bed, second) };
-    let reading = heater.reading(reading, || heaters::word(number));
+    let reading = heater.reading(reading, || heaters::word(thread, number));
     heater.sample(number, reading, to, orders.fan, tune)
 }
 

@@ -51,7 +51,7 @@ use crate::hal::event::Event;
 use crate::hal::serial::{CUT, GO, USB};
 use crate::hal::system::reset;
 use crate::hal::time::millis;
-use crate::hal::{flags, uart};
+use crate::hal::{Interrupt, Thread, flags, uart};
 use crate::machine::{self, Alarm};
 use crate::protocol::{Hold, Machine, Speech};
 use crate::realtime::{ENQUIRY, FLUSH, HOLD, KILL, LET_GO, RESET, RESUME, UNPLACED};
@@ -59,9 +59,9 @@ use crate::status::Status;
 
 /// Whether a machine that is `running` must stop. The character alone begins the hold, because thread mode may be busy
 /// with a report. An open door holds nothing in an alarm, where nothing moves: the end of a program need not wait for
-/// the door. Exec only.
+/// the door.
 #[inline(always)]
-pub fn is_wanted(running: bool) -> bool {
+pub fn is_wanted(_: Interrupt, running: bool) -> bool {
     (machine::is_held() && !machine::is_locked()) || (running && uart::asks_hold())
 }
 
@@ -75,7 +75,7 @@ pub fn abandon(links: &Links) {
             // A probing that has failed has begun the alarm itself: its line is answered when the result has been told.
             let probed = port.speech.get().is_in_order() && links.probe.is_news();
             lines.terminate_from(probed.into(), dropped());
-            cut_up_to(port, &mut lines, uart::newest(port.number));
+            cut_up_to(port, &mut lines, uart::newest(links.thread, port.number));
         }
     }
     drop_queue(links);
@@ -91,7 +91,7 @@ pub fn refuse_others(links: &Links) {
         if let Ok(mut lines) = port.lines.try_borrow_mut() {
             lines.refuse();
             if !lines.ready() {
-                refuse_up_to(port, uart::newest(port.number));
+                refuse_up_to(port, uart::newest(links.thread, port.number));
             }
         }
     }
@@ -151,11 +151,14 @@ pub fn door(links: &Links, open: bool) {
     }
     let works = links.has_data() || View::of(links, links.feeder()).has_work();
     links.signs.door.set(works);
-    machine::take(match works {
-        _ if open => machine::Event::DoorOpened,
-        true => machine::Event::DoorShut,
-        false => machine::Event::DoorShutIdle,
-    });
+    machine::take(
+        links.thread,
+        match works {
+            _ if open => machine::Event::DoorOpened,
+            true => machine::Event::DoorShut,
+            false => machine::Event::DoorShutIdle,
+        },
+    );
 }
 
 /// Holds the machine as if the door were opened and shut at once: nothing moves until a tilde. Also holds a machine at
@@ -166,7 +169,7 @@ pub fn knock(links: &Links) {
     if may_hold_at_rest() && !machine::has_open_door() {
         door(links, true);
         links.signs.door.set(true);
-        machine::take(machine::Event::DoorShut);
+        machine::take(links.thread, machine::Event::DoorShut);
     }
 }
 
@@ -183,16 +186,16 @@ pub fn serve(links: &Links) {
         // A `%` of an earlier hold is ignored.
         links.signs.percent.set(links.signs.percent.get() && machine::is_held());
         links.signs.door.set(links.signs.door.get() && machine::is_held());
-        machine::take(machine::Event::Hold);
+        machine::take(links.thread, machine::Event::Hold);
     }
     for port in &links.ports {
-        let characters = uart::take_realtime(port.number);
+        let characters = uart::take_realtime(links.thread, port.number);
         if characters != 0 {
             act(links, port, characters);
         }
         // Not if a `^x` has come meanwhile: what is behind that runs.
         if Speech::HAS_QUESTION && port.take_asked(ports::RESET) && !port.is_resetting() {
-            start_over(links, port, uart::newest(port.number), false);
+            start_over(links, port, uart::newest(links.thread, port.number), false);
         }
     }
 }
@@ -213,12 +216,12 @@ fn act(links: &Links, port: &Port, characters: u8) {
         if starts_over(port) {
             // The end of the program, which an earlier reset has queued, is no motion.
             let works = !links.is_resetting() && is_moving(links, port);
-            return start_over(links, port, uart::last_cut(port.number), works);
+            return start_over(links, port, uart::last_cut(links.thread, port.number), works);
         }
-        reset();
+        reset(links.thread);
     }
     if characters & LET_GO != 0 {
-        uart::kick(port.number);
+        uart::kick(links.thread.level(), port.number);
     }
     // Senders of grbl's dialect flush nothing by a percent sign: it only begins and ends programs.
     let cuts = characters & FLUSH != 0 && !port.speech.get().is_in_order();
@@ -229,7 +232,7 @@ fn act(links: &Links, port: &Port, characters: u8) {
         signs.resume.set(false);
     }
     if busy {
-        machine::take(machine::Event::Hold);
+        machine::take(links.thread, machine::Event::Hold);
         if port.speech.get().is_in_order() && machine::cycle() == machine::Cycle::Jog {
             // In grbl's dialect a hold ends a jog.
             jog::end(links);
@@ -237,11 +240,11 @@ fn act(links: &Links, port: &Port, characters: u8) {
     } else if holds && !kills {
         jog::bar(links);
         if port.speech.get().is_in_order() && may_hold_at_rest() {
-            machine::take(machine::Event::Hold);
+            machine::take(links.thread, machine::Event::Hold);
         }
     }
     if kills {
-        cut(links, port, uart::last_cut(port.number), machine::Event::Kill);
+        cut(links, port, uart::last_cut(links.thread, port.number), machine::Event::Kill);
     }
     if cuts && machine::is_held() {
         signs.percent.set(true);
@@ -249,7 +252,7 @@ fn act(links: &Links, port: &Port, characters: u8) {
         signs.lone_percent(millis());
     } else if holds && signs.take_lone_percent(millis()) && busy {
         // Cuts at the percent sign, which the reader has mostly passed: what has come since belongs to what follows.
-        cut(links, port, uart::last_cut(port.number), machine::Event::Cut);
+        cut(links, port, uart::last_cut(links.thread, port.number), machine::Event::Cut);
     }
     if characters & RESUME != 0 {
         signs.resume.set(true);
@@ -303,8 +306,8 @@ fn start_over(links: &Links, port: &Port, slot: Option<u8>, works: bool) {
 
 /// Drops the queue, as a `%` in a hold does: for `{qf:1}`, and for the end of a jog. The caller has refused `{qf:1}` if
 /// the machine is busy without a hold.
-pub fn flush_here() {
-    machine::take(machine::Event::Flush);
+pub fn flush_here(thread: Thread) {
+    machine::take(thread, machine::Event::Flush);
     flags::set(Event::Received);
 }
 
@@ -315,7 +318,7 @@ pub fn here(links: &Links) {
         // Nothing is cut a second time on a port with a reset of its own.
         let port = links.ports.iter().find(|port| !port.is_resetting());
         let port = port.unwrap_or(links.port(USB));
-        cut(links, port, uart::newest(port.number), machine::Event::Cut);
+        cut(links, port, uart::newest(links.thread, port.number), machine::Event::Cut);
     }
 }
 
@@ -324,7 +327,7 @@ pub fn here(links: &Links) {
 #[inline(never)]
 #[small]
 fn cut(links: &Links, port: &Port, slot: Option<u8>, event: machine::Event) {
-    machine::take(event);
+    machine::take(links.thread, event);
     links.signs.percent.set(false);
     for each in &links.ports {
         let mut lines = each.lines.borrow_mut();
@@ -336,7 +339,7 @@ fn cut(links: &Links, port: &Port, slot: Option<u8>, event: machine::Event) {
         lines.terminate(dropped());
         match is_own {
             true => cut_here(each, &mut lines, slot),
-            false => cut_up_to(each, &mut lines, uart::newest(each.number)),
+            false => cut_up_to(each, &mut lines, uart::newest(links.thread, each.number)),
         }
     }
     drop_queue(links);
@@ -373,7 +376,7 @@ pub fn ahead(links: &Links, port: &Port, mark: u8, slot: u8) {
 /// Resumes a hold or a program stop if a tilde has come.
 pub(super) fn go_on(links: &Links) {
     if links.signs.resume.take() && machine::may_resume() {
-        machine::take(machine::Event::Resume);
+        machine::take(links.thread, machine::Event::Resume);
         links.cycle_start.signal();
         // The reporter may have checked already when the character came, and be waiting again.
         links.reporter_wake.notify_now();

@@ -19,7 +19,7 @@ use crate::machine::{self, Cycle};
 #[small]
 pub fn end(links: &Links) {
     if machine::cycle() == Cycle::Jog {
-        hold::flush_here();
+        hold::flush_here(links.thread);
     }
     bar(links);
 }

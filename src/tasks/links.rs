@@ -38,9 +38,9 @@ use crate::boards::outputs;
 use crate::config::Settings;
 use crate::gcode::command::Commands;
 use crate::gcode::interpreter::Interpreter;
-use crate::hal::Thread;
 use crate::hal::byte::SharedByte;
 use crate::hal::serial::PORTS;
+use crate::hal::{Interrupt, Thread};
 use crate::jobs::Job;
 use crate::machine::{Notices, Probe, Signs};
 use crate::motion::queue;
@@ -223,8 +223,8 @@ machine_static! {
     fn waits() -> SharedByte = SharedByte::new(1);
 }
 
-/// Notes whether exec waits for a block. Exec only.
-pub fn wait_for_block(yes: bool) {
+/// Notes whether exec waits for a block.
+pub fn wait_for_block(_: Interrupt, yes: bool) {
     waits().set(yes.into());
 }
 

@@ -13,9 +13,8 @@ use super::links::Links;
 use super::ports::Port;
 use super::spindle;
 use crate::gcode::overrides::{Change, FULL, LEAST, Override, Overrides};
-use crate::hal::Thread;
 use crate::hal::event::Event;
-use crate::hal::{exec, flags, uart};
+use crate::hal::{Interrupt, Thread, exec, flags, uart};
 use crate::motion::factors::Factors;
 use crate::motion::queue::{self, BlockSource};
 use crate::realtime::{Asked, NO_JOG, TRAVERSE};
@@ -60,9 +59,14 @@ pub fn fix_feed(thread: Thread, fixed: bool) {
 #[inline(always)]
 pub fn fix_feed(_thread: Thread, _fixed: bool) {}
 
-/// Makes a change that stands in the stream: the moves before it have been prepared. Exec only.
+/// Makes a change that stands in the stream: the moves before it have been prepared.
 #[small]
-pub fn change_in_stream(overrides: &mut Overrides, change: Change, blocks: &mut BlockSource) {
+pub fn change_in_stream(
+    _: Interrupt,
+    overrides: &mut Overrides,
+    change: Change,
+    blocks: &mut BlockSource,
+) {
     overrides.change(change);
     blocks.want(factors(overrides));
     flags::set(Event::Realtime);
@@ -73,7 +77,7 @@ pub fn change_in_stream(overrides: &mut Overrides, change: Change, blocks: &mut 
 #[small]
 pub fn serve(links: &Links) {
     for port in &links.ports {
-        apply(links, port, uart::take_asked(port.number));
+        apply(links, port, uart::take_asked(links.thread, port.number));
     }
 }
 

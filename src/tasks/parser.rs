@@ -127,7 +127,7 @@ pub fn run(
     };
     async move {
         loop {
-            if is_wanted() {
+            if is_wanted(parser.links.thread) {
                 yield_now().await;
             }
             match parser.turn() {
@@ -421,7 +421,7 @@ impl Parser {
     fn wait(&self) -> impl Future<Output = ()> + '_ {
         let links = self.links;
         // An answer that is still due does not wait for the CPU.
-        set_asked(false);
+        set_asked(links.thread, false);
         // Bit 0: this has been polled before. Bit 1: a line of a job waits for the end of a jog, as of now.
         let mut state = u8::from(waits_for_jog(links)) << 1;
         poll_fn(move |cx| {

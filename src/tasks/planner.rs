@@ -234,7 +234,7 @@ pub fn run(links: &'static Links, shared: &'static Shared) -> impl Future<Output
 
 /// Carries out the move in `Links::commands` while the planner's task waits for a line, if there is room. Neither a
 /// wake-up of that task nor a turn of the executor comes between. Returns false if the task has to carry the move out;
-/// nothing has been done then that the task would not do. Thread mode, in the parser's turn. Cost: 9,000 cycles if a
+/// nothing has been done then that the task would not do. Called in the parser's turn. Cost: 9,000 cycles if a
 /// block is planned; 1,400 for a move that joins a chain.
 pub fn take_at_once(planner: &mut Planner) -> bool {
     if planner.is_flushed() || planner.owes_answers() {
@@ -861,12 +861,12 @@ impl Planner {
         if self.is_flushed() {
             return;
         }
-        machine::carry_out(machine::Event::Stopped);
+        machine::carry_out(self.links.thread, machine::Event::Stopped);
         // Without this report a sender would wait for ever.
         self.links.except(Status::ProgramStopped);
         self.links.cycle_start.take();
         self.links.cycle_start.wait().await;
-        machine::carry_out(machine::Event::Done);
+        machine::carry_out(self.links.thread, machine::Event::Done);
     }
 
     /// Whether all that is queued is to be dropped.
@@ -903,7 +903,7 @@ impl Planner {
         links.job.set(Job::default());
         #[cfg(feature = "sd")]
         links.card.borrow_mut().interrupt();
-        let (cycle, killed) = machine::dropped();
+        let (cycle, killed) = machine::dropped(self.links.thread);
         match cycle {
             Cycle::Jog => links.notices.jogged.set(true),
             Cycle::Homing => {
@@ -916,7 +916,9 @@ impl Planner {
             }
             Cycle::Probe => links.probe.abandon(),
             // Check mode was about to begin.
-            Cycle::Check if !self.checks() => machine::carry_out(machine::Event::Done),
+            Cycle::Check if !self.checks() => {
+                machine::carry_out(self.links.thread, machine::Event::Done)
+            }
             Cycle::Lines | Cycle::Stopped | Cycle::Check => {}
         }
         // If a sender begins with a reset, nothing is reported, because there was no job.
@@ -930,7 +932,7 @@ impl Planner {
             && !machine::is_alarmed()
         {
             // Before any other line is begun: lines that have come since the reset are refused.
-            machine::start_alarmed();
+            machine::start_alarmed(self.links.thread);
             alarm::announce(links, Status::Alarmed, by);
         }
         links.reporter_wake.notify_now();
@@ -939,7 +941,7 @@ impl Planner {
 
     /// Sets what the machine does besides carrying out lines, and has it reported at once.
     fn enter(&self, cycle: machine::Event) {
-        machine::carry_out(cycle);
+        machine::carry_out(self.links.thread, cycle);
         self.links.reporter_wake.notify_now();
     }
 

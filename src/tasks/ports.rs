@@ -19,6 +19,7 @@ use super::tx::Tx;
 use super::view::{Seen, View};
 use crate::card;
 use crate::config::Settings;
+use crate::hal::Thread;
 use crate::hal::event::{is_unheard, set_eager};
 use crate::hal::serial::{Flow, USB, is_shared};
 use crate::hal::uart;
@@ -232,13 +233,13 @@ impl Port {
     /// Returns how many lines may come, which footers tell. Each may be [`PROMISED`] bytes long with its end; a longer
     /// one counts as several.
     #[inline(never)]
-    pub fn promise(&self, lines: &LinePool) -> u8 {
+    pub fn promise(&self, thread: Thread, lines: &LinePool) -> u8 {
         let (slots, room) = (lines.free(), lines.room());
         let shift = if self.number == USB { PROMISED } else { AUX_PROMISED }.trailing_zeros();
         if u16::from(slots) << shift <= room {
             return slots;
         }
-        let all = room + u16::from(uart::room(self.number));
+        let all = room + u16::from(uart::room(thread, self.number));
         slots.min((all >> shift) as u8)
     }
 
@@ -380,9 +381,11 @@ impl Links {
     #[small]
     pub fn decided(&self, settings: &Settings) {
         let eager = self.ports.iter().filter(|port| port.is_eager());
-        set_eager(eager.fold(0, |ports, port| ports | 1 << port.number));
+        set_eager(self.thread, eager.fold(0, |ports, port| ports | 1 << port.number));
         if Speech::HAS_PLAIN {
-            self.ports.iter().for_each(|port| uart::set_plain(port.number, port.is_plain()));
+            self.ports
+                .iter()
+                .for_each(|port| uart::set_plain(self.thread, port.number, port.is_plain()));
         }
         self.set_flow(settings);
         let began = |port: &Port| port.choice.get() != Choice::Open;
@@ -395,7 +398,9 @@ impl Links {
     #[inline(never)]
     #[small]
     pub fn set_flow(&self, settings: &Settings) {
-        self.ports.iter().for_each(|port| uart::set_flow(port.number, port.flow(settings)));
+        self.ports
+            .iter()
+            .for_each(|port| uart::set_flow(self.thread, port.number, port.flow(settings)));
     }
 
     /// Whether a sender has reset the machine, and waits for the greeting.

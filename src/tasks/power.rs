@@ -13,10 +13,9 @@ use super::links::Links;
 use super::view::View;
 use super::{spindle, surface, turning};
 use crate::config::Settings;
-use crate::hal::Thread;
 use crate::hal::after_ms;
 use crate::hal::time::millis;
-use crate::hal::{gpio, system, uart};
+use crate::hal::{Exclusive, Thread, gpio, system, uart};
 use crate::machine;
 use crate::motors::{Modes, Motors};
 
@@ -27,14 +26,14 @@ const LOOK_MS: u64 = 20;
 pub async fn run(links: &'static Links) -> ! {
     loop {
         heat::look(links);
-        health::look();
+        health::look(links.thread);
         drivers::look(links);
         links.signs.age(millis());
         look(links);
         turning::look(links);
         surface::look(links);
         if uart::sees_opening() {
-            system::set_rests(rests(links));
+            system::set_rests(links.thread, rests(links));
         }
         if links.moves_wait.get() {
             // The lines may have waited long enough.
@@ -60,9 +59,9 @@ fn rests(links: &Links) -> bool {
 fn look(links: &Links) {
     let timeout = links.settings.borrow().motor_timeout_centis().saturating_mul(10);
     let (now, holds) = (millis(), machine::is_held());
-    let told = common::with(links.thread, |common| {
+    let told = common::with_outputs(links.thread, |common, alone| {
         let running = common.motion.running;
-        carry_out(&mut common.motors, |motors| {
+        carry_out(alone, &mut common.motors, |motors| {
             if holds {
                 motors.stand_still(LOOK_MS as u32);
             }
@@ -75,10 +74,10 @@ fn look(links: &Links) {
 }
 
 /// Gives power to the motors `moving` (bits), before a segment of a block that moves them is queued. The increments of
-/// the segment would not be enough, because a motor may still have a remainder of the block before. Exec only.
+/// the segment would not be enough, because a motor may still have a remainder of the block before.
 #[small]
-pub fn segment(motors: &mut Motors, moving: u8) {
-    carry_out(motors, |motors| motors.segment(moving));
+pub fn segment(alone: Exclusive<'_>, motors: &mut Motors, moving: u8) {
+    carry_out(alone, motors, |motors| motors.segment(moving));
 }
 
 /// Takes over the modes of the settings.
@@ -102,15 +101,19 @@ pub fn release(thread: Thread, motors: u8) {
 
 #[small]
 fn change<R>(thread: Thread, what: impl FnOnce(&mut Motors) -> R + Send) -> R {
-    common::with(thread, |common| carry_out(&mut common.motors, what))
+    common::with_outputs(thread, |common, alone| carry_out(alone, &mut common.motors, what))
 }
 
 #[small]
-fn carry_out<R>(motors: &mut Motors, what: impl FnOnce(&mut Motors) -> R) -> R {
+fn carry_out<R>(
+    alone: Exclusive<'_>,
+    motors: &mut Motors,
+    what: impl FnOnce(&mut Motors) -> R,
+) -> R {
     let before = motors.on();
     let result = what(motors);
     if motors.on() != before {
-        gpio::power(motors.on());
+        gpio::power(alone, motors.on());
     }
     result
 }

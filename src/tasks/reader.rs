@@ -18,6 +18,7 @@ use super::overtake::Scan;
 use super::ports::{Cut, Port};
 use super::realtime;
 use crate::gcode::comment::Aside;
+use crate::hal::Thread;
 use crate::hal::event::{Event, next, set_asked};
 use crate::hal::ring::Window;
 use crate::hal::serial::{
@@ -51,8 +52,10 @@ pub fn run(
     usb: Received,
     aux: Option<Received>,
 ) -> impl Future<Output = Never> {
-    let mut usb = Intake::new(links.port(USB), usb);
-    let mut aux = aux.filter(|_| PORTS > 1).map(|received| Intake::new(links.port(AUX), received));
+    let mut usb = Intake::new(links.thread, links.port(USB), usb);
+    let mut aux = aux
+        .filter(|_| PORTS > 1)
+        .map(|received| Intake::new(links.thread, links.port(AUX), received));
     async move {
         loop {
             jog::passes(links);
@@ -117,8 +120,8 @@ struct Intake {
 }
 
 impl Intake {
-    fn new(port: &'static Port, received: Received) -> Self {
-        let seen = lost_ends(port.number);
+    fn new(thread: Thread, port: &'static Port, received: Received) -> Self {
+        let seen = lost_ends(thread, port.number);
         let has_pins = Flow::of(port.number, 2) == Flow::Pins;
         Self {
             port,
@@ -251,7 +254,7 @@ impl Intake {
             pool.refuse();
         }
         if pool.has_controls() {
-            set_asked(true);
+            set_asked(links.thread, true);
         }
         links.parser_wake.signal();
     }
@@ -307,7 +310,7 @@ impl Intake {
     fn control_flow(&mut self, waiting: u8, links: &Links) {
         let levels =
             if self.port.number == USB { Levels::of(RX_RING) } else { Levels::of(AUX_RING) };
-        if self.stopped == Flow::None && uart::is_stopped(self.port.number) {
+        if self.stopped == Flow::None && uart::is_stopped(links.thread, self.port.number) {
             // Exec has stopped the sender.
             self.stopped = Flow::Characters;
         }
@@ -323,11 +326,11 @@ impl Intake {
             let port = self.port.number;
             // There is time to wait for the end of a line, unless even the level for pins has been passed.
             let waits = waiting <= levels.pins;
-            uart::stop_sender(port, self.stopped, false, true);
-            uart::stop_sender(port, flow, true, waits);
+            uart::stop_sender(links.thread, port, self.stopped, false, true);
+            uart::stop_sender(links.thread, port, flow, true, waits);
             self.stopped = flow;
         } else if self.has_pins && flow == Flow::None {
-            uart::stop_sender(self.port.number, Flow::Pins, false, false);
+            uart::stop_sender(links.thread, self.port.number, Flow::Pins, false, false);
         }
     }
 
@@ -339,7 +342,7 @@ impl Intake {
     #[cold]
     #[inline(never)]
     fn loss(&mut self, pool: &mut LinePool, mark: u8, links: &Links) -> bool {
-        let ends = lost_ends(self.port.number);
+        let ends = lost_ends(links.thread, self.port.number);
         self.refused = ends.wrapping_sub(core::mem::replace(&mut self.seen, ends));
         self.then = mark;
         let is_line = mark & BEHIND_END != 0 && pool.end(mark & RETURNED != 0);

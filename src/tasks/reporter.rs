@@ -315,7 +315,7 @@ async fn tell(links: &Links, port: &Port, notice: Notice) -> usize {
             telling = begin(notice, links, port);
         }
         // A status report takes 4 ms, and the ring of a second port may be full in 5.
-        if uart::presses() || (turns > 0 && flags::has(Event::Tick)) {
+        if uart::presses(links.thread) || (turns > 0 && flags::has(Event::Tick)) {
             turns = turns.saturating_sub(1);
             yield_now().await;
         }
@@ -379,7 +379,7 @@ fn start_up(links: &Links) {
     if !keeps || machine::is_alarmed() || !links.job.get().is_none() {
         return;
     }
-    if let Some(job) = Job::of_startup(&Eeprom::take()) {
+    if let Some(job) = Job::of_startup(&Eeprom::of(links.thread)) {
         links.job.set(job);
         links.parser_wake.signal();
     }

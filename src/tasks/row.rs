@@ -71,7 +71,8 @@ pub(super) fn run(links: &Links, shared: &planner::Shared) -> Row {
         if prints {
             port.speech.set(speech);
         }
-        let ending = Ending { free: port.promise(&lines), length: lines.oldest_length() };
+        let ending =
+            Ending { free: port.promise(links.thread, &lines), length: lines.oldest_length() };
         speech.put_brief(&settings, ending, &mut *tx);
         tx.flush();
         lines.remove_oldest();
@@ -79,7 +80,7 @@ pub(super) fn run(links: &Links, shared: &planner::Shared) -> Row {
         if !hand_over(links, Some(&mut planner)) {
             break Row::Handed;
         }
-        if count == MOST || is_wanted() || machine::is_alarmed() {
+        if count == MOST || is_wanted(links.thread) || machine::is_alarmed() {
             break Row::Full;
         }
     };

@@ -16,9 +16,8 @@ use super::turning;
 use crate::boards::outputs;
 use crate::config::Setting;
 use crate::gcode::modal::Coolant;
-use crate::hal::Thread;
 use crate::hal::byte::SharedByte;
-use crate::hal::{exec, gpio, pwm, stepper};
+use crate::hal::{Exclusive, Thread, exec, gpio, pwm, stepper};
 use crate::machine;
 use crate::motion::snapshot::Snapshot;
 use crate::spindle::{Changed, Spindle};
@@ -38,7 +37,7 @@ pub fn on() -> u8 {
 /// exec, or with exec locked out.
 #[inline(never)]
 #[small]
-pub fn switch(spindle: &Spindle, out: &Snapshot, changed: bool) -> u16 {
+pub fn switch(alone: Exclusive<'_>, spindle: &Spindle, out: &Snapshot, changed: bool) -> u16 {
     let before = on();
     // A probe that has made contact holds motion as well; the outputs stay on then.
     let wanted = match out.held && machine::is_held() {
@@ -51,15 +50,17 @@ pub fn switch(spindle: &Spindle, out: &Snapshot, changed: bool) -> u16 {
     }
     now_on().set(wanted);
     // The speed is set before the spindle starts.
-    pwm::set_share(spindle.share(wanted, out.speed));
-    gpio::set_outputs(wanted);
+    pwm::set_share(alone, spindle.share(wanted, out.speed));
+    gpio::set_outputs(alone, wanted);
     spindle.spin_up(before, wanted)
 }
 
 /// Switches the outputs off, because an alarm has begun.
 #[small]
 pub fn stop(thread: Thread) {
-    common::with(thread, |common| switch(&common.spindle, &common.motion, true));
+    common::with_outputs(thread, |common, alone| {
+        switch(alone, &common.spindle, &common.motion, true)
+    });
 }
 
 /// Takes over all settings that concern the outputs, and then sets the outputs by them.
@@ -69,8 +70,8 @@ pub fn set_all(thread: Thread, storage: &Storage) {
     let settings = (Setting::WARM..Setting::COLD).filter_map(Setting::from_number);
     for setting in settings.filter(|setting| !setting.is_data()) {
         let value = storage.cold(setting);
-        with(thread, |spindle| match spindle.set(setting, value) {
-            Changed::Frequency(millihertz) => pwm::set_frequency(millihertz),
+        common::with_outputs(thread, |common, alone| match common.spindle.set(setting, value) {
+            Changed::Frequency(millihertz) => pwm::set_frequency(alone, millihertz),
             Changed::Outputs | Changed::Nothing => {}
         });
     }
@@ -85,7 +86,9 @@ pub fn set(thread: Thread, setting: Setting, value: i32) {
     match with(thread, |spindle| spindle.set(setting, value)) {
         Changed::Nothing => return,
         Changed::Outputs => {}
-        Changed::Frequency(millihertz) => exec::lock(thread, |_| pwm::set_frequency(millihertz)),
+        Changed::Frequency(millihertz) => {
+            exec::lock(thread, |ceiling| pwm::set_frequency(ceiling.exclusive(), millihertz))
+        }
     }
     tell(thread);
 }
@@ -101,11 +104,11 @@ pub fn follow(thread: Thread, thousandths: u16) {
 /// Sets S to `speed` turns a minute, for a surface speed. Under the override S is `most` at most.
 #[small]
 pub fn turn_at(thread: Thread, speed: f32, most: f32) {
-    common::with(thread, |common| {
+    common::with_outputs(thread, |common, alone| {
         let speed = common.spindle.limited(speed, most);
         if common.motion.speed.to_bits() != speed.to_bits() {
             common.motion.speed = speed;
-            pwm::set_share(common.spindle.share(on(), speed));
+            pwm::set_share(alone, common.spindle.share(on(), speed));
         }
     });
 }
@@ -119,9 +122,9 @@ fn with<R>(thread: Thread, what: impl FnOnce(&mut Spindle) -> R + Send) -> R {
 /// Updates the outputs.
 #[small]
 fn tell(thread: Thread) {
-    common::with(thread, |common| {
-        pwm::set_share(common.spindle.share(on(), common.motion.speed));
-        gpio::set_low(common.spindle.low(), on());
+    common::with_outputs(thread, |common, alone| {
+        pwm::set_share(alone, common.spindle.share(on(), common.motion.speed));
+        gpio::set_low(alone, common.spindle.low(), on());
     });
 }
 
@@ -133,9 +136,9 @@ pub fn flip(links: &Links, output: u8) {
     if machine::is_alarmed() || machine::is_checking() {
         return;
     }
-    let now = common::with(links.thread, |common| {
+    let now = common::with_outputs(links.thread, |common, alone| {
         common.motion.outputs ^= output;
-        switch(&common.spindle, &common.motion, true);
+        switch(alone, &common.spindle, &common.motion, true);
         common.motion.outputs
     });
     links.changes.flip(output);
@@ -146,10 +149,10 @@ pub fn flip(links: &Links, output: u8) {
 #[inline(never)]
 #[small]
 pub fn pause(links: &Links) {
-    common::with(links.thread, |common| {
+    common::with_outputs(links.thread, |common, alone| {
         if common.motion.held && common.motion.outputs & outputs::SPINDLE != 0 {
             common.spindle.pause();
-            switch(&common.spindle, &common.motion, true);
+            switch(alone, &common.spindle, &common.motion, true);
         }
     });
 }

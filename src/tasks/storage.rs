@@ -20,6 +20,7 @@ use super::wake::Wake;
 use crate::capability::Capability;
 use crate::config::{Setting, Settings};
 use crate::gcode::tables::{Edit, SYSTEMS, TableRow, Tables};
+use crate::hal::Thread;
 use crate::hal::after_ms;
 use crate::hal::eeprom::Eeprom;
 use crate::machine;
@@ -47,6 +48,7 @@ const _: () = assert!(program::STARTUP_MAX as usize == STARTUP_MAX);
 
 /// The state that the storage task shares with other tasks.
 pub struct Storage {
+    thread: Thread,
     log: Cell<Log>,
     /// The settings that may have changed: from this number to before `to`. If many change at once, `to` is
     /// [`TO_MACHINE`], [`TO_ALL`] or [`TO_OFFSETS`].
@@ -93,8 +95,9 @@ enum Work {
 #[small]
 impl Storage {
     /// Returns a storage with this log and nothing to write.
-    pub fn new(log: Log) -> Self {
+    pub fn new(thread: Thread, log: Log) -> Self {
         Self {
+            thread,
             log: Cell::new(log),
             from: Cell::new(ITEMS),
             to: Cell::new(0),
@@ -250,7 +253,7 @@ impl Storage {
     pub fn value(&self, row: TableRow, axis: u8) -> Length {
         match self.newer(row) {
             Some(values) => values.get(usize::from(axis)).copied().unwrap_or_default(),
-            None => tables::value(&self.log.get(), &Eeprom::take(), row, axis),
+            None => tables::value(&self.log.get(), &Eeprom::of(self.thread), row, axis),
         }
     }
 
@@ -260,7 +263,7 @@ impl Storage {
         match self.cold.get() {
             Some((number, value)) if number == setting.number() => value,
             _ if setting.number() >= self.forgotten.get() => setting.default_value(),
-            _ => kept::value(&self.log.get(), &Eeprom::take(), setting),
+            _ => kept::value(&self.log.get(), &Eeprom::of(self.thread), setting),
         }
     }
 
@@ -310,7 +313,7 @@ impl Storage {
     /// Does something to the program, writing one byte at most. Returns [`Status::Again`] until it is done.
     #[inline(never)]
     pub fn store(&self, what: Store<'_>) -> Result<(), Status> {
-        let mut memory = Eeprom::take();
+        let mut memory = Eeprom::of(self.thread);
         let new = self.program.get().ok_or(Status::NotAccepted);
         let stored = match what {
             _ if self.log.get().is_wide() => Stored::Full,
@@ -357,14 +360,14 @@ impl Tables for &Storage {
     fn row(&self, row: TableRow) -> PerAxis<Length> {
         match self.is_newer(row) {
             true => self.newer(row).unwrap_or_default(),
-            false => tables::row(&self.log.get(), &Eeprom::take(), row),
+            false => tables::row(&self.log.get(), &Eeprom::of(self.thread), row),
         }
     }
 
     #[inline(never)]
     fn is_stored(&self, row: TableRow) -> bool {
         let comes = self.edit.get().is_some_and(|edit| edit.row == row);
-        comes || tables::is_stored(&self.log.get(), &Eeprom::take(), row)
+        comes || tables::is_stored(&self.log.get(), &Eeprom::of(self.thread), row)
     }
 
     fn takes(&self, row: TableRow) -> bool {
@@ -392,7 +395,7 @@ const BYTE_MS: u64 = 3;
 
 /// The task.
 pub async fn run(links: &'static Links) -> ! {
-    let mut memory = Eeprom::take();
+    let mut memory = Eeprom::of(links.thread);
     loop {
         while let Some(work) = links.storage.take() {
             let mut moved = 0;

@@ -23,7 +23,7 @@ use crate::boards::{ACTIVE, inputs};
 use crate::config::Settings;
 use crate::gcode::setup::{AxisMode, Setup};
 use crate::hal::event::Event;
-use crate::hal::{flags, inputs as pins};
+use crate::hal::{Thread, flags, inputs as pins};
 use crate::machine::{self, Alarm};
 
 /// A bit of the settings `sn` and `sx`: the switch is a limit.
@@ -61,7 +61,7 @@ pub fn mode(settings: &Settings, end: u8) -> u8 {
 /// Applies the settings of all switches. Door and emergency stop are normally open, unless a setting says otherwise.
 #[inline(never)]
 #[small]
-pub fn set_up(settings: &Settings) {
+pub fn set_up(thread: Thread, settings: &Settings) {
     let mut closing = if settings.switches_normally_closed() { !ENDS } else { u16::MAX };
     if settings.door_switch() == OPENS {
         closing &= !(1 << inputs::DOOR);
@@ -77,22 +77,23 @@ pub fn set_up(settings: &Settings) {
     if settings.stop_switch() != 0 {
         stops |= 1 << inputs::STOP;
     }
-    pins::set_up(closing & WIRED, stops & WIRED);
+    pins::set_up(thread, closing & WIRED, stops & WIRED);
     // Switches may be active already.
     flags::set(Event::Realtime);
 }
 
 /// Whether the emergency stop is hit.
-pub fn is_stopped(settings: &Settings) -> bool {
-    settings.stop_switch() != 0 && pins::worked() & 1 << inputs::STOP != 0
+pub fn is_stopped(thread: Thread, settings: &Settings) -> bool {
+    settings.stop_switch() != 0 && pins::worked(thread.level()) & 1 << inputs::STOP != 0
 }
 
 /// Acts on changes of switches.
 pub fn serve(links: &Links) {
-    let hits = pins::take_hits();
+    let hits = pins::take_hits(links.thread);
     let settings = links.settings.borrow();
-    let stops = hits & 1 << inputs::STOP != 0 || is_stopped(&settings);
-    let open = settings.door_switch() != 0 && pins::worked() & 1 << inputs::DOOR != 0;
+    let stops = hits & 1 << inputs::STOP != 0 || is_stopped(links.thread, &settings);
+    let open =
+        settings.door_switch() != 0 && pins::worked(links.thread.level()) & 1 << inputs::DOOR != 0;
     drop(settings);
     if stops {
         alarm::raise(links, Alarm::Shutdown);

@@ -13,9 +13,8 @@ use crate::boards::ACTIVE;
 use crate::capability::Capability;
 use crate::config::groups::spindle;
 use crate::config::{Owner, Setting};
-use crate::hal::Thread;
 use crate::hal::event::Event;
-use crate::hal::{encoder, flags};
+use crate::hal::{Thread, encoder, flags};
 use crate::machine::Alarm;
 use crate::status::Status;
 
@@ -50,7 +49,7 @@ pub fn set_up(thread: Thread, storage: &Storage) {
         _ if tells => 7,
         _ => 3,
     };
-    encoder::set_up(lines, bounce as u16);
+    encoder::set_up(thread, lines, bounce as u16);
     let pulses = encoder::read();
     common::with(thread, |common| common.encoder.set_up(per_turn, tells, &pulses));
 }

@@ -53,13 +53,13 @@ impl Tx {
 
     /// Sends what has been put.
     pub fn flush(&mut self) {
-        uart::kick(self.port);
+        uart::kick(self.thread.level(), self.port);
     }
 
     /// Continues at `rate` bits a second. All queued bytes must have been sent at the old rate. Bytes received
     /// meanwhile may be damaged.
     pub fn set_rate(&mut self, rate: u32) {
-        uart::set_rate(self.port, rate);
+        uart::set_rate(self.thread, self.port, rate);
         self.rate = rate;
     }
 
@@ -123,7 +123,7 @@ impl crate::protocol::Out for Tx {
         }
         self.sum_behind(before);
         // The next computation takes longer than sending these bytes.
-        uart::kick(self.port);
+        uart::kick(self.thread.level(), self.port);
     }
 
     fn put_all(&mut self, bytes: impl Iterator<Item = u8>) {

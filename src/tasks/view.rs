@@ -45,10 +45,9 @@ use crate::gcode::command::Motion;
 use crate::gcode::overrides::Change;
 use crate::gcode::setup::Setup as _;
 use crate::gcode::tables::TableRow;
-use crate::hal::Thread;
 use crate::hal::eeprom::Eeprom;
 use crate::hal::event::Event;
-use crate::hal::{flags, inputs as pins, stepper};
+use crate::hal::{Thread, flags, inputs as pins, stepper};
 use crate::heat::Standing;
 #[cfg(feature = "dialect-reprap")]
 use crate::heat::tune::Tune;
@@ -286,7 +285,7 @@ impl<'a> View<'a> {
         let mut commands = links.commands.borrow_mut();
         commands.clear();
         commands.motion = motion;
-        machine::carry_out(cycle);
+        machine::carry_out(self.links.thread, cycle);
         links.commands_taken.set(true);
         links.planner_wake.signal();
         Status::Ok
@@ -324,7 +323,7 @@ impl<'a> View<'a> {
         if off || (switches::WIRED & !pins::left_out()) >> input & 1 == 0 {
             return -1;
         }
-        (pins::worked() >> input & 1).into()
+        (pins::worked(self.links.thread.level()) >> input & 1).into()
     }
 
     fn standing(&self, heater: u8) -> Standing {
@@ -393,7 +392,7 @@ impl Machine for View<'_> {
     fn doing(&mut self) -> Doing {
         // A jog of G-code ends when nothing of it is left now, whatever moment a report is about.
         if machine::cycle() == Cycle::Jog && !self.works_now() {
-            machine::carry_out(machine::Event::Done);
+            machine::carry_out(self.links.thread, machine::Event::Done);
         }
         machine::doing(|| self.has_work())
     }
@@ -445,7 +444,7 @@ impl Machine for View<'_> {
         if !machine::is_held() && (self.has_work() || self.links.has_data()) {
             return Status::NotAccepted;
         }
-        hold::flush_here();
+        hold::flush_here(self.links.thread);
         Status::Ok
     }
 
@@ -481,7 +480,7 @@ impl Machine for View<'_> {
         // An earlier tilde does not end this hold.
         self.links.signs.clear();
         self.links.signs.door.set(false);
-        machine::take(machine::Event::Hold);
+        machine::take(self.links.thread, machine::Event::Hold);
     }
 
     fn start_over(&mut self) {
@@ -595,12 +594,12 @@ impl Machine for View<'_> {
     }
 
     fn program(&mut self, at: u16) -> Option<u8> {
-        let memory = Eeprom::take();
+        let memory = Eeprom::of(self.links.thread);
         program::find(&memory)?.byte(&memory, at)
     }
 
     fn startup(&mut self, line: u8, at: u8) -> Option<u8> {
-        let memory = Eeprom::take();
+        let memory = Eeprom::of(self.links.thread);
         let line = Startup::find(&memory, line)?;
         (at < line.len()).then(|| line.byte(&memory, at))
     }
@@ -640,11 +639,15 @@ pub fn queue_free() -> usize {
 /// Applies the settings of outputs and inputs.
 #[small]
 pub fn set_hardware(thread: Thread, settings: &Settings) {
-    switches::set_up(settings);
+    switches::set_up(thread, settings);
     power::set_modes(thread, settings);
-    stepper::set_inverted(motors(|m| settings.motor_reversed(m)));
-    stepper::set_step_output(settings.step_pulse_us(), motors(|m| settings.step_inverted(m)));
-    drivers::tell(settings);
+    stepper::set_inverted(thread, motors(|m| settings.motor_reversed(m)));
+    stepper::set_step_output(
+        thread,
+        settings.step_pulse_us(),
+        motors(|m| settings.step_inverted(m)),
+    );
+    drivers::tell(thread, settings);
 }
 
 /// Returns the motors for which `is` is true, as bits.

@@ -116,7 +116,13 @@ impl Bench {
         state.extend(position.map(|steps| steps as f64));
         let pulse = f64::from(pwm::output().1);
         let [outputs, powered] = [gpio::outputs(), gpio::powered()].map(f64::from);
-        state.extend([outputs, pulse, powered, pins::worked().into(), was_reset().into()]);
+        state.extend([
+            outputs,
+            pulse,
+            powered,
+            pins::worked(self.machine.thread().level()).into(),
+            was_reset().into(),
+        ]);
         state
     }
 

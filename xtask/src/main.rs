@@ -40,6 +40,8 @@ mod fuzz;
 mod jobs;
 #[cfg(test)]
 mod layers;
+#[cfg(test)]
+mod levels;
 mod machines;
 mod nist;
 mod npm;

@@ -37,7 +37,7 @@ pub(crate) fn is_prompt(context: *mut ()) -> bool {
     is_own
 }
 
-/// Starts the executor: `init` spawns its tasks. Start-up; does nothing if it has been started before. The program
+/// Starts the executor: `init` spawns its tasks. Does nothing if it has been started before. The program
 /// sets the priority of the interrupt.
 pub fn start(init: impl FnOnce(Spawner)) {
     if STARTED.get() != 0 {

@@ -4,6 +4,7 @@
 
 use super::{gpio, spi};
 use crate::boards::{ACTIVE, SdCard};
+use crate::hal::Thread;
 use crate::hal::byte::SharedByte;
 
 static TAKEN: SharedByte = SharedByte::new(0);
@@ -12,9 +13,9 @@ static FAST: SharedByte = SharedByte::new(0);
 
 /// Selects the card.
 #[small]
-pub fn select() {
+pub fn select(thread: Thread) {
     TAKEN.set(1);
-    spi::set_clock(if FAST.get() != 0 { spi::Clock::Mhz4 } else { spi::Clock::Khz250 });
+    spi::set_clock(thread, if FAST.get() != 0 { spi::Clock::Mhz4 } else { spi::Clock::Khz250 });
     if let Some(SdCard { select, .. }) = ACTIVE.card {
         gpio::set(select, false);
     }
@@ -22,11 +23,11 @@ pub fn select() {
 
 /// Deselects the card, then sends one more byte, during which the card releases its data line.
 #[small]
-pub fn release() {
+pub fn release(thread: Thread) {
     if let Some(SdCard { select, .. }) = ACTIVE.card {
         gpio::set(select, true);
     }
-    spi::exchange(0xFF);
+    spi::exchange(thread, 0xFF);
     TAKEN.set(0);
 }
 
@@ -38,25 +39,25 @@ pub(super) fn is_free() -> bool {
 }
 
 /// Whether another device waits for the lines.
-pub fn is_wanted() -> bool {
+pub fn is_wanted(_: Thread) -> bool {
     WANTED.get() != 0
 }
 
 /// Sets the clock from the next [`select`] on: 4 MHz if `fast`, else 250 kHz.
-pub fn set_fast(fast: bool) {
+pub fn set_fast(_: Thread, fast: bool) {
     FAST.set(fast.into());
 }
 
 /// Sends a byte and returns the byte received meanwhile.
 #[small]
-pub fn exchange(byte: u8) -> u8 {
-    spi::exchange(byte)
+pub fn exchange(thread: Thread, byte: u8) -> u8 {
+    spi::exchange(thread, byte)
 }
 
 /// Reads a block. Cost: 30 cycles a byte.
 #[inline(never)]
-pub fn read(block: &mut [u8; 512]) {
+pub fn read(thread: Thread, block: &mut [u8; 512]) {
     for byte in block {
-        *byte = spi::exchange(0xFF);
+        *byte = spi::exchange(thread, 0xFF);
     }
 }

@@ -2,16 +2,17 @@
 
 use crate::drivers::REGISTERS;
 use crate::drivers::watch::Watch;
+use crate::hal::Thread;
 
 /// Does nothing.
-pub fn tell(_motor: u8, _values: &[u32; REGISTERS]) {}
+pub fn tell(_: Thread, _motor: u8, _values: &[u32; REGISTERS]) {}
 
 /// Returns a driver that is well.
-pub fn watch(_motor: u8) -> Watch {
+pub fn watch(_: Thread, _motor: u8) -> Watch {
     Watch::WELL
 }
 
 /// There are no news.
-pub fn take_news(_motor: u8) -> u8 {
+pub fn take_news(_: Thread, _motor: u8) -> u8 {
     0
 }

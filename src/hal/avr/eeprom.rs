@@ -4,6 +4,7 @@
 
 use core::arch::asm;
 
+use crate::hal::Thread;
 use crate::store::Memory;
 use crate::store::program::AREA;
 
@@ -14,12 +15,12 @@ const READ: u8 = 1;
 const WRITE: u8 = 1 << 1;
 
 /// Access to the EEPROM.
-pub struct Eeprom(());
+pub struct Eeprom(Thread);
 
 impl Eeprom {
-    /// Returns access from thread mode. At most one task may write each part.
-    pub fn take() -> Self {
-        Self(())
+    /// Returns access. At most one task may write each part.
+    pub fn of(thread: Thread) -> Self {
+        Self(thread)
     }
 }
 
@@ -37,7 +38,7 @@ impl Memory for Eeprom {
     #[inline(always)]
     fn read_here(&self, at: u16) -> u8 {
         while self.is_busy() {}
-        // SAFETY: these registers of the EEPROM are touched by thread mode only; the EEPROM is idle.
+        // SAFETY: only code with a `Thread`, as `self` has, touches these registers; the EEPROM is idle.
         unsafe {
             EEAR.write_volatile(at);
             EECR.write_volatile(READ);
@@ -52,7 +53,7 @@ impl Memory for Eeprom {
 
     fn write(&mut self, at: u16, byte: u8) {
         while self.is_busy() {}
-        // SAFETY: these registers of the EEPROM are touched by thread mode only; the EEPROM is idle. The write has to
+        // SAFETY: only code with a `Thread`, as `self` has, touches these registers; the EEPROM is idle. The write has to
         // begin within four cycles of its enable, so interrupts are off for 6.
         unsafe {
             EEAR.write_volatile(at);

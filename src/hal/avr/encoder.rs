@@ -21,6 +21,7 @@ use super::{inputs, mask};
 use crate::boards::ACTIVE;
 use crate::capability::Capability;
 use crate::encoder::Pulses;
+use crate::hal::{Boot, Thread};
 
 const TCCR5B: *mut u8 = 0x121 as *mut u8;
 const TCNT5: *const u16 = 0x124 as *const u16;
@@ -80,8 +81,8 @@ pub(super) static SHARED: Place = Place(UnsafeCell::new(Shared {
     in_use: 0,
 }));
 
-/// Sets the pull-ups. On images without threads, the timer counts edges of a pin instead. Before interrupts are on.
-pub(super) fn start() {
+/// Sets the pull-ups. On images without threads, the timer counts edges of a pin instead.
+pub(super) fn start(_: &Boot) {
     if !Capability::Lathe.is_built_in() {
         // SAFETY: start-up; the timer's register is this module's.
         unsafe { TCCR5B.write_volatile(EDGES) };
@@ -97,9 +98,9 @@ pub(super) fn start() {
     }
 }
 
-/// Returns the rising edges at D47 since the start, modulo 2^16; 0 on images with threads. Thread mode.
+/// Returns the rising edges at D47 since the start, modulo 2^16; 0 on images with threads.
 #[small]
-pub fn at_counter() -> u16 {
+pub fn at_counter(_: Thread) -> u16 {
     if Capability::Lathe.is_built_in() {
         return 0;
     }
@@ -108,10 +109,10 @@ pub fn at_counter() -> u16 {
 }
 
 /// Sets which sensors are read from now on (bit 0 index, bit 1 sync, bit 2 the second sync sensor), and for how many
-/// counts their contacts bounce. Thread mode.
+/// counts their contacts bounce.
 #[inline(never)]
 #[small]
-pub fn set_up(lines: u8, bounce: u16) {
+pub fn set_up(thread: Thread, lines: u8, bounce: u16) {
     let shared = SHARED.0.get();
     // SAFETY: interrupts are off for each write; the timer's register is this module's.
     mask(|| unsafe { (&raw mut (*shared).bounce).write_volatile(bounce) });
@@ -119,11 +120,14 @@ pub fn set_up(lines: u8, bounce: u16) {
         (&raw mut (*shared).in_use).write_volatile(lines);
         TCCR5B.write_volatile(if lines == 0 { 0 } else { RUN });
     });
-    inputs::leave_out(match lines {
-        0 => 0,
-        1 => const { ACTIVE.shared_inputs(1) },
-        _ => const { ACTIVE.shared_inputs(3) },
-    });
+    inputs::leave_out(
+        thread,
+        match lines {
+            0 => 0,
+            1 => const { ACTIVE.shared_inputs(1) },
+            _ => const { ACTIVE.shared_inputs(3) },
+        },
+    );
 }
 
 /// Whether any sensor is read. Any level.
@@ -139,7 +143,7 @@ fn now() -> u16 {
     mask(|| unsafe { TCNT5.read_volatile() })
 }
 
-/// Returns the pulses counted and timed so far. Thread mode and exec.
+/// Returns the pulses counted and timed so far. Any level.
 #[inline(never)]
 #[small]
 pub fn read() -> Pulses {

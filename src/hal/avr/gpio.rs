@@ -7,6 +7,7 @@
 use crate::boards::outputs::{COUNTERCLOCKWISE, SPINDLE};
 use crate::boards::{ACTIVE, Handshake, Pin, SdCard, each_motor};
 use crate::hal::byte::SharedByte;
+use crate::hal::{Boot, Exclusive};
 
 /// Drives a pin high.
 #[inline(always)]
@@ -33,9 +34,10 @@ pub fn toggle(pin: Pin) {
 }
 
 #[inline(always)]
-pub(super) fn output(pin: Pin) {
+pub(super) fn output(_: Exclusive<'_>, pin: Pin) {
     let direction = (pin.port.address() - 1) as *mut u8;
-    // SAFETY: the data direction register lies one below the port register; only thread mode writes it.
+    // SAFETY: the data direction register lies one below the port register. No handler writes it, and no other code
+    // is in interrupt mode, as `Exclusive` shows; thread mode writes it only with that proof, too.
     unsafe { direction.write_volatile(direction.read_volatile() | 1 << pin.bit) };
 }
 
@@ -61,44 +63,45 @@ pub(super) const fn item<T: Copy>(list: &[T], i: usize) -> Option<T> {
 
 /// Makes the board's output pins outputs: steps low, drivers off, hazards off, senders not held back, no bus driven.
 /// The level that switches the spindle off is not known yet, so its enable pin is not driven before [`set_low`].
-pub fn start() {
+pub fn start(boot: &Boot) {
+    let alone = boot.exclusive();
     free_debug_pins();
     each_motor!(M => {
         low(ACTIVE.motors[M].step);
-        output(ACTIVE.motors[M].step);
-        output(ACTIVE.motors[M].dir);
+        output(alone, ACTIVE.motors[M].step);
+        output(alone, ACTIVE.motors[M].dir);
         if let Some(enable) = ACTIVE.motors[M].enable {
             high(enable);
-            output(enable);
+            output(alone, enable);
         }
     });
     if let Some(enable) = ACTIVE.enable_all {
         high(enable);
-        output(enable);
+        output(alone, enable);
     }
     each!(ACTIVE.hazards, hazard => {
         low(hazard);
         if ACTIVE.outputs[0] != Some(hazard) {
-            output(hazard);
+            output(alone, hazard);
         }
     });
     each!(ACTIVE.serial, serial => {
         if let Some(Handshake { rts, cts }) = serial.handshake {
             low(rts);
-            output(rts);
+            output(alone, rts);
             // Pulled up, so that nothing is sent without a cable.
             high(cts);
         }
         if let Some(driver) = serial.driver_enable {
             low(driver);
-            output(driver);
+            output(alone, driver);
         }
     });
-    super::heaters::start();
-    super::spi::start();
+    super::heaters::start(boot);
+    super::spi::start(boot);
     if let Some(SdCard { select, .. }) = ACTIVE.card {
         high(select);
-        output(select);
+        output(alone, select);
     }
 }
 
@@ -120,8 +123,8 @@ pub fn powered() -> u8 {
 }
 
 /// Switches the drivers of these motors (bits) on and the others off, as far as the board can: an enable that all
-/// drivers share is on as soon as one of them is wanted. Exec, or other levels while exec cannot run.
-pub fn power(motors: u8) {
+/// drivers share is on as soon as one of them is wanted.
+pub fn power(_: Exclusive<'_>, motors: u8) {
     WANTED.set(motors);
     each_motor!(M => if let Some(enable) = ACTIVE.motors[M].enable {
         set(enable, motors & (1 << M) == 0);
@@ -135,8 +138,8 @@ pub fn power(motors: u8) {
 static LOW: SharedByte = SharedByte::new(0);
 
 /// Switches the outputs of M3 to M9, bits of [`outputs`](crate::boards::outputs). While the spindle is off, its
-/// direction pin keeps its level. Exec, or other levels while exec cannot run.
-pub fn set_outputs(on: u8) {
+/// direction pin keeps its level.
+pub fn set_outputs(_: Exclusive<'_>, on: u8) {
     let high = on ^ LOW.get();
     macro_rules! each {
         ($($o:literal)+) => {$(
@@ -150,21 +153,21 @@ pub fn set_outputs(on: u8) {
     each!(1 0 2 3);
 }
 
-/// Sets which outputs are active low, and switches to the outputs `on`. The first call also begins to drive the
-/// enable of the spindle. Thread mode, while exec cannot run.
-pub fn set_low(outputs: u8, on: u8) {
+/// Sets which outputs are active low, and switches to the outputs `on`. The first call also begins to drive the enable
+/// of the spindle.
+pub fn set_low(alone: Exclusive<'_>, outputs: u8, on: u8) {
     LOW.set(outputs);
     if let Some(direction) = ACTIVE.outputs[1] {
         set(direction, (on ^ outputs) & COUNTERCLOCKWISE != 0);
     }
-    set_outputs(on);
+    set_outputs(alone, on);
     if let Some(enable) = ACTIVE.outputs[0] {
-        output(enable);
+        output(alone, enable);
     }
 }
 
-/// Stops the spindle for good. Interrupts are off.
-pub fn stop_spindle() {
+/// Stops the spindle for good.
+pub fn stop_spindle(_: Exclusive<'_>) {
     if let Some(enable) = ACTIVE.outputs[0] {
         set(enable, LOW.get() & SPINDLE != 0);
     }

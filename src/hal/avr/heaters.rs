@@ -19,6 +19,7 @@ use core::cell::UnsafeCell;
 
 use super::{gpio, spi};
 use crate::boards::{ACTIVE, Heaters, PULSED, Pin};
+use crate::hal::{Boot, Thread};
 use crate::heat::sensor::SAMPLES;
 
 const ADCSRA: *mut u8 = 0x7A as *mut u8;
@@ -49,7 +50,7 @@ struct Sum {
 #[repr(transparent)]
 struct Place(UnsafeCell<Sum>);
 
-// SAFETY: the interrupt alone touches it while conversions are left, thread mode when none are.
+// SAFETY: the interrupt alone touches it while conversions are left. When none are, functions with a `Thread` do.
 unsafe impl Sync for Place {}
 
 static SUM: Place = Place(UnsafeCell::new(Sum { sum: 0, left: 0 }));
@@ -102,9 +103,9 @@ extern "C" fn __vector_29() -> ! {
     }
 }
 
-/// Begins a reading of a heater's sensor, unless a reading is already under way. Thread mode.
+/// Begins a reading of a heater's sensor, unless a reading is already under way.
 #[small]
-pub fn begin(heater: u8) {
+pub fn begin(_: Thread, heater: u8) {
     let Some(Heaters { heaters: [hot_end, bed], .. }) = ACTIVE.heaters else { return };
     let sum = SUM.0.get();
     // SAFETY: see `Place`; the registers of the converter are this module's.
@@ -121,9 +122,9 @@ pub fn begin(heater: u8) {
     }
 }
 
-/// Returns the reading that was begun last; `None` until it is complete. Thread mode.
+/// Returns the reading that was begun last; `None` until it is complete.
 #[small]
-pub fn reading() -> Option<u16> {
+pub fn reading(_: Thread) -> Option<u16> {
     let sum = SUM.0.get();
     // SAFETY: see `Place`.
     unsafe {
@@ -132,47 +133,47 @@ pub fn reading() -> Option<u16> {
     }
 }
 
-/// Reads the word of a heater's MAX6675, which then begins a conversion: see [`sensor`](crate::heat::sensor). `None`
-/// if the board has none, or while the SD card is selected. Thread mode. Cost: 500 cycles.
+/// Reads the word of a heater's MAX6675, which then begins a conversion: see [`sensor`](crate::heat::sensor). `None` if
+/// the board has none, or while the SD card is selected. Cost: 500 cycles.
 #[small]
-pub fn word(heater: u8) -> Option<u16> {
+pub fn word(thread: Thread, heater: u8) -> Option<u16> {
     let Heaters { heaters: [hot_end, bed], .. } = ACTIVE.heaters?;
     if !super::card::is_free() {
         return None;
     }
     // Each call has its pin as a constant.
     match heater {
-        0 => hot_end.select.map(ask),
-        _ => bed.select.map(ask),
+        0 => hot_end.select.map(|select| ask(thread, select)),
+        _ => bed.select.map(|select| ask(thread, select)),
     }
 }
 
 #[inline(always)]
-fn ask(select: Pin) -> u16 {
-    exchange(select.port.address() as u16, 1 << select.bit)
+fn ask(thread: Thread, select: Pin) -> u16 {
+    exchange(thread, select.port.address() as u16, 1 << select.bit)
 }
 
 /// Exchanges two bytes over SPI while one bit of a port is low, and returns those received.
 #[inline(never)]
 #[small]
-fn exchange(port: u16, bit: u8) -> u16 {
+fn exchange(thread: Thread, port: u16, bit: u8) -> u16 {
     let port = usize::from(port) as *mut u8;
-    spi::set_clock(spi::Clock::Mhz1);
+    spi::set_clock(thread, spi::Clock::Mhz1);
     // SAFETY: this is the output port of a pin of the board. Other levels write it with interrupts off or by single
     // instructions.
     avr_device::interrupt::free(|_| unsafe { port.write_volatile(port.read_volatile() & !bit) });
-    let word = u16::from_be_bytes([spi::exchange(0), spi::exchange(0)]);
+    let word = u16::from_be_bytes([spi::exchange(thread, 0), spi::exchange(thread, 0)]);
     // SAFETY: as above.
     avr_device::interrupt::free(|_| unsafe { port.write_volatile(port.read_volatile() | bit) });
     word
 }
 
-/// Makes the select pins of sensors outputs, and starts timer 2. Start-up.
-pub fn start() {
+/// Makes the select pins of sensors outputs, and starts timer 2.
+pub fn start(boot: &Boot) {
     let Some(Heaters { heaters: [hot_end, bed], .. }) = ACTIVE.heaters else { return };
     for select in [hot_end.select, bed.select].into_iter().flatten() {
         gpio::high(select);
-        gpio::output(select);
+        gpio::output(boot.exclusive(), select);
     }
     if HAS_PULSES {
         // SAFETY: the registers of the timer are this module's.
@@ -184,8 +185,8 @@ pub fn start() {
 }
 
 /// Sets the power of the hot end, the bed and the fan; 255 is full power. Outputs that [`PULSED`] names have pulses;
-/// the others are off at 0, else on. Thread mode.
-pub fn drive(power: [u8; 3]) {
+/// the others are off at 0, else on.
+pub fn drive(_: Thread, power: [u8; 3]) {
     let Some(heaters) = ACTIVE.heaters else { return };
     let [hot_end, bed] = heaters.heaters;
     let [of_hot_end, of_bed, of_fan] = power;
@@ -195,7 +196,7 @@ pub fn drive(power: [u8; 3]) {
 }
 
 /// Does nothing: no board with this chip has a fan for the heatbreak.
-pub fn cool(_: bool) {}
+pub fn cool(_: Thread, _: bool) {}
 
 /// Sets the power of a pin. The timer drives the pin while it is connected to it. The port's bit stays low, so the
 /// pin is low while it is not connected.

@@ -24,6 +24,7 @@ use super::{flags, stepper};
 use crate::boards::{ACTIVE, Interrupt, LOOKS, inputs};
 use crate::dda::contact;
 use crate::hal::event::Event;
+use crate::hal::{Boot, Level, Thread};
 use crate::switches::{FIRST_US, LATER_US, Next, SOON_US, Switches};
 
 const _: () = {
@@ -146,8 +147,7 @@ impl State {
 
 struct Shared(UnsafeCell<State>);
 
-// SAFETY: only two use it: the sampling interrupt, which does not nest, and thread mode with interrupts off, see
-// `with`.
+// SAFETY: only two use it: the sampling interrupt, which does not nest, and tasks with interrupts off, see `with`.
 unsafe impl Sync for Shared {}
 
 static STATE: Shared = Shared(UnsafeCell::new(State {
@@ -163,16 +163,16 @@ static STATE: Shared = Shared(UnsafeCell::new(State {
     fresh: true,
 }));
 
-/// Gives thread mode access to the state. Each access takes a few cycles, with interrupts off.
-fn with<R>(what: impl FnOnce(&mut State) -> R) -> R {
-    // SAFETY: interrupts are off, and no sample is under way while thread mode runs.
+/// Gives a task access to the state. Each access takes a few cycles, with interrupts off.
+fn with<R>(_: Level, what: impl FnOnce(&mut State) -> R) -> R {
+    // SAFETY: interrupts are off, and no sample is under way while a task runs, as `Level` shows.
     avr_device::interrupt::free(|_| what(unsafe { &mut *STATE.0.get() }))
 }
 
-/// Sets up the pins and the interrupts. Before interrupts are on.
-pub fn start() {
+/// Sets up the pins and the interrupts.
+pub fn start(boot: &Boot) {
     each_input!(I, pin => super::gpio::high(pin));
-    super::encoder::start();
+    super::encoder::start(boot);
     let (external, change) = MASKS;
     // SAFETY: start-up; nobody else uses these registers.
     unsafe {
@@ -191,14 +191,14 @@ pub fn start() {
     }
 }
 
-/// Sets which inputs are active low, and which inputs stop the steps. Thread mode.
-pub fn set_up(low: u16, stops: u16) {
-    with(|state| {
+/// Sets which inputs are active low, and which inputs stop the steps.
+pub fn set_up(thread: Thread, low: u16, stops: u16) {
+    with(thread.level(), |state| {
         state.stops = stops;
         state.live = stops & !u16::from(state.spared);
     });
     // In two pieces, so that a step waits for 31 cycles at most.
-    with(|state| {
+    with(thread.level(), |state| {
         if state.low != low {
             (state.low, state.fresh) = (low, true);
             // SAFETY: starts a sample; if one is due already, it serves as well.
@@ -207,42 +207,43 @@ pub fn set_up(low: u16, stops: u16) {
     });
 }
 
-/// Gives the pins of these inputs to an encoder from now on. Thread mode.
-pub(super) fn leave_out(inputs: u16) {
-    with(|state| {
+/// Gives the pins of these inputs to an encoder from now on.
+pub(super) fn leave_out(thread: Thread, inputs: u16) {
+    with(thread.level(), |state| {
         (state.used, state.fresh) = (!inputs, true);
         // SAFETY: starts a sample; if one is due already, it serves as well.
         unsafe { CONTROL_B.write_volatile(RUN) };
     });
 }
 
-/// Returns the inputs that are not read because an encoder uses their pins. Thread mode.
+/// Returns the inputs that are not read because an encoder uses their pins. Any level.
 pub fn left_out() -> u16 {
-    with(|state| !state.used)
+    // SAFETY: a plain read, with interrupts off.
+    avr_device::interrupt::free(|_| unsafe { !(&raw const (*STATE.0.get()).used).read() })
 }
 
-/// Sets the ends of axes that are ignored as limits for now. Thread mode.
-pub fn spare(ends: u8) {
-    with(|state| {
+/// Sets the ends of axes that are ignored as limits for now.
+pub fn spare(thread: Thread, ends: u8) {
+    with(thread.level(), |state| {
         state.spared = ends;
         state.live = state.stops & !u16::from(ends);
     });
 }
 
 /// Arms the end of a move: the first input of `armed` whose state becomes that in `awaited` ends the move
-/// ([`contact`](crate::dda::contact)). 0 disarms. Thread mode.
-pub fn arm(armed: u16, awaited: u16) {
-    with(|state| (state.armed, state.awaited) = (armed, awaited));
+/// ([`contact`](crate::dda::contact)). 0 disarms.
+pub fn arm(thread: Thread, armed: u16, awaited: u16) {
+    with(thread.level(), |state| (state.armed, state.awaited) = (armed, awaited));
 }
 
-/// Returns the inputs that are active. Thread mode.
-pub fn worked() -> u16 {
-    with(|state| state.switches.worked())
+/// Returns the inputs that are active.
+pub fn worked(level: Level) -> u16 {
+    with(level, |state| state.switches.worked())
 }
 
-/// Takes the inputs that have stopped the steps since the last call. Thread mode.
-pub fn take_hits() -> u16 {
-    with(|state| core::mem::take(&mut state.hits))
+/// Takes the inputs that have stopped the steps since the last call.
+pub fn take_hits(thread: Thread) -> u16 {
+    with(thread.level(), |state| core::mem::take(&mut state.hits))
 }
 
 /// Returns the inputs whose pins are high.

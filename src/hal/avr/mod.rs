@@ -41,6 +41,7 @@ pub use avr_embassy::mask;
 
 pub use crate::hal::{exec, flags};
 
+use crate::hal::Thread;
 use crate::hal::resets::Mark;
 
 /// This chip, for the [contract](super::contract).
@@ -57,7 +58,7 @@ pub mod text_functions {
 }
 
 /// Restarts the firmware, as if the reset button had been pressed: the watchdog resets the chip in 15 ms.
-pub fn reset() -> ! {
+pub fn reset(_: Thread) -> ! {
     avr_device::interrupt::disable();
     stepper::kill();
     watchdog::reset(Mark::ASKED)
@@ -69,10 +70,10 @@ pub fn reset() -> ! {
 /// The loader finds the chip as after a reset by the button: interrupts are off and all registers of peripherals have
 /// their values after a reset, so no interrupt comes when the loader allows them, and all pins float. No reset cause is
 /// set. The loader is in the last 8 KiB of flash, as the fuses of these boards select.
-pub fn boot() -> ! {
+pub fn boot(thread: Thread) -> ! {
     avr_device::interrupt::disable();
     if !has_boot_loader() {
-        reset();
+        reset(thread);
     }
     watchdog::off();
     // SAFETY: nothing of the firmware runs after this; the loader sets up its own stack. The loop stores 0 to each
@@ -105,7 +106,7 @@ pub fn boot() -> ! {
 }
 
 /// Does nothing: this chip has no USB.
-pub fn set_rests(_: bool) {}
+pub fn set_rests(_: Thread, _: bool) {}
 
 /// Whether lines are blended: this chip has no room for it.
 pub fn blends() -> bool {

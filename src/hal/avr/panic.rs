@@ -3,6 +3,7 @@
 
 use super::gpio::{self, each};
 use crate::boards::ACTIVE;
+use crate::hal::Exclusive;
 
 /// Stops the step timer, switches drivers and hazardous outputs off, and never returns.
 pub fn halt() -> ! {
@@ -20,8 +21,10 @@ pub fn make_safe() {
     super::pwm::kill();
     super::heaters::kill();
     each!(ACTIVE.hazards, hazard => gpio::low(hazard));
-    gpio::stop_spindle();
-    gpio::power(0);
+    // SAFETY: interrupts are off.
+    let alone = unsafe { Exclusive::assume() };
+    gpio::stop_spindle(alone);
+    gpio::power(alone, 0);
 }
 
 #[panic_handler]

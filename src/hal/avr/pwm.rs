@@ -5,6 +5,7 @@
 //! Exec, or thread mode while exec cannot run. On a board without a PWM output nothing happens.
 
 use crate::boards::{ACTIVE, Pwm};
+use crate::hal::Exclusive;
 use crate::spindle::{WHOLE, divide};
 
 /// Offsets of registers from the timer's first.
@@ -33,7 +34,7 @@ impl Pwm {
 
 /// Sets the frequency, in thousandths of a Hz. The share becomes 0 and has to be set again.
 #[small]
-pub fn set_frequency(millihertz: u32) {
+pub fn set_frequency(_: Exclusive<'_>, millihertz: u32) {
     let Some(pwm) = ACTIVE.pwm else { return };
     let (prescaler, top) = divide(ACTIVE.clock_hz, millihertz);
     // SAFETY: the registers of the timer are this module's. While it is set up the timer stands still in mode 0,
@@ -52,7 +53,7 @@ pub fn set_frequency(millihertz: u32) {
 /// Sets the share of the period for which the pin is high, in thousandths.
 #[inline(never)]
 #[small]
-pub fn set_share(share: f32) {
+pub fn set_share(_: Exclusive<'_>, share: f32) {
     let Some(pwm) = ACTIVE.pwm else { return };
     // SAFETY: as in `set_frequency`. The high byte of a word is latched in a register of this timer, which nobody
     // else uses.

@@ -5,6 +5,7 @@
 
 use super::gpio;
 use crate::boards::{ACTIVE, SPI};
+use crate::hal::{Boot, Thread};
 
 const SPCR: *mut u8 = 0x4C as *mut u8;
 const SPSR: *mut u8 = 0x4D as *mut u8;
@@ -27,29 +28,29 @@ pub enum Clock {
     Khz250 = 0b10,
 }
 
-/// Sets the pins up. Start-up.
-pub fn start() {
+/// Sets the pins up.
+pub fn start(boot: &Boot) {
     if !ACTIVE.has_spi() {
         return;
     }
     let [select, clock, out, input] = SPI;
     gpio::high(select);
-    gpio::output(select);
-    gpio::output(clock);
-    gpio::output(out);
+    gpio::output(boot.exclusive(), select);
+    gpio::output(boot.exclusive(), clock);
+    gpio::output(boot.exclusive(), out);
     gpio::high(input);
 }
 
-/// Sets the clock of the exchanges that follow. Thread mode.
-pub fn set_clock(clock: Clock) {
+/// Sets the clock of the exchanges that follow.
+pub fn set_clock(_: Thread, clock: Clock) {
     // SAFETY: the registers are this module's.
     unsafe { SPCR.write_volatile(MASTER | clock as u8) };
 }
 
-/// Sends a byte and returns the byte received meanwhile. Thread mode. Cost: 8 bits and 30 cycles.
+/// Sends a byte and returns the byte received meanwhile. Cost: 8 bits and 30 cycles.
 #[inline(never)]
 #[small]
-pub fn exchange(byte: u8) -> u8 {
+pub fn exchange(_: Thread, byte: u8) -> u8 {
     // SAFETY: the registers are this module's.
     unsafe {
         SPDR.write_volatile(byte);

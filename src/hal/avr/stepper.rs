@@ -15,6 +15,7 @@ use crate::dda::{Dda, SEGMENTS, Segment};
 use crate::hal::byte::SharedByte;
 use crate::hal::ring::Ring;
 use crate::hal::segments::Segments;
+use crate::hal::{Boot, Interrupt, Thread};
 
 const _: () = assert!(matches!(ACTIVE.step_timer, Timer::T1), "the step timer is timer 1");
 
@@ -83,9 +84,8 @@ unsafe impl Sync for Owned {}
 
 pub(super) static STATE: Owned = Owned(UnsafeCell::new(Dda::new()));
 
-/// Sets the timer up and returns the filling end of the segment ring. Before interrupts are on; `None` after the
-/// first time.
-pub fn start() -> Option<Segments> {
+/// Sets the timer up and returns the filling end of the segment ring. `None` after the first time.
+pub fn start(_: &Boot) -> Option<Segments> {
     // The interrupt is the consumer.
     let (producer, _) = SEGMENT_RING.split()?;
     // SAFETY: interrupts are off, nobody else looks.
@@ -108,7 +108,7 @@ pub(super) fn is_on() -> bool {
 ///
 /// It is never inlined, because the bench counts segments by its calls.
 #[inline(never)]
-pub fn go() {
+pub fn go(_: Interrupt) {
     if RUNNING.get() != 0 {
         return;
     }
@@ -139,8 +139,8 @@ pub fn is_stopped() -> bool {
     STOPPED.get() != 0
 }
 
-/// Allows ticks again after a stop. Thread mode, when the motors have [settled](settle).
-pub fn release() {
+/// Allows ticks again after a stop. Call it when the motors have [settled](settle).
+pub fn release(_: Thread) {
     STOPPED.set(0);
 }
 
@@ -149,8 +149,8 @@ pub fn running() -> bool {
     RUNNING.get() != 0 && !is_stopped()
 }
 
-/// Returns how long the running segment still takes, in CPU cycles. Exec.
-pub fn left() -> u32 {
+/// Returns how long the running segment still takes, in CPU cycles.
+pub fn left(_: Interrupt) -> u32 {
     let (ticks, top) = super::mask(|| {
         // SAFETY: reading has no effect.
         unsafe { (TICKS.map(|register| register.read_volatile()), OCR1A.read_volatile()) }
@@ -159,11 +159,11 @@ pub fn left() -> u32 {
 }
 
 /// Drops the rest of all segments after a stop, so that every motor stands where its last pulse has put it. `held` is
-/// the segment that would have come next after the queued ones. Subtracts the steps that were not made from
-/// `position`. Exec, while no ticks come.
+/// the segment that would have come next after the queued ones. Subtracts the steps that were not made from `position`.
+/// Call it while no ticks come.
 #[inline(never)]
 #[small]
-pub fn settle(mut held: Option<Segment>, position: &mut [i32; MOTORS]) {
+pub fn settle(_: Interrupt, mut held: Option<Segment>, position: &mut [i32; MOTORS]) {
     if running() {
         return;
     }
@@ -181,7 +181,7 @@ pub fn settle(mut held: Option<Segment>, position: &mut [i32; MOTORS]) {
 
 /// Returns the state of the generator between two ticks, and the slot of its segment. Only for the sampling
 /// interrupt, which holds exec off.
-pub fn moment() -> (Dda, u8) {
+pub(super) fn moment() -> (Dda, u8) {
     let mut dda = Dda::new();
     let mut tail = 0;
     avr_device::interrupt::free(|_| {
@@ -201,8 +201,8 @@ pub fn moment() -> (Dda, u8) {
     (dda, tail)
 }
 
-/// Sets which direction pins are inverted: bit m for motor m. Thread mode, while nothing runs.
-pub fn set_inverted(motors: u8) {
+/// Sets which direction pins are inverted: bit m for motor m. Call it while nothing runs.
+pub fn set_inverted(_: Thread, motors: u8) {
     let changed = motors ^ INVERTED.get();
     INVERTED.set(motors);
     each_motor!(M => if changed & (1 << M) != 0 {
@@ -210,9 +210,9 @@ pub fn set_inverted(motors: u8) {
     });
 }
 
-/// Sets the width of a step pulse, in microseconds, and which step pins rest high (bit m for motor m). Thread mode;
-/// the values may change only while nothing runs.
-pub fn set_step_output(pulse_us: u8, inverted: u8) {
+/// Sets the width of a step pulse, in microseconds, and which step pins rest high (bit m for motor m). The values may
+/// change only while nothing runs.
+pub fn set_step_output(_: Thread, pulse_us: u8, inverted: u8) {
     LOCKSTEP_WIDTH.set(width_turns(pulse_us, LOCKSTEP_CYCLES));
     SHORT_WIDTH.set(width_turns(pulse_us, SHORT_CYCLES));
     WIDTH.set(width_turns(pulse_us, CYCLES));

@@ -21,6 +21,7 @@ use crate::hal::serial::{
     self, AUX, AUX_RING, AllEnds, Ends, Flow, LATE, PORTS, RX_RING, TX_RING, USB, WAIT_MS, XOFF,
     XON, hardware, is_shared, last_mark, wait_ms,
 };
+use crate::hal::{Boot, Interrupt, Level, Thread};
 use crate::realtime::{self, Asked};
 
 /// The state that the interrupts of a port share with thread mode.
@@ -63,14 +64,14 @@ const PLAIN: u8 = 1 << 3;
 const AHEAD: u8 = 1 << 4;
 
 impl Flags {
-    /// Orders `byte` to be sent before all others. Thread mode, and exec.
-    fn send_ahead(&self, byte: u8) {
+    /// Orders `byte` to be sent before all others.
+    fn send_ahead(&self, _: Level, byte: u8) {
         self.ahead.set(byte);
         avr_device::interrupt::free(|_| self.held.set(self.held.get() | AHEAD));
     }
 
-    /// Sets the reasons for which the bytes in the ring may have to wait from now on. Thread mode.
-    fn hold(&self, why: u8) {
+    /// Sets the reasons for which the bytes in the ring may have to wait from now on.
+    fn hold(&self, _: Thread, why: u8) {
         // `AHEAD` is set in any case, because exec may have a byte sent ahead meanwhile. The transmit interrupt
         // checks whether there is one.
         self.held.set(why | AHEAD);
@@ -139,23 +140,23 @@ fn tx(port: u8) -> &'static Ring<u8, TX_RING> {
     if PORTS > 1 && port == AUX { &AUX_SHARED.tx } else { &USB_SHARED.tx }
 }
 
-/// Starts the lines, 8N1: USB at `rate` bits a second, the second port at the board's rate. Before interrupts are on;
-/// `None` after the first time.
-pub fn start(rate: u32) -> Option<AllEnds> {
+/// Starts the lines, 8N1: USB at `rate` bits a second, the second port at the board's rate. `None` after the first
+/// time.
+pub fn start(thread: Thread, _: &Boot, rate: u32) -> Option<AllEnds> {
     let usb = USB_SHARED.split()?;
-    start_port(USB, rate);
+    start_port(thread, USB, rate);
     let aux = match const { hardware(AUX) } {
         None => None,
         Some(aux) => {
-            start_port(AUX, aux.rate);
+            start_port(thread, AUX, aux.rate);
             Some(AUX_SHARED.split()?)
         }
     };
     Some(AllEnds { usb, aux })
 }
 
-fn start_port(port: u8, rate: u32) {
-    set_rate(port, rate);
+fn start_port(thread: Thread, port: u8, rate: u32) {
+    set_rate(thread, port, rate);
     // SAFETY: start-up.
     unsafe {
         register(port, 0).write_volatile(U2X);
@@ -163,11 +164,10 @@ fn start_port(port: u8, rate: u32) {
     }
 }
 
-/// Changes the rate to `rate` bits a second. A byte that is on the line at that moment, in either direction, is
-/// spoilt. Thread mode.
-pub fn set_rate(port: u8, rate: u32) {
+/// Changes the rate to `rate` bits a second. A byte that is on the line at that moment, in either direction, is spoilt.
+pub fn set_rate(_: Thread, port: u8, rate: u32) {
     let [low, high] = baud::divisor(rate).to_le_bytes();
-    // SAFETY: only thread mode writes these two registers; the write of the lower one takes effect.
+    // SAFETY: only code with a `Thread` writes these two registers; the write of the lower one takes effect.
     unsafe {
         register(port, 5).write_volatile(high);
         register(port, 4).write_volatile(low);
@@ -191,8 +191,8 @@ pub unsafe fn end_lines() {
     }
 }
 
-/// Starts sending what the ring holds. Thread mode, or exec on a port that is no bus.
-pub fn kick(port: u8) {
+/// Starts sending what the ring holds. Exec calls it only on a port that is no bus.
+pub fn kick(_: Level, port: u8) {
     if is_shared(port) {
         return kick_bus(port);
     }
@@ -233,12 +233,12 @@ fn each_driver(port: u8, act: impl Fn(Pin)) {
 
 /// Stops the sender or lets it go on, by the flow control that the two sides have agreed on. With `Flow::Pins` the
 /// receive interrupt also stops the sender. If `waits`, XOFF or XON may wait for the end of the line that is being
-/// sent. Thread mode.
-pub fn stop_sender(port: u8, flow: Flow, stop: bool, waits: bool) {
+/// sent.
+pub fn stop_sender(thread: Thread, port: u8, flow: Flow, stop: bool, waits: bool) {
     match flow {
         Flow::None => {}
         Flow::Characters => {
-            // SAFETY: only thread mode writes this register.
+            // SAFETY: only code with a `Thread` writes this register.
             let divisor = unsafe { register(port, 4).read_volatile() };
             let wait = if waits { WAIT_MS * wait_ms(port, divisor) } else { 0 };
             let flags = flags(port);
@@ -246,38 +246,38 @@ pub fn stop_sender(port: u8, flow: Flow, stop: bool, waits: bool) {
             if stop {
                 flags.stopped.set(1);
             }
-            flags.send_ahead(wait + if stop { XOFF } else { XON });
+            flags.send_ahead(thread.level(), wait + if stop { XOFF } else { XON });
             flags.stopped.set(stop.into());
-            kick(port);
+            kick(thread.level(), port);
         }
         Flow::Pins => set_rts(port, stop),
     }
 }
 
 /// Whether XOFF has stopped the sender, sent by thread mode or by [`stop_late`].
-pub fn is_stopped(port: u8) -> bool {
+pub fn is_stopped(_: Thread, port: u8) -> bool {
     flags(port).stopped.get() != 0
 }
 
-/// Stops the sender of the second port by XOFF if its receive ring fills while thread mode has no turn. Exec, which
-/// never runs within an interrupt of a port. Cost: 12 cycles.
+/// Stops the sender of the second port by XOFF if its receive ring fills while thread mode has no turn. Exec never runs
+/// within an interrupt of a port. Cost: 12 cycles.
 #[inline(always)]
-pub fn stop_late() {
+pub fn stop_late(exec: Interrupt) {
     if PORTS > 1 && AUX_SHARED.rx.used() >= LATE {
-        stop_now();
+        stop_now(exec);
     }
 }
 
 #[cold]
 #[inline(never)]
-fn stop_now() {
+fn stop_now(exec: Interrupt) {
     let flags = flags(AUX);
     // An XOFF that waits for the end of a line is sent at once.
     let waits = flags.ahead.get() > WAIT_MS + XON;
     if flags.held.get() & HEEDS_XOFF != 0 && (flags.stopped.get() == 0 || waits) {
         flags.stopped.set(1);
-        flags.send_ahead(XOFF);
-        kick(AUX);
+        flags.send_ahead(exec.level(), XOFF);
+        kick(exec.level(), AUX);
     }
 }
 
@@ -294,17 +294,17 @@ fn set_rts(port: u8, stop: bool) {
     }
 }
 
-/// Sets whether `!`, `~`, `%` and bytes above 0x7F are plain text from now on. Thread mode.
-pub fn set_plain(port: u8, plain: bool) {
+/// Sets whether `!`, `~`, `%` and bytes above 0x7F are plain text from now on.
+pub fn set_plain(thread: Thread, port: u8, plain: bool) {
     // XOFF is not obeyed on such a port, so the receive interrupt does not write `held`.
     if plain {
-        flags(port).hold(PLAIN);
-        kick(port);
+        flags(port).hold(thread, PLAIN);
+        kick(thread.level(), port);
     }
 }
 
-/// Sets how the other side may stop this port's transmitter from now on. Thread mode.
-pub fn set_flow(port: u8, flow: Flow) {
+/// Sets how the other side may stop this port's transmitter from now on.
+pub fn set_flow(thread: Thread, port: u8, flow: Flow) {
     let heeds = match flow {
         Flow::None => 0,
         Flow::Characters => HEEDS_XOFF,
@@ -314,29 +314,29 @@ pub fn set_flow(port: u8, flow: Flow) {
     let heeds = if cfg!(feature = "dialect-reprap") { heeds | held & PLAIN } else { heeds };
     if held & !(STOPPED | AHEAD) != heeds {
         // An earlier XOFF is ignored from now on.
-        flags(port).hold(heeds);
+        flags(port).hold(thread, heeds);
         set_rts(port, false);
-        kick(port);
+        kick(thread.level(), port);
     }
 }
 
-/// Sends bytes that CTS has held back, and XOFF or XON that has waited long enough. Thread mode, each millisecond.
+/// Sends bytes that CTS has held back, and XOFF or XON that has waited long enough. Called each millisecond.
 #[inline(always)]
-pub fn look() {
+pub fn look(thread: Thread) {
     for port in 0..PORTS as u8 {
         if flags(port).ahead.get() >= WAIT_MS {
-            wait_less(port);
+            wait_less(thread, port);
         }
         let has_pins = matches!(Flow::of(port, 2), Flow::Pins);
         if has_pins && flags(port).held.get() & HEEDS_CTS != 0 {
-            kick(port);
+            kick(thread.level(), port);
         }
     }
 }
 
 /// Takes one millisecond off the time that XOFF or XON waits.
 #[inline(never)]
-fn wait_less(port: u8) {
+fn wait_less(thread: Thread, port: u8) {
     super::mask(|| {
         let ahead = &flags(port).ahead;
         // The transmit interrupt may have sent the byte meanwhile, or exec may have ordered one that does not wait.
@@ -344,11 +344,11 @@ fn wait_less(port: u8) {
             ahead.set(less);
         }
     });
-    kick(port);
+    kick(thread.level(), port);
 }
 
 /// Does nothing: bytes that find no room in the ring are lost.
-pub fn go_on() {}
+pub fn go_on(_: Thread) {}
 
 /// Always false: opening the port resets this chip, so there is nothing to notice.
 pub fn sees_opening() -> bool {
@@ -356,22 +356,22 @@ pub fn sees_opening() -> bool {
 }
 
 /// Always false: see [`sees_opening`].
-pub fn take_opened() -> bool {
+pub fn take_opened(_: Thread) -> bool {
     false
 }
 
 /// Always 0: this chip has no USB.
-pub fn restarts() -> u8 {
+pub fn restarts(_: Thread) -> u8 {
     0
 }
 
 /// Always 0: see [`restarts`].
-pub fn bus_errors() -> u16 {
+pub fn bus_errors(_: Thread) -> u16 {
     0
 }
 
 /// Returns how many line ends have been lost since start-up, modulo 2^16.
-pub fn lost_ends(port: u8) -> u16 {
+pub fn lost_ends(_: Thread, port: u8) -> u16 {
     let [low, high] = &flags(port).lost_ends;
     loop {
         let before = high.get();
@@ -383,34 +383,34 @@ pub fn lost_ends(port: u8) -> u16 {
 }
 
 /// Returns how many bytes may come before one is lost, at most 254: one less than the receive ring has room for.
-pub fn room(port: u8) -> u8 {
+pub fn room(_: Thread, port: u8) -> u8 {
     let is_aux = PORTS > 1 && port == AUX;
     let used = if is_aux { AUX_SHARED.rx.used() } else { USB_SHARED.rx.used() };
     serial::capacity(port).saturating_sub(used as u8)
 }
 
 /// Whether half of the second port's receive ring is full. The other half fills in 3 ms, so a task with much to do then
-/// yields to the reader. Thread mode.
-pub fn presses() -> bool {
+/// yields to the reader.
+pub fn presses(_: Thread) -> bool {
     PORTS > 1 && AUX_SHARED.rx.used() >= AUX_RING / 2
 }
 
 /// Whether the reader has to have its turn before the next waiting line is carried out: see [`serial::calls_reader`].
-/// On the second port any waiting byte is a reason. Thread mode.
-pub fn calls_reader() -> bool {
+/// On the second port any waiting byte is a reason.
+pub fn calls_reader(_: Thread) -> bool {
     // SAFETY: the reader does not run meanwhile.
     let ring = unsafe { USB_SHARED.rx.window() };
     PORTS > 1 && AUX_SHARED.rx.used() > 0 || serial::calls_reader(&ring)
 }
 
-/// Returns the slot of the receive ring that holds the newest byte; `None` if that byte has been read. Thread mode.
-pub fn newest(port: u8) -> Option<u8> {
+/// Returns the slot of the receive ring that holds the newest byte; `None` if that byte has been read.
+pub fn newest(_: Thread, port: u8) -> Option<u8> {
     if PORTS > 1 && port == AUX { AUX_SHARED.rx.newest() } else { USB_SHARED.rx.newest() }
 }
 
-/// Returns the slot of the mark that stands for the last `%` or `^d`; `None` if no such mark waits. Thread mode.
-/// Cost: 12 cycles for each byte that waits.
-pub fn last_cut(port: u8) -> Option<u8> {
+/// Returns the slot of the mark that stands for the last `%` or `^d`; `None` if no such mark waits. Cost: 12 cycles for
+/// each byte that waits.
+pub fn last_cut(_: Thread, port: u8) -> Option<u8> {
     // SAFETY: the reader does not run meanwhile.
     let ring = unsafe {
         if PORTS > 1 && port == AUX { AUX_SHARED.rx.window() } else { USB_SHARED.rx.window() }
@@ -426,7 +426,7 @@ pub fn asks_hold() -> bool {
 
 /// Takes the override requests that characters have made since the last call.
 #[inline(never)]
-pub fn take_asked(port: u8) -> Asked {
+pub fn take_asked(_: Thread, port: u8) -> Asked {
     let [feed, spindle, fixed] = &flags(port).asked;
     if feed.get() | spindle.get() | fixed.get() == 0 {
         return Asked::NOTHING;
@@ -445,7 +445,7 @@ pub fn take_asked(port: u8) -> Asked {
 }
 
 /// Takes the real-time characters since the last call, as bits (see [`realtime`](crate::realtime)).
-pub fn take_realtime(port: u8) -> u8 {
+pub fn take_realtime(_: Thread, port: u8) -> u8 {
     let realtime = &flags(port).realtime;
     avr_device::interrupt::free(|_| {
         let bits = realtime.get();

@@ -8,6 +8,7 @@
 use core::arch::asm;
 
 use super::{panic, stepper, uart};
+use crate::hal::Boot;
 use crate::hal::resets::{self, Cause, Mark};
 
 const MCUSR: *mut u8 = 0x54 as *mut u8;
@@ -43,9 +44,9 @@ fn set(value: u8) {
     }
 }
 
-/// Switches the watchdog off, and stores the cause of the reset. First thing at start-up.
+/// Switches the watchdog off, and stores the cause of the reset. The first call.
 #[small]
-pub fn begin() {
+pub fn begin(_: &Boot) {
     // SAFETY: start-up, with interrupts off. The flag in MCUSR is cleared first: while it says that the watchdog has
     // reset the chip, the watchdog cannot be switched off.
     let (chip, mark) = unsafe {
@@ -65,14 +66,14 @@ pub fn cause() -> Cause {
     Mark(mark).cause().unwrap_or(Cause::PowerOn)
 }
 
-/// Switches the watchdog on. Interrupts are off.
+/// Switches the watchdog on.
 #[small]
-pub fn start() {
+pub fn start(_: &Boot) {
     set(TIME);
 }
 
 /// Restarts the time of the watchdog. Does nothing if the step interrupt is off, because then ticks would come only
-/// from the interrupts of serial ports, one for each byte. Thread mode, and exec. Cost: 4 cycles.
+/// from the interrupts of serial ports, one for each byte. Any level. Cost: 4 cycles.
 #[inline(never)]
 #[small]
 pub fn feed() {

@@ -1,6 +1,7 @@
 //! An SD card of a machine: a card of high capacity. It is busy for some time after each block that is written. Blocks
 //! that nobody has written are 0.
 
+use crate::hal::Thread;
 use core::cell::{Cell, RefCell};
 use std::collections::{HashMap, VecDeque};
 use std::vec::Vec;
@@ -59,20 +60,20 @@ pub fn reads() -> u32 {
 }
 
 /// Selects the card.
-pub fn select() {
+pub fn select(_: Thread) {
     card().taken.borrow_mut().clear();
     card().answer.borrow_mut().clear();
     card().writes.set(None);
 }
 
 /// Deselects the card.
-pub fn release() {}
+pub fn release(_: Thread) {}
 
 /// Sets the speed of the clock.
-pub fn set_fast(_: bool) {}
+pub fn set_fast(_: Thread, _: bool) {}
 
 /// Sends a byte. Returns what the card sends meanwhile; 0xFF without a card, because an undriven line is high.
-pub fn exchange(byte: u8) -> u8 {
+pub fn exchange(_: Thread, byte: u8) -> u8 {
     let mut blocks = card().blocks.borrow_mut();
     let Some(blocks) = blocks.as_mut() else { return 0xFF };
     let (busy, since) = card().busy.get();
@@ -127,11 +128,11 @@ fn obey(number: u8, argument: u32, blocks: &Blocks) {
 }
 
 /// Reads a block.
-pub fn read(block: &mut [u8; 512]) {
-    block.fill_with(|| exchange(0xFF));
+pub fn read(thread: Thread, block: &mut [u8; 512]) {
+    block.fill_with(|| exchange(thread, 0xFF));
 }
 
 /// Whether another device waits for the lines: never.
-pub fn is_wanted() -> bool {
+pub fn is_wanted(_: Thread) -> bool {
     false
 }

@@ -4,6 +4,7 @@ use core::cell::{Cell, RefCell};
 use std::vec::Vec;
 
 use super::now;
+use crate::hal::Thread;
 use crate::store::Memory;
 use crate::store::program::AREA;
 
@@ -44,12 +45,12 @@ pub fn take_written() -> Vec<(u16, u8)> {
 }
 
 /// The EEPROM.
-pub struct Eeprom(());
+pub struct Eeprom(Thread);
 
 impl Eeprom {
     /// Returns access to the EEPROM of this thread's machine.
-    pub fn take() -> Self {
-        Self(())
+    pub fn of(thread: Thread) -> Self {
+        Self(thread)
     }
 }
 

@@ -6,6 +6,7 @@ use core::cell::Cell;
 use super::{NEVER, inputs, now};
 use crate::boards::{ACTIVE, Pin};
 use crate::encoder::Pulses;
+use crate::hal::Thread;
 
 /// CPU cycles in a count.
 const COUNT: u64 = 64;
@@ -49,14 +50,14 @@ machine_static! {
 
 /// Sets which sensors are read from now on (bit 0 index, bit 1 sync, bit 2 the second sync sensor), and for how many
 /// counts their contacts bounce.
-pub fn set_up(lines: u8, bounce: u16) {
+pub fn set_up(_: Thread, lines: u8, bounce: u16) {
     all().in_use.set(lines);
     all().bounce.set(bounce);
     inputs::leave_out(ACTIVE.shared_inputs(lines));
 }
 
 /// Returns 0: there is no counter.
-pub fn at_counter() -> u16 {
+pub fn at_counter(_: Thread) -> u16 {
     0
 }
 

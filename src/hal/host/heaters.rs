@@ -1,6 +1,7 @@
 //! Heaters and their sensors. Tests set the readings of the converter, and see what the firmware has switched.
 
 use super::Local;
+use crate::hal::Thread;
 use crate::heat::sensor::SAMPLES;
 
 machine_static! {
@@ -16,28 +17,28 @@ machine_static! {
 }
 
 /// Begins a reading of a heater's sensor.
-pub fn begin(heater: u8) {
+pub fn begin(_: Thread, heater: u8) {
     begun().set(heater);
 }
 
 /// Returns the reading that was begun last; the highest one if no sensor is there.
-pub fn reading() -> Option<u16> {
-    Some(word(begun().get()).unwrap_or(SAMPLES * 1_023))
+pub fn reading(thread: Thread) -> Option<u16> {
+    Some(word(thread, begun().get()).unwrap_or(SAMPLES * 1_023))
 }
 
 /// Returns the word that the MAX6675 of a heater sends; `None` if the heater has no MAX6675.
-pub fn word(heater: u8) -> Option<u16> {
+pub fn word(_: Thread, heater: u8) -> Option<u16> {
     readings().get().get(usize::from(heater)).copied().flatten()
 }
 
 /// Switches the hot end, the bed and the fan: off at 0, else on.
-pub fn drive(power: [u8; 3]) {
+pub fn drive(_: Thread, power: [u8; 3]) {
     let [hot_end, bed, fan] = power.map(|power| u8::from(power != 0));
     switched().set(hot_end | bed << 1 | fan << 2);
 }
 
 /// Does nothing: the host's board has no fan for the heatbreak.
-pub fn cool(_: bool) {}
+pub fn cool(_: Thread, _: bool) {}
 
 /// Sets what the converter reads of a heater's sensor from now on.
 pub fn set(heater: usize, reading: u16) {

@@ -6,6 +6,7 @@ use super::{NEVER, encoder, flags, now, stepper};
 use crate::boards::{ACTIVE, inputs};
 use crate::dda::contact;
 use crate::hal::event::Event;
+use crate::hal::{Level, Thread};
 use crate::switches::{FIRST_US, LATER_US, Next, SOON_US, Switches};
 
 struct Inputs {
@@ -42,7 +43,7 @@ const fn cycles(us: u32) -> u64 {
 }
 
 /// Sets which inputs are active low, and which inputs stop the steps.
-pub fn set_up(low: u16, stops: u16) {
+pub fn set_up(_: Thread, low: u16, stops: u16) {
     all().stops.set(stops);
     if all().low.replace(low) != low {
         all().fresh.set(true);
@@ -63,23 +64,23 @@ pub fn left_out() -> u16 {
 }
 
 /// Sets the ends of axes that are not limits for now.
-pub fn spare(ends: u8) {
+pub fn spare(_: Thread, ends: u8) {
     all().spared.set(ends);
 }
 
 /// Arms the end of a move: the first input of `armed` whose state becomes that in `awaited` ends the move
 /// ([`contact`]). 0 disarms.
-pub fn arm(armed: u16, awaited: u16) {
+pub fn arm(_: Thread, armed: u16, awaited: u16) {
     all().armed.set((armed, awaited));
 }
 
 /// Returns the inputs that are active.
-pub fn worked() -> u16 {
+pub fn worked(_: Level) -> u16 {
     all().switches.borrow().worked()
 }
 
 /// Takes the inputs that have stopped the steps since the last call.
-pub fn take_hits() -> u16 {
+pub fn take_hits(_: Thread) -> u16 {
     all().hits.take()
 }
 

@@ -2,8 +2,8 @@
 
 use std::vec::Vec;
 
-use avr_embassy::Thread;
 use avr_embassy::host::Runtime;
+use avr_embassy::{Boot, Thread};
 use embassy_executor::Spawner;
 
 use super::{card, clock, encoder, heaters, inputs, now, stepper, time, uart};
@@ -18,10 +18,15 @@ pub struct Machine {
 impl Machine {
     /// Makes the machine, with a millisecond count that begins at `ms`, and starts the firmware. `start` spawns its
     /// tasks, and returns `None` if it has been started before; then this returns `None`, too.
-    pub fn start(ms: u64, start: impl FnOnce(Spawner, Thread) -> Option<()>) -> Option<Self> {
+    pub fn start(
+        ms: u64,
+        start: impl FnOnce(Spawner, Thread, &Boot) -> Option<()>,
+    ) -> Option<Self> {
         clock().set(ms * time::CYCLES_PER_MS);
         let runtime = Runtime::new();
-        start(runtime.spawner(), runtime.thread())?;
+        // SAFETY: no task has been polled, and the token is dropped before one is.
+        let boot = unsafe { Boot::assume() };
+        start(runtime.spawner(), runtime.thread(), &boot)?;
         let machine = Self { runtime };
         machine.settle();
         Some(machine)

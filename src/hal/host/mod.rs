@@ -27,6 +27,7 @@ pub mod watchdog;
 
 pub use machine::Machine;
 
+use crate::hal::Thread;
 use core::cell::Cell;
 
 pub use avr_embassy::mask;
@@ -76,17 +77,17 @@ pub fn now() -> u64 {
 }
 
 /// Restarts the firmware. On the host this is only recorded: see [`was_reset`].
-pub fn reset() {
+pub fn reset(_: Thread) {
     resets().set(true);
 }
 
 /// Starts the boot loader. On the host this only does what [`reset`] does.
-pub fn boot() {
-    reset();
+pub fn boot(thread: Thread) {
+    reset(thread);
 }
 
 /// Does nothing: there is no USB.
-pub fn set_rests(_: bool) {}
+pub fn set_rests(_: Thread, _: bool) {}
 
 /// Whether lines are blended.
 pub fn blends() -> bool {

@@ -8,6 +8,7 @@ use crate::boards::{MOTORS, inputs as board_inputs};
 use crate::dda::{Dda, Pins, SEGMENTS, Segment};
 use crate::hal::ring::{Consumer, Ring};
 use crate::hal::segments::Segments;
+use crate::hal::{Boot, Interrupt, Thread};
 
 const FIRST_TICK: u64 = 400;
 
@@ -112,7 +113,7 @@ impl Pins for Pinned {
 }
 
 /// Sets the timer up and returns the filling end of the segment ring; `None` after the first time.
-pub fn start() -> Option<Segments> {
+pub fn start(_: &Boot) -> Option<Segments> {
     let (producer, consumer) = ring().split()?;
     stepper().segments.replace(Some(consumer));
     // SAFETY: the mocked step interrupt alone reads the ring. It never runs within exec, and copies each segment.
@@ -120,7 +121,7 @@ pub fn start() -> Option<Segments> {
 }
 
 /// Starts the ticks if they have stopped.
-pub fn go() {
+pub fn go(_: Interrupt) {
     if !running() && !stepper().halted.get() {
         let mut pins = stepper().pins.borrow_mut();
         pins.stopped = false;
@@ -141,7 +142,7 @@ pub fn is_stopped() -> bool {
 }
 
 /// Allows ticks again after a stop.
-pub fn release() {
+pub fn release(_: Thread) {
     stepper().halted.set(false);
 }
 
@@ -151,15 +152,15 @@ pub fn running() -> bool {
 }
 
 /// Returns how long the running segment still takes, in cycles.
-pub fn left() -> u32 {
+pub fn left(_: Interrupt) -> u32 {
     let stepper = stepper();
     u32::from(stepper.dda.borrow().ticks) * stepper.pins.borrow().period as u32
 }
 
 /// Drops the rest of all segments after a stop, so that every motor stands where its last pulse has put it. `held` is
-/// the segment that would have come next after the queued ones. Subtracts the steps that were not made from
-/// `position`. Exec, while no ticks come.
-pub fn settle(mut held: Option<Segment>, position: &mut [i32; MOTORS]) {
+/// the segment that would have come next after the queued ones. Subtracts the steps that were not made from `position`.
+/// Call it while no ticks come.
+pub fn settle(_: Interrupt, mut held: Option<Segment>, position: &mut [i32; MOTORS]) {
     if running() {
         return;
     }
@@ -169,16 +170,16 @@ pub fn settle(mut held: Option<Segment>, position: &mut [i32; MOTORS]) {
 }
 
 /// Returns the state of the generator now, and the slot of its segment.
-pub fn moment() -> (Dda, u8) {
+pub(super) fn moment() -> (Dda, u8) {
     (stepper().dda.borrow().clone(), ring().tail())
 }
 
 /// Does nothing: positions are counted before pins are inverted.
-pub fn set_inverted(_motors: u8) {}
+pub fn set_inverted(_: Thread, _motors: u8) {}
 
 /// Keeps the width of a step pulse, in microseconds, and which step pins rest high, for tests. They have no other
 /// effect here.
-pub fn set_step_output(pulse_us: u8, inverted: u8) {
+pub fn set_step_output(_: Thread, pulse_us: u8, inverted: u8) {
     stepper().output.set((pulse_us, inverted));
 }
 

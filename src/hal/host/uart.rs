@@ -15,6 +15,7 @@ use crate::hal::serial::{
     RX_RING, STRAY, TX_RING, USB, XOFF, XON, batch, hardware, high_water, last_mark, lose, mark,
     wait_ms,
 };
+use crate::hal::{Boot, Interrupt, Level, Thread};
 use crate::realtime::{self, Asked};
 
 /// The filling end of a receive ring, whatever its size.
@@ -148,7 +149,7 @@ fn with<R>(port: u8, act: impl FnOnce(&mut Line) -> R) -> R {
 
 /// Starts the lines and the senders' ends of the lines: USB at `rate` bits a second, the second port at the board's
 /// rate. `None` after the first time.
-pub fn start(rate: u32) -> Option<AllEnds> {
+pub fn start(_: Thread, _: &Boot, rate: u32) -> Option<AllEnds> {
     let usb = split(USB, usb_rx(), usb_tx(), rate)?;
     let aux = match hardware(AUX) {
         Some(board) => Some(split(AUX, aux_rx(), aux_tx(), board.rate)?),
@@ -169,14 +170,14 @@ fn split<const N: usize>(
         line.rx_in = Some(Box::new(rx_in));
         line.tx_out = Some(tx_out);
     });
-    set_rate(port, rate);
+    with(port, |line| line.set_rate(rate));
     set_sender_rate(port, rate);
     Some((rx_out.into_view(), tx_in))
 }
 
 /// Changes the firmware's rate to `rate` bits a second.
-pub fn set_rate(port: u8, rate: u32) {
-    with(port, |line| (line.byte_cycles, line.rate) = (byte_cycles(rate), rate));
+pub fn set_rate(_: Thread, port: u8, rate: u32) {
+    with(port, |line| line.set_rate(rate));
 }
 
 /// Changes the sender's rate to `rate` bits a second.
@@ -189,13 +190,13 @@ fn byte_cycles(rate: u32) -> u64 {
 }
 
 /// Starts sending what the ring holds.
-pub fn kick(port: u8) {
+pub fn kick(_: Level, port: u8) {
     with(port, Line::kick);
 }
 
 /// Stops the sender or lets it go on, by the flow control that the two sides have agreed on. If `waits`, XOFF or XON
 /// may wait for the end of a line.
-pub fn stop_sender(port: u8, flow: Flow, stop: bool, waits: bool) {
+pub fn stop_sender(_: Thread, port: u8, flow: Flow, stop: bool, waits: bool) {
     with(port, |line| match flow {
         Flow::None => {}
         Flow::Characters => {
@@ -212,12 +213,12 @@ pub fn stop_sender(port: u8, flow: Flow, stop: bool, waits: bool) {
 }
 
 /// Whether XOFF has stopped the sender, sent by thread mode or by [`stop_late`].
-pub fn is_stopped(port: u8) -> bool {
+pub fn is_stopped(_: Thread, port: u8) -> bool {
     with(port, |line| line.stopped)
 }
 
-/// Stops the sender of the second port by XOFF if its receive ring fills while thread mode has no turn. Exec.
-pub fn stop_late() {
+/// Stops the sender of the second port by XOFF if its receive ring fills while thread mode has no turn.
+pub fn stop_late(_: Interrupt) {
     if aux_rx().used() < LATE {
         return;
     }
@@ -231,12 +232,12 @@ pub fn stop_late() {
 }
 
 /// Sets whether `!`, `~`, `%` and bytes above 0x7F are plain text from now on.
-pub fn set_plain(port: u8, plain: bool) {
+pub fn set_plain(_: Thread, port: u8, plain: bool) {
     with(port, |line| line.plain = plain);
 }
 
 /// Sets how the other side may stop this port's transmitter from now on.
-pub fn set_flow(port: u8, flow: Flow) {
+pub fn set_flow(_: Thread, port: u8, flow: Flow) {
     with(port, |line| {
         line.heeds_xoff = flow == Flow::Characters;
         line.held &= line.heeds_xoff;
@@ -248,15 +249,15 @@ pub fn set_flow(port: u8, flow: Flow) {
 }
 
 /// Sends XOFF or XON that has waited long enough, and what CTS has held back. Each millisecond.
-pub fn look() {
+pub fn look(thread: Thread) {
     for port in 0..PORTS as u8 {
         with(port, |line| line.wait_ms = line.wait_ms.saturating_sub(1));
-        kick(port);
+        kick(thread.level(), port);
     }
 }
 
 /// Does nothing: bytes that find no room in the ring are lost.
-pub fn go_on() {}
+pub fn go_on(_: Thread) {}
 
 /// Always true, so that tests can open the port: [`Machine::open_usb`](super::Machine::open_usb).
 pub fn sees_opening() -> bool {
@@ -264,17 +265,17 @@ pub fn sees_opening() -> bool {
 }
 
 /// Whether a program has opened the first port since the last call.
-pub fn take_opened() -> bool {
+pub fn take_opened(_: Thread) -> bool {
     with(USB, |line| core::mem::take(&mut line.opened))
 }
 
 /// Always 0: this USB never hangs.
-pub fn restarts() -> u8 {
+pub fn restarts(_: Thread) -> u8 {
     0
 }
 
 /// Always 0: see [`restarts`].
-pub fn bus_errors() -> u16 {
+pub fn bus_errors(_: Thread) -> u16 {
     0
 }
 
@@ -297,32 +298,32 @@ pub(super) fn close_usb() {
 }
 
 /// Returns how many line ends have been lost since start-up, modulo 2^16.
-pub fn lost_ends(port: u8) -> u16 {
+pub fn lost_ends(_: Thread, port: u8) -> u16 {
     with(port, |line| line.lost_ends)
 }
 
 /// Returns how many bytes may come before one is lost, at most 254: one less than the receive ring has room for.
-pub fn room(port: u8) -> u8 {
+pub fn room(_: Thread, port: u8) -> u8 {
     let used = if port == AUX { aux_rx().used() } else { usb_rx().used() };
     serial::capacity(port).saturating_sub(used as u8)
 }
 
 /// Whether half of the second port's receive ring is full. The other half lasts 3 ms, so a task with much to do then
-/// gives way to the reader. Thread mode.
-pub fn presses() -> bool {
+/// gives way to the reader.
+pub fn presses(_: Thread) -> bool {
     aux_rx().used() >= AUX_RING / 2
 }
 
 /// Whether the reader has to have its turn before the next waiting line is carried out: see [`serial::calls_reader`].
-/// On the second port any waiting byte is a reason. Thread mode.
-pub fn calls_reader() -> bool {
+/// On the second port any waiting byte is a reason.
+pub fn calls_reader(_: Thread) -> bool {
     // SAFETY: the reader does not run meanwhile.
     let ring = unsafe { usb_rx().window() };
     aux_rx().used() > 0 || serial::calls_reader(&ring)
 }
 
 /// Returns the slot of the receive ring that holds the newest byte; `None` if that byte has been read.
-pub fn newest(port: u8) -> Option<u8> {
+pub fn newest(_: Thread, port: u8) -> Option<u8> {
     match port {
         AUX => aux_rx().newest(),
         _ => usb_rx().newest(),
@@ -330,7 +331,7 @@ pub fn newest(port: u8) -> Option<u8> {
 }
 
 /// Returns the slot of the mark that stands for the last `%` or `^d`; `None` if no such mark waits.
-pub fn last_cut(port: u8) -> Option<u8> {
+pub fn last_cut(_: Thread, port: u8) -> Option<u8> {
     // SAFETY: the reader does not run meanwhile.
     let ring = unsafe { if port == AUX { aux_rx().window() } else { usb_rx().window() } };
     last_mark(&ring)
@@ -342,12 +343,12 @@ pub fn asks_hold() -> bool {
 }
 
 /// Takes the real-time characters since the last call, as bits (see [`realtime`]).
-pub fn take_realtime(port: u8) -> u8 {
+pub fn take_realtime(_: Thread, port: u8) -> u8 {
     with(port, |line| core::mem::take(&mut line.realtime))
 }
 
 /// Takes the override requests that characters have made since the last call.
-pub fn take_asked(port: u8) -> Asked {
+pub fn take_asked(_: Thread, port: u8) -> Asked {
     with(port, |line| core::mem::take(&mut line.asked))
 }
 
@@ -396,6 +397,11 @@ pub(super) fn advance() {
 }
 
 impl Line {
+    /// Changes the firmware's rate to `rate` bits a second.
+    fn set_rate(&mut self, rate: u32) {
+        (self.byte_cycles, self.rate) = (byte_cycles(rate), rate);
+    }
+
     /// Whether the rates of the two ends differ too much to understand each other: by more than 4.5 %.
     fn garbles(&self) -> bool {
         self.byte_cycles.abs_diff(self.sender_cycles) * 1_000 > self.sender_cycles * 45

@@ -7,6 +7,7 @@ use embassy_rp::pac::{SPI0, SPI1, spi::Spi};
 
 use super::gpio::{self, Unit};
 use crate::boards::{ACTIVE, SdCard};
+use crate::hal::{Boot, Thread};
 
 /// The divider of the clock before the card is initialized, and then: 252 kHz and 12.8 MHz at 128 MHz.
 const SLOW: (u8, u8) = (254, 1);
@@ -21,8 +22,8 @@ fn spi(card: &SdCard) -> Spi {
     if card.bus[0].bit / 8 % 2 == 0 { SPI0 } else { SPI1 }
 }
 
-/// Connects the pins, with no card selected. Start-up.
-pub(super) fn start() {
+/// Connects the pins, with no card selected.
+pub(super) fn start(_: &Boot) {
     let Some(card) = &ACTIVE.card else { return };
     gpio::set(card.select, true);
     gpio::output(card.select);
@@ -31,26 +32,30 @@ pub(super) fn start() {
     gpio::connect_output(to, Unit::Spi);
     // Without a card the line would float.
     gpio::connect_pulled(from, Unit::Spi);
-    set_fast(false);
+    set_clock(false);
 }
 
 /// Selects the card.
-pub fn select() {
+pub fn select(_: Thread) {
     if let Some(card) = &ACTIVE.card {
         gpio::set(card.select, false);
     }
 }
 
 /// Deselects the card, then sends one more byte, during which the card releases its data line.
-pub fn release() {
+pub fn release(thread: Thread) {
     if let Some(card) = &ACTIVE.card {
         gpio::set(card.select, true);
     }
-    exchange(0xFF);
+    exchange(thread, 0xFF);
 }
 
 /// Sets the clock: 12.8 MHz if `fast`, else 252 kHz.
-pub fn set_fast(fast: bool) {
+pub fn set_fast(_: Thread, fast: bool) {
+    set_clock(fast);
+}
+
+fn set_clock(fast: bool) {
     let Some(card) = &ACTIVE.card else { return };
     let (prescaler, divider) = if fast { FAST } else { SLOW };
     let spi = spi(card);
@@ -64,7 +69,7 @@ pub fn set_fast(fast: bool) {
 }
 
 /// Sends a byte and returns the byte received meanwhile.
-pub fn exchange(byte: u8) -> u8 {
+pub fn exchange(_: Thread, byte: u8) -> u8 {
     let Some(card) = &ACTIVE.card else { return 0xFF };
     let spi = spi(card);
     spi.dr().write(|w| w.set_data(byte.into()));
@@ -73,7 +78,7 @@ pub fn exchange(byte: u8) -> u8 {
 }
 
 /// Reads a block. Bytes follow each other without a pause, because the SPI holds eight of them.
-pub fn read(block: &mut [u8; 512]) {
+pub fn read(_: Thread, block: &mut [u8; 512]) {
     let Some(card) = &ACTIVE.card else { return block.fill(0xFF) };
     let spi = spi(card);
     let send = |_| spi.dr().write(|w| w.set_data(0xFF));
@@ -90,6 +95,6 @@ pub fn read(block: &mut [u8; 512]) {
 }
 
 /// Whether another device waits for the lines: never.
-pub fn is_wanted() -> bool {
+pub fn is_wanted(_: Thread) -> bool {
     false
 }

@@ -19,6 +19,7 @@ use super::gpio::{Unit, connect, connect_pulled};
 use crate::boards::{ACTIVE, MOTORS};
 use crate::drivers::watch::{Asked, ROUND, Step, Watch};
 use crate::drivers::{DATAGRAM, FIRST, REGISTERS, REQUEST, answer, clearing, datagram, request};
+use crate::hal::{Boot, Thread};
 
 /// Bits a second. The drivers detect the rate.
 const RATE: u32 = 115_200;
@@ -55,7 +56,7 @@ struct Known {
     sent: Cell<Option<Sent>>,
 }
 
-// SAFETY: only thread mode uses it, which never interrupts itself.
+// SAFETY: only functions with a `Thread` use it, and thread mode never interrupts itself.
 unsafe impl Sync for Known {}
 
 static KNOWN: Known =
@@ -71,8 +72,8 @@ const fn first() -> [AtomicU32; MOTORS * REGISTERS] {
     values
 }
 
-/// Connects the UART. Start-up.
-pub(super) fn start() {
+/// Connects the UART.
+pub(super) fn start(_: &Boot) {
     let Some(drivers) = ACTIVE.drivers else { return };
     connect(drivers.tx, Unit::Uart);
     connect_pulled(drivers.rx, Unit::Uart);
@@ -90,8 +91,8 @@ pub(super) fn start() {
     });
 }
 
-/// Sets the values of the registers of a motor's driver. Thread mode.
-pub fn tell(motor: u8, values: &[u32; REGISTERS]) {
+/// Sets the values of the registers of a motor's driver.
+pub fn tell(_: Thread, motor: u8, values: &[u32; REGISTERS]) {
     let first = usize::from(motor) * REGISTERS;
     for (at, value) in (first..).zip(values) {
         let Some(told) = VALUES.get(at) else { return };
@@ -102,18 +103,18 @@ pub fn tell(motor: u8, values: &[u32; REGISTERS]) {
     }
 }
 
-/// Returns what is known of a motor's driver. Thread mode.
-pub fn watch(motor: u8) -> Watch {
+/// Returns what is known of a motor's driver.
+pub fn watch(_: Thread, motor: u8) -> Watch {
     KNOWN.watches.get(usize::from(motor)).map_or(Watch::NEW, Cell::get)
 }
 
-/// Takes the worst of the news of a motor's driver since the last call. Thread mode.
-pub fn take_news(motor: u8) -> u8 {
+/// Takes the worst of the news of a motor's driver since the last call.
+pub fn take_news(_: Thread, motor: u8) -> u8 {
     change(motor.into(), Watch::take_news).unwrap_or(0)
 }
 
-/// Takes a step, if it is time for one. Thread mode, each millisecond.
-pub(super) fn look(now_ms: u32) {
+/// Takes a step, if it is time for one. Called each millisecond.
+pub(super) fn look(_: Thread, now_ms: u32) {
     let Some(drivers) = ACTIVE.drivers else { return };
     if let Some(sent) = KNOWN.sent.get() {
         if now_ms.wrapping_sub(sent.at_ms) < ANSWER_MS {

@@ -21,6 +21,7 @@ use embassy_rp::peripherals::FLASH;
 
 use super::pieces::{BYTES, Pieces, number};
 use super::{heaters, stepper, time, uart, watchdog};
+use crate::hal::{Boot, Thread};
 use crate::store::Memory;
 use crate::store::program::AREA;
 
@@ -36,50 +37,52 @@ type Chip = BlockingAsync<Flash<'static, FLASH, Blocking, FLASH_BYTES>>;
 
 struct Shared(UnsafeCell<Pieces<Chip>>);
 
-// SAFETY: only thread mode uses it: see `with`.
+// SAFETY: `with` takes a `Thread`, which no other level has.
 unsafe impl Sync for Shared {}
 
 static PIECES: Shared = Shared(UnsafeCell::new(Pieces::new()));
 
-fn with<R>(act: impl FnOnce(&mut Pieces<Chip>) -> R) -> R {
-    // SAFETY: thread mode, in which nothing preempts anything; `act` does not come back here.
+fn with<R>(_: Thread, act: impl FnOnce(&mut Pieces<Chip>) -> R) -> R {
+    // SAFETY: `Thread` shows thread mode, in which nothing preempts anything; `act` does not come back here.
     act(unsafe { &mut *PIECES.0.get() })
 }
 
-/// Reads the bytes from the flash. Start-up.
-pub(super) fn start(flash: embassy_rp::Peri<'static, FLASH>) {
+/// Reads the bytes from the flash. The first call.
+pub(super) fn start(_: &Boot, flash: embassy_rp::Peri<'static, FLASH>) {
     let chip = BlockingAsync::new(Flash::new_blocking(flash));
-    with(|pieces| pieces.start(chip, PLACE));
+    // SAFETY: nothing runs yet, as `Boot` shows.
+    let thread = unsafe { Thread::assume() };
+    with(thread, |pieces| pieces.start(chip, PLACE));
 }
 
 /// Writes the piece that waits to the flash.
-fn put_away(pieces: &mut Pieces<Chip>) {
+fn put_away(thread: Thread, pieces: &mut Pieces<Chip>) {
     // Erasing takes as long as the flash needs, at worst 400 ms, or for ever if the flash is broken: nobody looks after
     // the heaters meanwhile, nor can the watchdog.
-    heaters::pause();
+    heaters::pause(thread);
     watchdog::off();
     pieces.put_away();
     watchdog::start();
 }
 
 /// Writes the piece that waits, if that disturbs nothing now. Returns whether no piece waits any more.
-fn is_kept() -> bool {
-    with(|pieces| {
+fn is_kept(thread: Thread) -> bool {
+    with(thread, |pieces| {
         let quiet = time::millis().wrapping_sub(uart::heard_at()) >= QUIET_MS;
         if pieces.waiting().is_some() && quiet && !stepper::running() {
-            put_away(pieces);
+            put_away(thread, pieces);
         }
         pieces.waiting().is_none()
     })
 }
 
 /// Access to the memory.
-pub struct Eeprom(());
+pub struct Eeprom(Thread);
 
 impl Eeprom {
-    /// Returns access from thread mode. At most one task may write each part.
-    pub fn take() -> Self {
-        Self(())
+    /// Returns access. At most one task may write each part.
+    pub fn of(thread: Thread) -> Self {
+        Self(thread)
     }
 }
 
@@ -88,32 +91,33 @@ impl Memory for Eeprom {
     const LOG: u16 = Self::SIZE - AREA;
 
     fn read(&self, at: u16) -> u8 {
-        with(|pieces| pieces.read(at))
+        with(self.0, |pieces| pieces.read(at))
     }
 
     fn is_lost(&self) -> bool {
-        with(|pieces| pieces.is_lost())
+        with(self.0, |pieces| pieces.is_lost())
     }
 
     fn is_busy(&self) -> bool {
-        !is_kept()
+        !is_kept(self.0)
     }
 
     fn takes(&self, at: u16) -> bool {
-        with(|pieces| pieces.waiting() == Some(number(at))) || is_kept()
+        with(self.0, |pieces| pieces.waiting() == Some(number(at))) || is_kept(self.0)
     }
 
     fn write(&mut self, at: u16, byte: u8) {
-        with(|pieces| {
+        let thread = self.0;
+        with(thread, |pieces| {
             if pieces.waiting().is_some_and(|waiting| waiting != number(at)) {
-                put_away(pieces);
+                put_away(thread, pieces);
             }
             pieces.write(at, byte);
         });
     }
 }
 
-/// Writes the waiting piece when that is possible. Thread mode, each millisecond.
-pub(super) fn look() {
-    is_kept();
+/// Writes the waiting piece when that is possible. Called each millisecond.
+pub(super) fn look(thread: Thread) {
+    is_kept(thread);
 }

@@ -12,6 +12,7 @@ use super::{gpio, inputs, mask};
 use crate::boards::{ACTIVE, Pin};
 use crate::capability::Capability;
 use crate::encoder::Pulses;
+use crate::hal::{Boot, Thread};
 
 /// The state that the handler and readers share.
 struct State {
@@ -48,8 +49,8 @@ fn pins() -> Option<[Pin; 2]> {
     Some([encoder.index, encoder.sync])
 }
 
-/// Sets the pull-ups. Start-up.
-pub(super) fn start() {
+/// Sets the pull-ups.
+pub(super) fn start(_: &Boot) {
     pins().into_iter().flatten().for_each(gpio::pull_up);
 }
 
@@ -59,10 +60,9 @@ pub(super) fn watched() -> u32 {
 }
 
 /// Sets which sensors are read from now on (bit 0 index, bit 1 sync), and for how many counts their contacts bounce.
-/// Thread mode.
-pub fn set_up(lines: u8, bounce: u16) {
+pub fn set_up(thread: Thread, lines: u8, bounce: u16) {
     with(|state| (state.in_use, state.bounce) = (lines, bounce));
-    inputs::leave_out(ACTIVE.shared_inputs(lines));
+    inputs::leave_out(thread, ACTIVE.shared_inputs(lines));
 }
 
 /// Returns which sensors are read, as bits of [`set_up`]; 0 without an encoder. Any level.
@@ -70,13 +70,13 @@ pub fn in_use() -> u8 {
     with(|state| state.in_use)
 }
 
-/// Returns the pulses counted and timed so far. Thread mode and exec.
+/// Returns the pulses counted and timed so far. Any level.
 pub fn read() -> Pulses {
     with(|state| Pulses { now: counts() as u16, ..state.pulses })
 }
 
 /// Returns 0: there is no counter.
-pub fn at_counter() -> u16 {
+pub fn at_counter(_: Thread) -> u16 {
     0
 }
 

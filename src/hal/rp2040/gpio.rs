@@ -10,6 +10,7 @@ use super::register;
 use crate::boards::outputs::{COUNTERCLOCKWISE, SPINDLE};
 use crate::boards::{ACTIVE, Pin, Port};
 use crate::hal::byte::SharedByte;
+use crate::hal::{Boot, Exclusive};
 
 /// The unit that a pin is connected to (RP2040 data sheet, 2.19.2).
 #[derive(Clone, Copy)]
@@ -28,7 +29,7 @@ const FIRST_SENSED: u8 = 26;
 /// Connects a pin to no unit.
 const NOBODY: u8 = 0x1F;
 
-/// Connects a pin to a unit. Start-up.
+/// Connects a pin to a unit. Nobody else may connect this pin at the same time.
 pub(super) fn connect(pin: Pin, unit: Unit) {
     PADS_BANK0.gpio(pin.bit.into()).modify(|w| {
         w.set_ie(true);
@@ -60,19 +61,19 @@ pub(super) fn connect_output(pin: Pin, unit: Unit) {
     PADS_BANK0.gpio(pin.bit.into()).modify(|w| w.set_drive(Drive::_12M_A));
 }
 
-/// Makes a pin an input with a pull-up. Start-up.
+/// Makes a pin an input with a pull-up.
 pub(super) fn pull_up(pin: Pin) {
     connect_pulled(pin, Unit::Cpu);
 }
 
-/// Connects an input to a unit, with a pull-up. Start-up.
+/// Connects an input to a unit, with a pull-up.
 pub(super) fn connect_pulled(pin: Pin, unit: Unit) {
     connect(pin, unit);
     PADS_BANK0.gpio(pin.bit.into()).modify(|w| w.set_pue(true));
 }
 
-/// Connects the pin of an analog channel to the converter. Start-up.
-pub(super) fn sense(channel: u8) {
+/// Connects the pin of an analog channel to the converter.
+pub(super) fn sense(_: &Boot, channel: u8) {
     let pin = usize::from(FIRST_SENSED + channel);
     IO_BANK0.gpio(pin).ctrl().write(|w| w.set_funcsel(NOBODY));
     PADS_BANK0.gpio(pin).write(|w| w.set_od(true));
@@ -90,11 +91,16 @@ pub(super) fn levels() -> u32 {
     SIO.gpio_in(0).read()
 }
 
-/// Drives a pin high or low.
-pub(super) fn set(pin: Pin, high: bool) {
-    if is_behind(pin) {
-        return register::set(pin.bit, high);
+/// Drives an output high or low, which may be behind a shift register.
+pub(super) fn switch(alone: Exclusive<'_>, output: Pin, high: bool) {
+    if is_behind(output) {
+        return register::set(alone, output.bit, high);
     }
+    set(output, high);
+}
+
+/// Drives a pin of the chip high or low, by one write. Any level.
+pub(super) fn set(pin: Pin, high: bool) {
     let out = SIO.gpio_out(0);
     let one = if high { out.value_set() } else { out.value_clr() };
     one.write_value(1 << pin.bit);
@@ -118,15 +124,16 @@ fn drive(pin: Pin) {
 /// Makes the board's output pins outputs: drivers off, hazards off. The level that switches the spindle off is not
 /// known yet, so its enable pin is not driven before [`set_low`]; its pull-down stays on, as it is from the reset on, so
 /// that the pin does not float. An enable behind a register is low until then.
-pub(super) fn start() {
-    register::start();
+pub(super) fn start(boot: &Boot) {
+    register::start(boot);
+    let alone = boot.exclusive();
     let enables = ACTIVE.motors.iter().filter_map(|motor| motor.enable);
     enables.chain(ACTIVE.enable_all).for_each(|enable| {
-        set(enable, true);
+        switch(alone, enable, true);
         output(enable);
     });
     for hazard in ACTIVE.hazards {
-        set(*hazard, false);
+        switch(alone, *hazard, false);
         if ACTIVE.outputs[0] == Some(*hazard) && !is_behind(*hazard) {
             connect_output(*hazard, Unit::Cpu);
             PADS_BANK0.gpio(hazard.bit.into()).modify(|w| w.set_pde(true));
@@ -145,16 +152,16 @@ pub fn powered() -> u8 {
 }
 
 /// Switches the drivers of these motors (bits) on and the others off, as far as the board can: an enable that all
-/// drivers share is on as soon as one of them is wanted. Exec, or other levels while exec cannot run.
-pub fn power(motors: u8) {
+/// drivers share is on as soon as one of them is wanted.
+pub fn power(alone: Exclusive<'_>, motors: u8) {
     WANTED.set(motors);
     for (m, motor) in ACTIVE.motors.iter().enumerate() {
         if let Some(enable) = motor.enable {
-            set(enable, motors & 1 << m == 0);
+            switch(alone, enable, motors & 1 << m == 0);
         }
     }
     if let Some(enable) = ACTIVE.enable_all {
-        set(enable, motors == 0);
+        switch(alone, enable, motors == 0);
     }
 }
 
@@ -162,35 +169,35 @@ pub fn power(motors: u8) {
 static LOW: SharedByte = SharedByte::new(0);
 
 /// Switches the outputs of M3 to M9, bits of [`outputs`](crate::boards::outputs). While the spindle is off, its
-/// direction pin keeps its level. Exec, or other levels while exec cannot run.
-pub fn set_outputs(on: u8) {
+/// direction pin keeps its level.
+pub fn set_outputs(alone: Exclusive<'_>, on: u8) {
     let high = on ^ LOW.get();
     // The direction is set before the enable.
     for o in [1, 0, 2, 3] {
         if let Some(pin) = ACTIVE.outputs[o]
             && (1 << o != COUNTERCLOCKWISE || on & SPINDLE != 0)
         {
-            set(pin, high & (1 << o) != 0);
+            switch(alone, pin, high & (1 << o) != 0);
         }
     }
 }
 
-/// Sets which outputs are active low, and switches to the outputs `on`. The first call also begins to drive the
-/// enable of the spindle. Thread mode, while exec cannot run.
-pub fn set_low(outputs: u8, on: u8) {
+/// Sets which outputs are active low, and switches to the outputs `on`. The first call also begins to drive the enable
+/// of the spindle.
+pub fn set_low(alone: Exclusive<'_>, outputs: u8, on: u8) {
     LOW.set(outputs);
     if let Some(direction) = ACTIVE.outputs[1] {
-        set(direction, (on ^ outputs) & COUNTERCLOCKWISE != 0);
+        switch(alone, direction, (on ^ outputs) & COUNTERCLOCKWISE != 0);
     }
-    set_outputs(on);
+    set_outputs(alone, on);
     if let Some(enable) = ACTIVE.outputs[0] {
         drive(enable);
     }
 }
 
-/// Stops the spindle for good. Interrupts are off.
-pub(super) fn stop_spindle() {
+/// Stops the spindle for good.
+pub(super) fn stop_spindle(alone: Exclusive<'_>) {
     if let Some(enable) = ACTIVE.outputs[0] {
-        set(enable, LOW.get() & SPINDLE != 0);
+        switch(alone, enable, LOW.get() & SPINDLE != 0);
     }
 }

@@ -13,6 +13,7 @@ use embassy_rp::pac::ADC;
 
 use super::gpio;
 use crate::boards::{ACTIVE, Heaters};
+use crate::hal::{Boot, Thread};
 use crate::heat::sensor::SAMPLES;
 
 #[cfg(feature = "printer")]
@@ -30,16 +31,16 @@ const FINER: u32 = 2;
 
 static READING: AtomicU16 = AtomicU16::new(NONE);
 
-/// Connects the sensors. Start-up.
-pub(super) fn start() {
+/// Connects the sensors.
+pub(super) fn start(boot: &Boot) {
     let Some(Heaters { heaters, cooler, .. }) = ACTIVE.heaters else { return };
-    heaters.iter().for_each(|heater| gpio::sense(heater.channel));
+    heaters.iter().for_each(|heater| gpio::sense(boot, heater.channel));
     cooler.into_iter().for_each(gpio::output);
     ADC.cs().write(|w| w.set_en(true));
 }
 
-/// Takes a reading of a heater's sensor, and waits for it. Thread mode.
-pub fn begin(heater: u8) {
+/// Takes a reading of a heater's sensor, and waits for it.
+pub fn begin(_: Thread, heater: u8) {
     let Some(Heaters { heaters: [hot_end, bed], .. }) = ACTIVE.heaters else { return };
     let channel = if heater == 0 { hot_end.channel } else { bed.channel };
     ADC.cs().modify(|w| w.set_ainsel(channel));
@@ -57,24 +58,24 @@ fn convert() -> Option<u16> {
     is_ready().then(|| ADC.result().read().result())
 }
 
-/// Returns the last reading; `None` if the converter did not answer. Thread mode.
-pub fn reading() -> Option<u16> {
+/// Returns the last reading; `None` if the converter did not answer.
+pub fn reading(_: Thread) -> Option<u16> {
     Some(READING.load(Ordering::Relaxed)).filter(|reading| *reading != NONE)
 }
 
 /// Always `None`: these boards have no MAX6675.
-pub fn word(_: u8) -> Option<u16> {
+pub fn word(_: Thread, _: u8) -> Option<u16> {
     None
 }
 
-/// Switches both heaters off, until [`drive`] is called the next time: within 20 ms. Thread mode.
-pub(super) fn pause() {
+/// Switches both heaters off, until [`drive`] is called the next time: within 20 ms.
+pub(super) fn pause(_: Thread) {
     let Some(Heaters { heaters, .. }) = ACTIVE.heaters else { return };
     heaters.iter().for_each(|heater| gpio::set(heater.pin, false));
 }
 
-/// Switches the hot end, the bed and the fan: off at 0, else on. Thread mode.
-pub fn drive(power: [u8; 3]) {
+/// Switches the hot end, the bed and the fan: off at 0, else on.
+pub fn drive(_: Thread, power: [u8; 3]) {
     let Some(Heaters { heaters: [hot_end, bed], fan, .. }) = ACTIVE.heaters else { return };
     let [of_hot_end, of_bed, of_fan] = power.map(|power| power != 0);
     gpio::set(hot_end.pin, of_hot_end);
@@ -82,8 +83,8 @@ pub fn drive(power: [u8; 3]) {
     gpio::set(fan, of_fan);
 }
 
-/// Switches the fan of the heatbreak, if the board has one. Thread mode, and the panic handler.
-pub fn cool(on: bool) {
+/// Switches the fan of the heatbreak, if the board has one.
+pub fn cool(_: Thread, on: bool) {
     let cooler = ACTIVE.heaters.and_then(|heaters| heaters.cooler);
     cooler.into_iter().for_each(|pin| gpio::set(pin, on));
 }

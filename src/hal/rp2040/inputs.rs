@@ -21,6 +21,7 @@ use super::stepper::{self, Place};
 use super::{encoder, flags, gpio, mask};
 use crate::boards::{ACTIVE, inputs};
 use crate::hal::event::Event;
+use crate::hal::{Boot, Level, Thread};
 use crate::switches::{FIRST_US, LATER_US, Next, Switches};
 
 /// Time from the first of two samples to the second. A limit stops the steps within 10 us of its edge.
@@ -150,10 +151,10 @@ impl State {
     }
 }
 
-/// Sets up the pins and the interrupts. Start-up.
-pub(super) fn start() {
+/// Sets up the pins and the interrupts.
+pub(super) fn start(boot: &Boot) {
     ACTIVE.inputs.iter().flatten().for_each(|pin| gpio::pull_up(*pin));
-    encoder::start();
+    encoder::start(boot);
     let switches = ACTIVE.inputs.iter().flatten().fold(0u32, |bits, pin| bits | 1 << pin.bit);
     let own = switches & !encoder::watched();
     for group in 0..GROUPS {
@@ -244,8 +245,8 @@ fn sample(state: &mut State) {
     }
 }
 
-/// Sets which inputs are active low, and which inputs stop the steps. Thread mode.
-pub fn set_up(low: u16, stops: u16) {
+/// Sets which inputs are active low, and which inputs stop the steps.
+pub fn set_up(_: Thread, low: u16, stops: u16) {
     with(|state| {
         state.stops = stops;
         if core::mem::replace(&mut state.low, low) != low {
@@ -255,37 +256,37 @@ pub fn set_up(low: u16, stops: u16) {
     });
 }
 
-/// Gives the pins of these inputs to an encoder from now on. Thread mode.
-pub(super) fn leave_out(inputs: u16) {
+/// Gives the pins of these inputs to an encoder from now on.
+pub(super) fn leave_out(_: Thread, inputs: u16) {
     with(|state| {
         (state.used, state.fresh) = (!inputs, true);
         state.ask();
     });
 }
 
-/// Returns the inputs that are not read because an encoder uses their pins. Thread mode.
+/// Returns the inputs that are not read because an encoder uses their pins. Any level.
 pub fn left_out() -> u16 {
     with(|state| !state.used)
 }
 
-/// Sets the ends of axes that are ignored as limits for now, and with them the ends at the same pins. Thread mode.
-pub fn spare(ends: u8) {
+/// Sets the ends of axes that are ignored as limits for now, and with them the ends at the same pins.
+pub fn spare(_: Thread, ends: u8) {
     let ends = ACTIVE.ends_beside(ends);
     with(|state| state.spared = ends);
 }
 
 /// Arms the end of a move: the first input of `armed` whose state becomes that in `awaited` ends the move
-/// ([`contact`](crate::dda::contact)). 0 disarms. Thread mode.
-pub fn arm(armed: u16, awaited: u16) {
+/// ([`contact`](crate::dda::contact)). 0 disarms.
+pub fn arm(_: Thread, armed: u16, awaited: u16) {
     with(|state| (state.armed, state.awaited) = (armed, awaited));
 }
 
-/// Returns the inputs that are active. Thread mode.
-pub fn worked() -> u16 {
+/// Returns the inputs that are active.
+pub fn worked(_: Level) -> u16 {
     with(|state| state.switches.worked())
 }
 
-/// Takes the inputs that have stopped the steps since the last call. Thread mode.
-pub fn take_hits() -> u16 {
+/// Takes the inputs that have stopped the steps since the last call.
+pub fn take_hits(_: Thread) -> u16 {
     with(|state| core::mem::take(&mut state.hits))
 }

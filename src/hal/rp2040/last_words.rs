@@ -3,6 +3,7 @@
 //! RAM keeps its bytes over a reset by the button or the watchdog, but not without power. A mark and a checksum tell
 //! a message from what RAM contains at power-up. [`take`] returns the message once, as a line of JSON.
 
+use crate::hal::Exclusive;
 use core::cell::UnsafeCell;
 use core::fmt::{Display, Write};
 use core::mem::MaybeUninit;
@@ -52,8 +53,8 @@ fn sum(bytes: &[u8]) -> u32 {
     bytes.iter().fold(MARK, |sum, byte| sum.rotate_left(5) ^ u32::from(*byte))
 }
 
-/// Keeps a message in RAM. Interrupts are off, and stay so.
-pub(super) fn leave(message: &dyn Display) {
+/// Keeps a message in RAM. Nothing goes on after this.
+pub(super) fn leave(_: Exclusive<'_>, message: &dyn Display) {
     let mut cut = Cut(String::new());
     let _ = write!(cut, "{message}");
     let mut words = Words { mark: MARK, sum: 0, len: cut.0.len() as u32, bytes: [0; MOST] };
@@ -63,7 +64,7 @@ pub(super) fn leave(message: &dyn Display) {
     unsafe { PLACE.0.get().cast::<Words>().write_volatile(words) };
 }
 
-/// Takes the line with the message that was left; `None` if there is none. Start-up.
+/// Takes the line with the message that was left; `None` if there is none. USB's task calls it, once.
 pub(super) fn take() -> Option<String<LINE>> {
     let place = PLACE.0.get().cast::<Words>();
     // SAFETY: see `Place`; any bytes form a valid `Words`.

@@ -60,6 +60,7 @@ use embassy_rp::clocks::{ClockConfig, clk_sys_freq};
 use embassy_rp::interrupt::{InterruptExt, Priority, SWI_IRQ_1, TIMER_IRQ_0};
 
 use crate::boards::ACTIVE;
+use crate::hal::Boot;
 pub use crate::hal::{exec, flags};
 
 /// This chip, for the [contract](super::contract).
@@ -83,8 +84,8 @@ pub mod text_functions {
 }
 
 /// Sets up clocks, time and pins. First thing at start-up.
-pub fn begin() {
-    watchdog::begin();
+pub fn begin(boot: &Boot) {
+    watchdog::begin(boot);
     let mut config = embassy_rp::config::Config::default();
     if let Ok(clocks) = ClockConfig::system_freq(ACTIVE.clock_hz) {
         config.clocks = clocks;
@@ -94,19 +95,19 @@ pub fn begin() {
     if clk_sys_freq() != ACTIVE.clock_hz {
         panic::halt();
     }
-    vectors::move_to_ram();
+    vectors::move_to_ram(boot);
     SWI_IRQ_1.set_priority(Priority::P3);
     TIMER_IRQ_0.set_priority(Priority::P2);
-    gpio::start();
-    card::start();
-    inputs::start();
-    heaters::start();
-    drivers::start();
-    eeprom::start(peripherals.FLASH);
+    gpio::start(boot);
+    card::start(boot);
+    inputs::start(boot);
+    heaters::start(boot);
+    drivers::start(boot);
+    eeprom::start(boot, peripherals.FLASH);
 }
 
-/// Starts the tick and the watchdog. Interrupts are off.
-pub fn start() {
-    time::start();
+/// Starts the tick and the watchdog.
+pub fn start(boot: &Boot) {
+    time::start(boot);
     watchdog::start();
 }

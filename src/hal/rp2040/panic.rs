@@ -9,6 +9,7 @@ use cortex_m_rt::{ExceptionFrame, exception};
 
 use super::{gpio, heaters, last_words, pwm, stepper, watchdog};
 use crate::boards::ACTIVE;
+use crate::hal::{Exclusive, Thread};
 
 /// Stops the steps, switches drivers and hazardous outputs off, and never returns.
 pub fn halt() -> ! {
@@ -21,29 +22,32 @@ pub fn halt() -> ! {
 }
 
 /// Stops the steps, and switches drivers and hazardous outputs off. The fan of the heatbreak turns from then on, because
-/// the hot end may be hot. Interrupts are off.
-pub fn make_safe() {
+/// the hot end may be hot. Interrupts are off, and stay so.
+pub fn make_safe() -> Exclusive<'static> {
     stepper::kill();
     pwm::kill();
-    ACTIVE.hazards.iter().for_each(|hazard| gpio::set(*hazard, false));
-    gpio::stop_spindle();
-    gpio::power(0);
-    heaters::cool(true);
+    // SAFETY: interrupts are off, and nothing goes on after this.
+    let (thread, alone) = unsafe { (Thread::assume(), Exclusive::assume()) };
+    ACTIVE.hazards.iter().for_each(|hazard| gpio::switch(alone, *hazard, false));
+    gpio::stop_spindle(alone);
+    gpio::power(alone, 0);
+    heaters::cool(thread, true);
+    alone
 }
 
 // SAFETY: the handler of a fault ends all that runs, and its registers and the message are touched by nothing else
 // from then on.
 #[exception]
 unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
-    make_safe();
-    last_words::leave(&format_args!("fault at {:#x}", frame.pc()));
+    let alone = make_safe();
+    last_words::leave(alone, &format_args!("fault at {:#x}", frame.pc()));
     halt()
 }
 
 #[panic_handler]
 fn panic(info: &core::panic::PanicInfo) -> ! {
     cortex_m::interrupt::disable();
-    make_safe();
-    last_words::leave(info);
+    let alone = make_safe();
+    last_words::leave(alone, info);
     halt()
 }

@@ -10,6 +10,7 @@ use embassy_rp::pac::PWM;
 
 use super::gpio::{self, Unit};
 use crate::boards::ACTIVE;
+use crate::hal::Exclusive;
 use crate::spindle::WHOLE;
 
 /// The highest count.
@@ -32,7 +33,7 @@ fn divide(millihertz: u32) -> (u32, u32) {
 }
 
 /// Sets the frequency, in thousandths of a Hz. The share becomes 0 and has to be set again.
-pub fn set_frequency(millihertz: u32) {
+pub fn set_frequency(_: Exclusive<'_>, millihertz: u32) {
     let Some((pin, slice, _)) = place() else { return };
     let (sixteenths, top) = divide(millihertz);
     let channel = PWM.ch(slice);
@@ -55,7 +56,7 @@ pub fn set_frequency(millihertz: u32) {
 }
 
 /// Sets the share of the period for which the pin is high, in thousandths.
-pub fn set_share(share: f32) {
+pub fn set_share(_: Exclusive<'_>, share: f32) {
     let Some((_, slice, is_b)) = place() else { return };
     let channel = PWM.ch(slice);
     let top = channel.top().read().top();

@@ -18,6 +18,7 @@ use embassy_rp::pio::program::{Program, RP2040_MAX_PROGRAM_SIZE, pio_asm};
 
 use super::gpio::{self, Unit};
 use crate::boards::{ACTIVE, Pin, Port, ShiftRegister};
+use crate::hal::{Boot, Exclusive};
 
 /// The number of the state machine, of PIO1's four.
 const SM: usize = 0;
@@ -48,8 +49,8 @@ const fn enable(pin: Option<Pin>) -> u32 {
     }
 }
 
-/// Loads a program, which begins at address 0. Start-up.
-pub(super) fn load(pio: Pio, sm: usize, program: &Program<RP2040_MAX_PROGRAM_SIZE>) {
+/// Loads a program, which begins at address 0.
+pub(super) fn load(_: &Boot, pio: Pio, sm: usize, program: &Program<RP2040_MAX_PROGRAM_SIZE>) {
     for (i, instruction) in program.code.iter().enumerate() {
         pio.instr_mem(i).write(|w| w.set_instr_mem(*instruction));
     }
@@ -59,8 +60,8 @@ pub(super) fn load(pio: Pio, sm: usize, program: &Program<RP2040_MAX_PROGRAM_SIZ
     });
 }
 
-/// Has a state machine drive a pin low from now on. Start-up.
-pub(super) fn drive_low(pio: Pio, sm: usize, pin: Pin) {
+/// Has a state machine drive a pin low from now on.
+pub(super) fn drive_low(_: &Boot, pio: Pio, sm: usize, pin: Pin) {
     let sm = pio.sm(sm);
     sm.pinctrl().write(|w| {
         w.set_set_base(pin.bit);
@@ -73,10 +74,10 @@ pub(super) fn drive_low(pio: Pio, sm: usize, pin: Pin) {
 }
 
 /// Connects a chain to a state machine: data by `out pins`, clock and latch by side-set. Words are shifted out from the
-/// right; `jmp !osre` counts the outputs. Start-up.
-pub(super) fn connect(pio: Pio, sm: usize, chain: ShiftRegister, unit: Unit) {
+/// right; `jmp !osre` counts the outputs.
+pub(super) fn connect(boot: &Boot, pio: Pio, sm: usize, chain: ShiftRegister, unit: Unit) {
     for pin in [chain.data, chain.clock, chain.latch] {
-        drive_low(pio, sm, pin);
+        drive_low(boot, pio, sm, pin);
         gpio::connect_output(pin, unit);
     }
     let sm = pio.sm(sm);
@@ -93,8 +94,8 @@ pub(super) fn connect(pio: Pio, sm: usize, chain: ShiftRegister, unit: Unit) {
     });
 }
 
-/// Starts the state machine of the outputs, which are off. Start-up.
-pub(super) fn start() {
+/// Starts the state machine of the outputs, which are off.
+pub(super) fn start(boot: &Boot) {
     let Some(registers) = ACTIVE.registers else { return };
     let program = pio_asm!(
         ".origin 0",
@@ -108,16 +109,16 @@ pub(super) fn start() {
         ".wrap",
     );
     PIO1.sm(SM).clkdiv().write(|w| w.set_int(1));
-    load(PIO1, SM, &program.program);
-    connect(PIO1, SM, registers.outputs, Unit::Pio1);
+    load(boot, PIO1, SM, &program.program);
+    connect(boot, PIO1, SM, registers.outputs, Unit::Pio1);
     // Eight words.
     PIO1.sm(SM).shiftctrl().modify(|w| w.set_fjoin_tx(true));
     PIO1.ctrl().write(|w| w.set_sm_enable(1 << SM));
     send(SAFE);
 }
 
-/// Drives an output high or low. Exec, or other levels while exec cannot run.
-pub(super) fn set(output: u8, high: bool) {
+/// Drives an output high or low.
+pub(super) fn set(_: Exclusive<'_>, output: u8, high: bool) {
     let levels = LEVELS.load(Relaxed) & !(1 << output) | u32::from(high) << output;
     LEVELS.store(levels, Relaxed);
     send(levels);

@@ -8,6 +8,7 @@ use cortex_m::peripheral::scb::SystemHandler;
 use cortex_m::peripheral::syst::SystClkSource;
 
 use crate::boards::ACTIVE;
+use crate::hal::Boot;
 use crate::hal::event::Event;
 use crate::hal::flags;
 
@@ -16,8 +17,8 @@ static MILLIS: AtomicU32 = AtomicU32::new(0);
 /// Priority 1, in the two highest bits.
 const PRIORITY: u8 = 1 << 6;
 
-/// Starts the count. Start-up.
-pub(super) fn start() {
+/// Starts the count.
+pub(super) fn start(_: &Boot) {
     // Nobody has taken them before.
     let Some(mut core) = cortex_m::Peripherals::take() else { return };
     // SAFETY: start-up.

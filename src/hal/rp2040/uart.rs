@@ -33,6 +33,7 @@ use crate::hal::serial::{
     self, AUX, AUX_RING, AllEnds, CLOSE, CUT, Ends, Flow, GO, LATE, LINE_END, MARKS, PORTS,
     RX_RING, STRAY, TX_RING, USB, XOFF, XON, batch, hardware, last_mark, lose, mark, wait_ms,
 };
+use crate::hal::{Boot, Interrupt, Level, Thread};
 use crate::realtime::{self, Asked};
 
 /// The filling end of a receive ring.
@@ -274,15 +275,15 @@ fn registers(port: u8) -> Option<Registers> {
     }
 }
 
-/// Starts the lines, 8N1: the first at `rate` bits a second, the second at the board's rate. Start-up; `None` after
-/// the first time.
-pub fn start(rate: u32) -> Option<AllEnds> {
+/// Starts the lines, 8N1: the first at `rate` bits a second, the second at the board's rate. `None` after the first
+/// time.
+pub fn start(thread: Thread, boot: &Boot, rate: u32) -> Option<AllEnds> {
     let usb = split(USB, &USB_RX, &USB_TX, Filling::Usb)?;
-    begin(USB, rate);
+    begin(thread, boot, USB, rate);
     let aux = match hardware(AUX) {
         Some(board) => {
             let ends = split(AUX, &AUX_RX, &AUX_TX, Filling::Aux)?;
-            begin(AUX, board.rate);
+            begin(thread, boot, AUX, board.rate);
             Some(ends)
         }
         None => None,
@@ -302,13 +303,13 @@ fn split<const N: usize>(
     Some((rx_out.into_view(), tx_in))
 }
 
-fn begin(port: u8, rate: u32) {
-    let Some(uart) = registers(port) else { return usb::start() };
+fn begin(thread: Thread, boot: &Boot, port: u8, rate: u32) {
+    let Some(uart) = registers(port) else { return usb::start(boot) };
     if let Some([rx, tx]) = hardware(port).and_then(|serial| serial.line()) {
         gpio::connect_pulled(rx, Unit::Uart);
         gpio::connect(tx, Unit::Uart);
     }
-    set_rate(port, rate);
+    set_rate(thread, port, rate);
     uart.uartcr().write(|w| {
         w.set_uarten(true);
         w.set_txe(true);
@@ -325,9 +326,8 @@ fn begin(port: u8, rate: u32) {
     unsafe { interrupt.enable() };
 }
 
-/// Changes the rate to `rate` bits a second. A byte that is on the line at that moment, in either direction, is
-/// spoilt. Thread mode.
-pub fn set_rate(port: u8, rate: u32) {
+/// Changes the rate to `rate` bits a second. A byte that is on the line at that moment, in either direction, is spoilt.
+pub fn set_rate(_: Thread, port: u8, rate: u32) {
     // The divisor in 64ths, rounded.
     let divisor = (ACTIVE.clock_hz * 8 / rate.max(1)).div_ceil(2);
     let Some(uart) = registers(port) else { return };
@@ -603,8 +603,8 @@ impl Line {
     }
 }
 
-/// Starts sending what the ring holds. Thread mode, or exec on a port that is no bus.
-pub fn kick(port: u8) {
+/// Starts sending what the ring holds. Exec calls it only on a port that is no bus.
+pub fn kick(_: Level, port: u8) {
     let Some(uart) = registers(port) else { return usb::kick() };
     if with(port, |line| line.send(uart)) {
         flags::set(Event::Transmitted);
@@ -612,8 +612,8 @@ pub fn kick(port: u8) {
 }
 
 /// Stops the sender or lets it go on, by the flow control that the two sides have agreed on. If `waits`, XOFF or XON
-/// may wait for the end of a line. Thread mode.
-pub fn stop_sender(port: u8, flow: Flow, stop: bool, waits: bool) {
+/// may wait for the end of a line.
+pub fn stop_sender(thread: Thread, port: u8, flow: Flow, stop: bool, waits: bool) {
     // USB needs no flow control here: it holds the computer back by itself.
     if flow == Flow::Characters && registers(port).is_some() {
         with(port, |line| {
@@ -622,17 +622,17 @@ pub fn stop_sender(port: u8, flow: Flow, stop: bool, waits: bool) {
             line.wait_ms =
                 if waits { wait_ms(port, (2_000_000 / line.rate.max(1)) as u8) } else { 0 };
         });
-        kick(port);
+        kick(thread.level(), port);
     }
 }
 
 /// Whether XOFF has stopped the sender, sent by thread mode or by [`stop_late`].
-pub fn is_stopped(port: u8) -> bool {
+pub fn is_stopped(_: Thread, port: u8) -> bool {
     with(port, |line| line.stopped)
 }
 
-/// Stops the sender of the second port by XOFF if its receive ring fills while thread mode has no turn. Exec.
-pub fn stop_late() {
+/// Stops the sender of the second port by XOFF if its receive ring fills while thread mode has no turn.
+pub fn stop_late(exec: Interrupt) {
     if PORTS < 2 || AUX_RX.used() < LATE {
         return;
     }
@@ -645,12 +645,12 @@ pub fn stop_late() {
         stops
     });
     if stops {
-        kick(AUX);
+        kick(exec.level(), AUX);
     }
 }
 
-/// Sets whether `!`, `~`, `%` and bytes above 0x7F are plain text from now on. Thread mode.
-pub fn set_plain(port: u8, plain: bool) {
+/// Sets whether `!`, `~`, `%` and bytes above 0x7F are plain text from now on.
+pub fn set_plain(_: Thread, port: u8, plain: bool) {
     with(port, |line| line.plain = plain);
 }
 
@@ -684,8 +684,8 @@ pub(super) fn close() {
     with(USB, Line::close);
 }
 
-/// Queues bytes that have come by USB when there was no room. Thread mode, each turn.
-pub fn go_on() {
+/// Queues bytes that have come by USB when there was no room. Called in each turn of the main loop.
+pub fn go_on(_: Thread) {
     for _ in 0..PACKET / AT_ONCE {
         match with(USB, Line::go_on) {
             Some(true) => {}
@@ -700,18 +700,18 @@ pub fn sees_opening() -> bool {
     registers(USB).is_none()
 }
 
-/// Whether a program, not the first, has opened USB since the last call. Thread mode.
-pub fn take_opened() -> bool {
-    usb::take_opened()
+/// Whether a program, not the first, has opened USB since the last call.
+pub fn take_opened(thread: Thread) -> bool {
+    usb::take_opened(thread)
 }
 
-/// How often USB has been restarted since the start, because it hung; 255 for more. Thread mode.
-pub fn restarts() -> u8 {
+/// How often USB has been restarted since the start, because it hung; 255 for more.
+pub fn restarts(_: Thread) -> u8 {
     usb::restarts()
 }
 
-/// In how many milliseconds USB has seen errors of its bus since the start, modulo 2^16. Thread mode.
-pub fn bus_errors() -> u16 {
+/// In how many milliseconds USB has seen errors of its bus since the start, modulo 2^16.
+pub fn bus_errors(_: Thread) -> u16 {
     usb::bus_errors()
 }
 
@@ -743,28 +743,28 @@ pub(super) fn is_due() -> bool {
     used >= PACKET - 1 || used > 0 && USB_RX.used() == 0
 }
 
-/// Sets how the other side may stop this port's transmitter from now on. Thread mode.
-pub fn set_flow(port: u8, flow: Flow) {
+/// Sets how the other side may stop this port's transmitter from now on.
+pub fn set_flow(thread: Thread, port: u8, flow: Flow) {
     with(port, |line| {
         line.heeds_xoff = flow == Flow::Characters;
         line.held &= line.heeds_xoff;
     });
-    kick(port);
+    kick(thread.level(), port);
 }
 
-/// Sends XOFF or XON that has waited long enough; also gives [`eeprom`] and [`drivers`] their turns. Thread mode,
-/// each millisecond.
-pub fn look() {
+/// Sends XOFF or XON that has waited long enough; also gives [`eeprom`] and [`drivers`] their turns. Called each
+/// millisecond.
+pub fn look(thread: Thread) {
     for port in 0..PORTS as u8 {
         with(port, |line| line.wait_ms = line.wait_ms.saturating_sub(1));
         if port == USB && registers(port).is_none() {
             usb::flush();
-            usb::look();
+            usb::look(thread);
         }
-        kick(port);
+        kick(thread.level(), port);
     }
-    eeprom::look();
-    drivers::look(time::millis());
+    eeprom::look(thread);
+    drivers::look(thread, time::millis());
 }
 
 /// Returns the millisecond in which the last byte came, on any port.
@@ -774,41 +774,40 @@ pub(super) fn heard_at() -> u32 {
     now.wrapping_sub(ages.min().unwrap_or(0))
 }
 
-/// Returns how many line ends have been lost since start-up, modulo 2^16. Thread mode.
-pub fn lost_ends(port: u8) -> u16 {
+/// Returns how many line ends have been lost since start-up, modulo 2^16.
+pub fn lost_ends(_: Thread, port: u8) -> u16 {
     with(port, |line| line.lost_ends)
 }
 
 /// Returns how many bytes may come before one is lost, at most 254: one less than the receive ring has room for.
-/// Thread mode.
-pub fn room(port: u8) -> u8 {
+pub fn room(_: Thread, port: u8) -> u8 {
     let used = if port == AUX { AUX_RX.used() } else { USB_RX.used() };
     serial::capacity(port).saturating_sub(used as u8)
 }
 
-/// Whether half of the second port's receive ring is full. Thread mode.
-pub fn presses() -> bool {
+/// Whether half of the second port's receive ring is full.
+pub fn presses(_: Thread) -> bool {
     PORTS > 1 && AUX_RX.used() >= AUX_RING / 2
 }
 
 /// Whether the reader has to have its turn before the next waiting line is carried out: see [`serial::calls_reader`].
-/// On the second port any waiting byte is a reason. Thread mode.
-pub fn calls_reader() -> bool {
+/// On the second port any waiting byte is a reason.
+pub fn calls_reader(_: Thread) -> bool {
     // SAFETY: the reader does not run meanwhile.
     let ring = unsafe { USB_RX.window() };
     PORTS > 1 && AUX_RX.used() > 0 || serial::calls_reader(&ring)
 }
 
-/// Returns the slot of the receive ring that holds the newest byte; `None` if that byte has been read. Thread mode.
-pub fn newest(port: u8) -> Option<u8> {
+/// Returns the slot of the receive ring that holds the newest byte; `None` if that byte has been read.
+pub fn newest(_: Thread, port: u8) -> Option<u8> {
     match port {
         AUX => AUX_RX.newest(),
         _ => USB_RX.newest(),
     }
 }
 
-/// Returns the slot of the mark that stands for the last `%` or `^d`; `None` if no such mark waits. Thread mode.
-pub fn last_cut(port: u8) -> Option<u8> {
+/// Returns the slot of the mark that stands for the last `%` or `^d`; `None` if no such mark waits.
+pub fn last_cut(_: Thread, port: u8) -> Option<u8> {
     // SAFETY: the reader does not run meanwhile.
     let ring = unsafe { if port == AUX { AUX_RX.window() } else { USB_RX.window() } };
     last_mark(&ring)
@@ -820,8 +819,7 @@ pub fn asks_hold() -> bool {
 }
 
 /// Takes override requests that characters have made since the last call; if there are more, an event announces them.
-/// Thread mode.
-pub fn take_asked(port: u8) -> Asked {
+pub fn take_asked(_: Thread, port: u8) -> Asked {
     let (asked, more) = with(port, |line| (line.asked.pop_front(), !line.asked.is_empty()));
     if more {
         flags::set(Event::Realtime);
@@ -829,8 +827,8 @@ pub fn take_asked(port: u8) -> Asked {
     asked.unwrap_or(Asked::NOTHING)
 }
 
-/// Takes the real-time characters since the last call, as bits (see [`realtime`]). Thread mode.
-pub fn take_realtime(port: u8) -> u8 {
+/// Takes the real-time characters since the last call, as bits (see [`realtime`]).
+pub fn take_realtime(_: Thread, port: u8) -> u8 {
     with(port, |line| core::mem::take(&mut line.realtime))
 }
 

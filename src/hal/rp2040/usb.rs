@@ -35,6 +35,7 @@ use static_cell::StaticCell;
 use super::{flags, last_words, uart};
 use crate::boards::ACTIVE;
 use crate::hal::event::Event;
+use crate::hal::{Boot, Thread};
 
 /// The longest packet of a full-speed bus.
 pub(super) const PACKET: usize = 64;
@@ -89,8 +90,8 @@ fn set_asleep(asleep: bool) {
     NEWS.signal(());
 }
 
-/// Starts the tasks of USB; the computer notices the device. Start-up.
-pub(super) fn start() {
+/// Starts the tasks of USB; the computer notices the device.
+pub(super) fn start(boot: &Boot) {
     static DESCRIPTORS: StaticCell<[u8; 256]> = StaticCell::new();
     static BOS: StaticCell<[u8; 64]> = StaticCell::new();
     static MICROSOFT: StaticCell<[u8; 64]> = StaticCell::new();
@@ -114,7 +115,7 @@ pub(super) fn start() {
     builder.handler(SLEEP.init(Sleep));
     let class = CdcAcmClass::new(&mut builder, STATE.init(State::new()), PACKET as u16);
     let (sender, receiver, control) = class.split_with_control();
-    let requests = restart::Requests::new(&mut builder);
+    let requests = restart::Requests::new(boot, &mut builder);
     builder.handler(RESTARTS.init(requests));
     let device = builder.build();
     interrupt::SWI_IRQ_2.set_priority(Priority::P2);
@@ -131,8 +132,8 @@ pub(super) fn start() {
     });
 }
 
-/// Whether a program, not the first, has opened the port since the last call. Thread mode.
-pub(super) fn take_opened() -> bool {
+/// Whether a program, not the first, has opened the port since the last call.
+pub(super) fn take_opened(_: Thread) -> bool {
     // If another opening comes in between, this greeting serves both.
     take(&OPENED)
 }
@@ -161,10 +162,10 @@ pub(super) fn flush() {
     }
 }
 
-/// Looks after the controller and after requests of the computer. Thread mode, each millisecond.
-pub(super) fn look() {
-    watch::look();
-    restart::look();
+/// Looks after the controller and after requests of the computer. Called each millisecond.
+pub(super) fn look(thread: Thread) {
+    watch::look(thread);
+    restart::look(thread);
 }
 
 #[embassy_executor::task]

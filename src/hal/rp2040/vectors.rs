@@ -3,6 +3,7 @@
 //! The handler of `embassy-rp` for edges wakes tasks. A limit switch has to stop the steps within 10 us, whatever
 //! tasks do, so our own handler replaces it.
 
+use crate::hal::Boot;
 use core::cell::UnsafeCell;
 
 use embassy_rp::interrupt::IO_IRQ_BANK0;
@@ -24,8 +25,8 @@ static TABLE: Table = Table(UnsafeCell::new([0; EXCEPTIONS + INTERRUPTS]));
 /// The register with the address of the table.
 const VTOR: *mut u32 = 0xE000_ED08 as *mut u32;
 
-/// Copies the table to RAM, and has the CPU use the copy. Start-up.
-pub(super) fn move_to_ram() {
+/// Copies the table to RAM, and has the CPU use the copy.
+pub(super) fn move_to_ram(_: &Boot) {
     let edges = EXCEPTIONS + IO_IRQ_BANK0 as usize;
     // SAFETY: this runs before any handler of ours is enabled. VTOR points to the table at the beginning of the
     // image, which has as many words.

@@ -10,6 +10,7 @@ use embassy_rp::pac::watchdog::regs::Load;
 use embassy_rp::pac::{PSM, VREG_AND_CHIP_RESET, WATCHDOG};
 
 use crate::hal::resets::{self, Cause, Mark};
+use crate::hal::{Boot, Thread};
 
 /// 0.5 s. The counter goes down twice a microsecond (erratum E1).
 const TIME_US: u32 = 500_000;
@@ -35,7 +36,7 @@ fn left() -> Mark {
 /// Stores the cause of the reset. First thing at start-up.
 ///
 /// The boot loader in ROM starts a new image by the watchdog, too. Only a mark of this firmware makes a fault of it.
-pub(super) fn begin() {
+pub(super) fn begin(_: &Boot) {
     off();
     let reason = WATCHDOG.reason().read();
     let chip = VREG_AND_CHIP_RESET.chip_reset().read();
@@ -61,7 +62,7 @@ pub(super) fn start() {
     WATCHDOG.ctrl().modify(|w| w.set_enable(true));
 }
 
-/// Restarts the time of the watchdog. Thread mode, and exec.
+/// Restarts the time of the watchdog. Any level.
 pub fn feed() {
     WATCHDOG.load().write_value(Load(2 * TIME_US));
 }
@@ -72,7 +73,7 @@ pub(super) fn off() {
 }
 
 /// Restarts the firmware, as if the reset button had been pressed.
-pub fn reset() -> ! {
+pub fn reset(_: Thread) -> ! {
     cortex_m::interrupt::disable();
     super::panic::make_safe();
     super::uart::end_lines();
@@ -85,7 +86,7 @@ pub fn reset() -> ! {
 }
 
 /// Starts the boot loader in ROM, which appears as a drive that takes a new image.
-pub fn boot() -> ! {
+pub fn boot(_: Thread) -> ! {
     cortex_m::interrupt::disable();
     super::panic::make_safe();
     off();

@@ -3,6 +3,7 @@
 
 use super::block::{is_free, run_block};
 use super::{Line, Session};
+use crate::hal::Thread;
 use crate::hal::event::{Event, is_unheard};
 use crate::hal::flags;
 use crate::hal::serial::USB;
@@ -111,9 +112,9 @@ fn has_left(links: &Links, tx: &mut Tx, since: &mut Option<u16>) -> bool {
     }
     if let Some(boot) = links.restart.take() {
         if boot {
-            system::boot()
+            system::boot(links.thread)
         } else {
-            system::reset()
+            system::reset(links.thread)
         };
     }
     if let Some(rate) = links.rate.take() {
@@ -186,7 +187,8 @@ impl Answer {
             }
             if !tx.has_room()
                 || (begun && self.request.is_list() && !tx.is_low())
-                || (done > 0 && (awaited || gives_way(if asks { 1 } else { done }, since)))
+                || (done > 0
+                    && (awaited || gives_way(links.thread, if asks { 1 } else { done }, since)))
             {
                 break;
             }
@@ -219,9 +221,9 @@ impl Answer {
 /// Whether other tasks get a turn before a response continues. The turn has made `done` steps and began at `since`, ms.
 #[inline(never)]
 #[small]
-fn gives_way(done: u8, since: u32) -> bool {
+fn gives_way(thread: Thread, done: u8, since: u32) -> bool {
     let late = || done >= STEPS_LATE && flags::has(Event::Tick);
-    uart::presses() || is_unheard() || late() || millis().wrapping_sub(since) >= TURN_MS
+    uart::presses(thread) || is_unheard() || late() || millis().wrapping_sub(since) >= TURN_MS
 }
 
 /// Whether there is room for the first part of an answer. `None` while another task has the transmitter; the parser is

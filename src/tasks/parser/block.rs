@@ -6,6 +6,7 @@ use super::answer::has_room;
 #[cfg(feature = "card-write")]
 use crate::card;
 use crate::gcode::command::Stop;
+use crate::hal::Thread;
 use crate::hal::eeprom::Eeprom;
 use crate::jobs::Job;
 use crate::machine::alarm::is_program_end;
@@ -51,7 +52,7 @@ pub(super) fn job_line(links: &Links) {
     let mut job = links.job.get();
     let mut line = Vec::new();
     let startup = job.startup();
-    if !job.next_line(&Eeprom::take(), &mut line) {
+    if !job.next_line(&Eeprom::of(links.thread), &mut line) {
         job.end();
     } else {
         match interpret(links, &line, false).0 {
@@ -182,8 +183,8 @@ pub(super) fn is_working(links: &Links) -> bool {
 /// Begins a jog of G-code, or ends it because other G-code follows.
 #[cold]
 #[inline(never)]
-fn enter(jogs: bool) {
-    machine::carry_out(if jogs { machine::Event::Jog } else { machine::Event::Done });
+fn enter(thread: Thread, jogs: bool) {
+    machine::carry_out(thread, if jogs { machine::Event::Jog } else { machine::Event::Done });
 }
 
 /// Interprets a block and hands its commands to the planner, except in check mode. Returns also whether the block may
@@ -217,7 +218,7 @@ fn carry_out(links: &Links, block: &[u8], declined: bool) -> (Status, bool) {
             if !commands.is_empty() && !machine::is_checking() {
                 links.last.set(Last::of(&commands));
                 if words.is_some() != jogs {
-                    enter(words.is_some());
+                    enter(links.thread, words.is_some());
                 }
                 links.commands_taken.set(true);
                 links.planner_wake.signal();

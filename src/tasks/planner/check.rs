@@ -25,7 +25,7 @@ impl Planner {
 
     /// Ends check mode, for a reset.
     pub(super) fn stop_checks(&mut self) {
-        machine::carry_out(machine::Event::Done);
+        machine::carry_out(self.links.thread, machine::Event::Done);
         self.check();
     }
 

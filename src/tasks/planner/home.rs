@@ -200,7 +200,7 @@ impl Planner {
             self.begin_axis(at, &homing);
         }
         let (own, second) = (homing.switch(), at.second.map_or(0, Second::switch));
-        let closed = inputs::worked() & (own | second);
+        let closed = inputs::worked(self.links.thread.level()) & (own | second);
         self.fix_search(at.axis);
         if self.homes_by_stall(at.axis) {
             at.pass_stall(closed)?;
@@ -317,7 +317,7 @@ impl Planner {
 
     /// Begins with an axis. The axis is not homed any more, unless its position is to stay.
     fn begin_axis(&mut self, at: &Progress, homing: &Homing) {
-        inputs::spare(homing.ends() | at.second.map_or(0, Second::ends));
+        inputs::spare(self.links.thread, homing.ends() | at.second.map_or(0, Second::ends));
         if self.homed_by_line().1 {
             #[cfg(feature = "bed-plane")]
             self.follow_bed(false);
@@ -368,7 +368,7 @@ impl Planner {
     fn end_homing(&mut self, at: &Progress, failure: Option<Status>) {
         let links = self.links;
         overrides::fix_feed(links.thread, false);
-        inputs::spare(0);
+        inputs::spare(self.links.thread, 0);
         let mut model = links.model.borrow_mut();
         // In a flush, the position is not known yet.
         if !self.is_flushed() {

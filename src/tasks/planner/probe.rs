@@ -70,7 +70,7 @@ impl Planner {
             MotionMode::ProbeAway | MotionMode::ProbeAwayQuietly => 0,
             _ => SWITCH,
         };
-        if inputs::worked() & SWITCH == awaited {
+        if inputs::worked(self.links.thread.level()) & SWITCH == awaited {
             drop(commands);
             // The model is at the end of the line, but the machine is not.
             links.set_position(&self.position);

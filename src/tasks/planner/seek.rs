@@ -41,7 +41,7 @@ pub(super) enum Sought {
 
 /// Makes exec drop its blocks as soon as it is at a standstill, and waits for that.
 pub(super) fn drop_blocks(thread: Thread) -> impl Future<Output = ()> {
-    machine::drop_blocks();
+    machine::drop_blocks(thread);
     wait(thread, Event::BlockDone, || machine::has_dropped_blocks().then_some(()))
 }
 
@@ -61,8 +61,8 @@ impl Planner {
     /// Begins a move that ends at the first of the inputs `armed` (bits) that becomes as in `awaited`. Nothing may be
     /// queued yet. [`Planner::sought`] is to be called next.
     pub(super) fn seek(&mut self, target: &PerAxis<Length>, feed: Feed, armed: u16, awaited: u16) {
-        contact::clear();
-        inputs::arm(armed, awaited);
+        contact::clear(self.links.thread);
+        inputs::arm(self.links.thread, armed, awaited);
         self.straight(target, Some(feed));
     }
 
@@ -84,15 +84,15 @@ impl Planner {
             (queue::used() == 0 || self.is_over()).then_some(())
         })
         .await;
-        inputs::arm(0, 0);
+        inputs::arm(self.links.thread, 0, 0);
         self.begun = Begun::Nothing;
         if !contact::is_noted() || self.is_flushed() {
-            contact::clear();
+            contact::clear(self.links.thread);
             return if self.is_flushed() { Sought::Flushed } else { Sought::End };
         }
         drop_blocks(self.links.thread).await;
         let motion = common::snapshot(self.links.thread);
-        let steps = contact::take(&motion.target);
+        let steps = contact::take(self.links.thread, &motion.target);
         self.relocate(&motion);
         steps.map_or(Sought::End, Sought::Contact)
     }

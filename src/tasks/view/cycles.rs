@@ -28,7 +28,7 @@ pub(super) fn start_job(view: &mut View<'_>, number: u8) -> Status {
     if !job.is_none() && view.is_busy() {
         return Status::NotAccepted;
     }
-    if number == STORED && !program::is_whole(&Eeprom::take()) {
+    if number == STORED && !program::is_whole(&Eeprom::of(view.links.thread)) {
         return Status::Error;
     }
     view.links.job.set(job);

@@ -102,7 +102,8 @@ pub(super) fn recall(view: &mut View<'_>) -> Status {
     let storage = view.links.storage;
     view.links.changes.note(Changes::STEPS | Changes::SETTINGS);
     if let Some(setting) = storage.take_lent() {
-        view.settings.store(setting, kept::value(&storage.log(), &Eeprom::take(), setting));
+        view.settings
+            .store(setting, kept::value(&storage.log(), &Eeprom::of(view.links.thread), setting));
         return Status::Again;
     }
     set_hardware(view.links.thread, &view.settings);

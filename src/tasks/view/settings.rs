@@ -95,7 +95,11 @@ pub(super) fn set(view: &mut View<'_>, setting: Setting, value: i32) -> Result<W
 /// Whether many settings may change at once. They may not while the emergency stop is hit, because its input may be off
 /// then.
 fn may_replace(view: &View<'_>) -> Result<(), Status> {
-    if switches::is_stopped(&view.settings) { Err(Status::ShutDown) } else { Ok(()) }
+    if switches::is_stopped(view.links.thread, &view.settings) {
+        Err(Status::ShutDown)
+    } else {
+        Ok(())
+    }
 }
 
 /// Sets all settings to their defaults. With `offsets`, the coordinate systems are stored as 0 with them.

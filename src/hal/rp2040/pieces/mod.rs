@@ -51,7 +51,7 @@ impl<F: MultiwriteNorFlash> Pieces<F> {
         Self { bytes: [0xFF; BYTES], map: None, waiting: None, lost: false, sure: false }
     }
 
-    /// Reads the bytes. They are in the sectors of `place`; the sector before it is for notes. Start-up. 0.1 s; up to
+    /// Reads the bytes. They are in the sectors of `place`; the sector before it is for notes. Takes 0.1 s; up to
     /// some seconds if the map is damaged.
     pub fn start(&mut self, flash: F, place: Range<u32>) {
         let base = place.start.saturating_sub(F::ERASE_SIZE as u32);

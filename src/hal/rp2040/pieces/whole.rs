@@ -39,7 +39,7 @@ impl<F: MultiwriteNorFlash> Whole<F> {
         Self { flash, base, has_erased: false }
     }
 
-    /// Erases what was to be erased when power failed. Start-up, before the flash is used. Returns whether all was
+    /// Erases what was to be erased when power failed. Call it before the flash is used. Returns whether all was
     /// being written anew: then some of it may be missing.
     pub async fn finish(&mut self) -> Result<bool, F::Error> {
         let (mut is_anew, mut is_damaged) = (false, false);

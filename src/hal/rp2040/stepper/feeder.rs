@@ -16,6 +16,7 @@ use super::words::{CYCLES_PER_COUNT, OF_A_SEGMENT, OF_THE_END, Out, Writer};
 use super::{BEGINS, CHUNK_CYCLES, INVERTED, PULSE_US, RING, RUNNING, STOPPED, exec, mask};
 use crate::boards::MOTORS;
 use crate::dda::{Dda, SEGMENTS, Segment, contact};
+use crate::hal::Boot;
 use crate::hal::event::Event;
 use crate::hal::flags;
 use crate::hal::ring::Consumer;
@@ -59,12 +60,12 @@ pub(super) static FEEDER: Shared = Shared {
     contact: Cell::new(None),
 };
 
-/// Takes the reading end of the segment ring. Start-up.
-pub(super) fn start(segments: Consumer<Segment, SEGMENTS>) {
+/// Takes the reading end of the segment ring.
+pub(super) fn start(_: &Boot, segments: Consumer<Segment, SEGMENTS>) {
     alone(|feeder| feeder.segments = Some(segments));
 }
 
-/// Runs `act` on the feeder while its handlers cannot run. Thread mode, exec, and start-up.
+/// Runs `act` on the feeder while its handlers cannot run. Any level but theirs.
 pub(super) fn alone<R>(act: impl FnOnce(&mut Feeder) -> R) -> R {
     let was = interrupt::DMA_IRQ_0.is_enabled();
     interrupt::DMA_IRQ_0.disable();
@@ -112,11 +113,6 @@ fn turn() {
 }
 
 impl Feeder {
-    /// Returns the generator.
-    pub(super) fn dda(&self) -> &Dda {
-        &self.dda
-    }
-
     fn begin(&mut self) {
         self.writer.set_inverted(INVERTED.load(Relaxed));
         self.writer.set_pulse(PULSE_US.load(Relaxed) as u8);

@@ -14,6 +14,7 @@ use super::program::{self, Layout};
 use super::words::{CHANGES, Count, Entry, List, Wiring};
 use super::{CHUNK, CHUNKS, INVERTED, STOPPED, gpio, mask, register};
 use crate::boards::{ACTIVE, MOTORS, Port};
+use crate::hal::Boot;
 
 /// The number of the state machine, of four.
 const SM: usize = 0;
@@ -90,18 +91,18 @@ fn length(chunk: u32) -> u32 {
     LENGTHS[chunk as usize % CHUNKS].load(Relaxed)
 }
 
-/// Connects the pins and loads the program. Start-up.
-pub(super) fn start() {
+/// Connects the pins and loads the program.
+pub(super) fn start(boot: &Boot) {
     let sm = PIO0.sm(SM);
     sm.clkdiv().write(|w| w.set_int(1));
     if let Some(registers) = ACTIVE.registers {
-        register::load(PIO0, SM, &program::shifted());
-        register::connect(PIO0, SM, registers.steps, gpio::Unit::Pio0);
+        register::load(boot, PIO0, SM, &program::shifted());
+        register::connect(boot, PIO0, SM, registers.steps, gpio::Unit::Pio0);
         // The register has anything at power-up, and keeps what it has over a reset.
         show(0);
     } else {
-        register::load(PIO0, SM, &program::direct());
-        connect_motors();
+        register::load(boot, PIO0, SM, &program::direct());
+        connect_motors(boot);
     }
     PIO0.irqs(0).inte().write(|w| w.set_sm0(true));
     DMA.inte(0).write_value(0b11);
@@ -113,7 +114,7 @@ pub(super) fn start() {
 }
 
 /// Makes the motors' pins outputs of the state machine.
-fn connect_motors() {
+fn connect_motors(boot: &Boot) {
     let sm = PIO0.sm(SM);
     sm.shiftctrl().write(|w| {
         w.set_out_shiftdir(true);
@@ -121,7 +122,7 @@ fn connect_motors() {
     });
     for motor in ACTIVE.motors {
         for pin in [motor.step, motor.dir] {
-            register::drive_low(PIO0, SM, pin);
+            register::drive_low(boot, PIO0, SM, pin);
             gpio::connect_output(pin, gpio::Unit::Pio0);
         }
     }

@@ -30,9 +30,10 @@ use embassy_rp::interrupt::{DMA_IRQ_0, InterruptExt};
 
 use super::{exec, gpio, mask, register};
 use crate::boards::{ACTIVE, MOTORS};
-use crate::dda::{Dda, SEGMENTS, Segment};
+use crate::dda::{SEGMENTS, Segment};
 use crate::hal::ring::Ring;
 use crate::hal::segments::Segments;
+use crate::hal::{Boot, Interrupt, Thread};
 use feeder::FEEDER;
 use machine::WIRING;
 pub use machine::{Place, place};
@@ -57,17 +58,17 @@ static PULSE_US: AtomicU32 = AtomicU32::new(2);
 /// The outputs of a register that are inverted, as bits of an entry. A pin of the chip is inverted at its pad instead.
 static INVERTED: AtomicU32 = AtomicU32::new(0);
 
-/// Sets PIO, DMA and pins up, and returns the filling end of the segment ring. Start-up; `None` after the first time.
-pub fn start() -> Option<Segments> {
+/// Sets PIO, DMA and pins up, and returns the filling end of the segment ring. `None` after the first time.
+pub fn start(boot: &Boot) -> Option<Segments> {
     let (producer, consumer) = RING.split()?;
-    feeder::start(consumer);
-    machine::start();
+    feeder::start(boot, consumer);
+    machine::start(boot);
     // SAFETY: the feeder alone reads the ring, in the interrupt of the DMA, and copies each segment.
     Some(unsafe { Segments::new(producer) })
 }
 
 /// Starts the steps if they have stopped. Exec calls it after it has queued a segment.
-pub fn go() {
+pub fn go(_: Interrupt) {
     if !RUNNING.load(Relaxed) && !is_stopped() {
         RUNNING.store(true, Relaxed);
         BEGINS.store(true, Relaxed);
@@ -91,8 +92,8 @@ pub fn is_stopped() -> bool {
     STOPPED.load(Relaxed)
 }
 
-/// Allows steps again after a stop. Thread mode, when the motors have [settled](settle).
-pub fn release() {
+/// Allows steps again after a stop. Call it when the motors have [settled](settle).
+pub fn release(_: Thread) {
     STOPPED.store(false, Relaxed);
 }
 
@@ -101,15 +102,15 @@ pub fn running() -> bool {
     RUNNING.load(Relaxed) && !is_stopped()
 }
 
-/// Always returns `u32::MAX`, unknown: the entries of the running segment still wait to be sent. Exec.
-pub fn left() -> u32 {
+/// Always returns `u32::MAX`, unknown: the entries of the running segment still wait to be sent.
+pub fn left(_: Interrupt) -> u32 {
     u32::MAX
 }
 
 /// Drops the rest of all segments after a stop, so that every motor stands where its last pulse has put it. `held` is
-/// the segment that would have come next after the queued ones. Subtracts the steps that were not made from
-/// `position`. Exec, while no steps come.
-pub fn settle(mut held: Option<Segment>, position: &mut [i32; MOTORS]) {
+/// the segment that would have come next after the queued ones. Subtracts the steps that were not made from `position`.
+/// Call it while no steps come.
+pub fn settle(_: Interrupt, mut held: Option<Segment>, position: &mut [i32; MOTORS]) {
     if running() {
         return;
     }
@@ -123,20 +124,14 @@ pub fn settle(mut held: Option<Segment>, position: &mut [i32; MOTORS]) {
     });
 }
 
-/// Returns the state of the generator between two ticks, and the slot of its segment. The generator is ahead of the
-/// pins, so contacts use [`contact`] on this chip.
-pub fn moment() -> (Dda, u8) {
-    feeder::alone(|feeder| (feeder.dda().clone(), RING.tail()))
-}
-
 /// Notes a contact, at which the pins were at `place`. Handler of inputs.
 pub(super) fn contact(place: Place) {
     mask(|| FEEDER.contact.set(Some(place)));
     DMA_IRQ_0.pend();
 }
 
-/// Sets which direction pins are inverted: bit m for motor m. Thread mode, while nothing runs.
-pub fn set_inverted(motors: u8) {
+/// Sets which direction pins are inverted: bit m for motor m. Call it while nothing runs.
+pub fn set_inverted(_: Thread, motors: u8) {
     if ACTIVE.registers.is_some() {
         let dirs = |motors| WIRING.turned(motors);
         return invert(dirs(u8::MAX), dirs(motors));
@@ -146,9 +141,9 @@ pub fn set_inverted(motors: u8) {
     }
 }
 
-/// Sets the width of a step pulse, in microseconds, and which step pins rest high (bit m for motor m). Thread mode;
-/// the values may change only while nothing runs.
-pub fn set_step_output(pulse_us: u8, inverted: u8) {
+/// Sets the width of a step pulse, in microseconds, and which step pins rest high (bit m for motor m). The values may
+/// change only while nothing runs.
+pub fn set_step_output(_: Thread, pulse_us: u8, inverted: u8) {
     PULSE_US.store(pulse_us.into(), Relaxed);
     if ACTIVE.registers.is_some() {
         let steps = |motors| WIRING.stepping(motors);

@@ -19,6 +19,7 @@ use embassy_usb::{Builder, Handler};
 
 use super::Driver;
 use crate::hal::imp::{stepper, watchdog};
+use crate::hal::{Boot, Thread};
 
 /// Class, subclass and protocol of the interface.
 const INTERFACE: [u8; 3] = [0xFF, 0x00, 0x01];
@@ -38,8 +39,8 @@ static ASKED: AtomicU8 = AtomicU8::new(0);
 /// Milliseconds until the restart. Only thread mode uses it.
 static LEFT: AtomicU8 = AtomicU8::new(ANSWER_MS);
 
-/// Tells whether the machine rests. Thread mode.
-pub fn set_rests(rests: bool) {
+/// Tells whether the machine rests.
+pub fn set_rests(_: Thread, rests: bool) {
     RESTS.store(rests, Ordering::Relaxed);
 }
 
@@ -51,8 +52,8 @@ fn rests() -> bool {
 pub(super) struct Requests(InterfaceNumber);
 
 impl Requests {
-    /// Adds the interface. Start-up.
-    pub(super) fn new(builder: &mut Builder<'static, Driver>) -> Self {
+    /// Adds the interface.
+    pub(super) fn new(_: &Boot, builder: &mut Builder<'static, Driver>) -> Self {
         let [class, subclass, protocol] = INTERFACE;
         builder.msos_descriptor(windows_version::WIN8_1, MICROSOFT);
         let mut function = builder.function(class, subclass, protocol);
@@ -81,16 +82,16 @@ impl Handler for Requests {
     }
 }
 
-/// Restarts the chip if a request has been answered. Thread mode, each millisecond.
-pub(super) fn look() {
+/// Restarts the chip if a request has been answered. Called each millisecond.
+pub(super) fn look(thread: Thread) {
     if ASKED.load(Ordering::Relaxed) != 0 {
-        count_down();
+        count_down(thread);
     }
 }
 
 #[cold]
 #[inline(never)]
-fn count_down() {
+fn count_down(thread: Thread) {
     let left = LEFT.load(Ordering::Relaxed);
     if left > 0 {
         LEFT.store(left - 1, Ordering::Relaxed);
@@ -102,7 +103,7 @@ fn count_down() {
     match asked {
         // A line may have come meanwhile.
         _ if !rests() => {}
-        BOOT_LOADER => watchdog::boot(),
-        _ => watchdog::reset(),
+        BOOT_LOADER => watchdog::boot(thread),
+        _ => watchdog::reset(thread),
     }
 }

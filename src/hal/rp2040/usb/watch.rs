@@ -42,6 +42,7 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 
 use super::{ASLEEP, set_asleep};
+use crate::hal::Thread;
 use crate::hal::imp::time;
 
 /// Without a frame for this time the controller hangs. A bus without frames is asleep after 3 ms.
@@ -124,8 +125,8 @@ fn enter(stage: Stage) {
     SINCE.store(time::millis(), Ordering::Relaxed);
 }
 
-/// Looks whether the controller and the stack are alive. Thread mode, each millisecond.
-pub(super) fn look() {
+/// Looks whether the controller and the stack are alive. Called each millisecond.
+pub(super) fn look(_: Thread) {
     let (frame, status) = (USB.sof_rd().read().count(), USB.sie_status().read());
     let is_new = frame != FRAME.load(Ordering::Relaxed) && stage() <= Stage::Woken as u8;
     let is_stray = is_new && ASLEEP.load(Ordering::Relaxed);

@@ -4,6 +4,7 @@
 //! bad if it does not hold one of both. The contents are as before afterwards, but for a cell that cannot hold them. If
 //! the power goes meanwhile, the value of one cell is lost.
 
+use kerf::hal::Thread;
 use kerf::hal::imp::eeprom::Eeprom;
 use kerf::store::Memory;
 
@@ -16,7 +17,8 @@ pub fn test(from: u32, count: u32) -> Option<(u32, u32)> {
     if count > MOST || from + count > u32::from(Eeprom::SIZE) {
         return None;
     }
-    let mut memory = Eeprom::take();
+    // SAFETY: this image has no interrupts and no tasks, so thread mode is all there is.
+    let mut memory = Eeprom::of(unsafe { Thread::assume() });
     let (mut bad, mut first) = (0, 0);
     for at in from..from + count {
         if !is_sound(&mut memory, at as u16) {
