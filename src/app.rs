@@ -4,37 +4,30 @@
 
 use kerf_macros::small;
 
-use core::cell::{Cell, RefCell};
-
 use avr_embassy::{Boot, Interrupt, InterruptEnd, Thread, interrupt};
 use embassy_executor::Spawner;
 use embassy_sync::mutex::Mutex;
 use heapless::Vec;
 
 use crate::config::{Setting, Settings};
-use crate::gcode::command::Commands;
-use crate::gcode::interpreter::Interpreter;
 use crate::hal::eeprom::Eeprom;
 use crate::hal::segments::Segments;
 use crate::hal::serial::{AUX, AllEnds, PORTS, Received, USB, hardware};
 use crate::hal::{LINE_BYTES, stepper, uart, watchdog};
-use crate::machine::{Notices, Probe, Signs};
 use crate::motion::blend::Blend;
 use crate::motion::queue::{self, BlockQueue, BlockSource, Stage};
-use crate::protocol::{Memory, Occasion, Remembers, Speech};
+use crate::protocol::{Occasion, Remembers, Speech};
 use crate::status::Status;
 use crate::store::kept;
 use crate::store::{Log, Memory as _};
 use crate::tasks::common::Common;
-use crate::tasks::heat::Heaters;
-use crate::tasks::links::{Changes, Last, Links, QueueCount};
+use crate::tasks::links::{Earlier, Links};
 use crate::tasks::planner::Planner;
 use crate::tasks::ports::{AUX_RESERVE, Choice, Port};
 use crate::tasks::setup::limit_velocity;
 use crate::tasks::storage::Storage;
 use crate::tasks::tx::Tx;
 use crate::tasks::view::set_hardware;
-use crate::tasks::wake::{ReporterWake, Wake};
 use crate::tasks::{
     alarm, control, drivers, exec, heat, parser, planner, power, reader, reporter, shaper, spindle,
     storage,
@@ -46,43 +39,6 @@ const LINES_USB: usize = LINE_BYTES[0];
 const LINES_AUX: usize = LINE_BYTES[1];
 const _: () = assert!(LINES_AUX >= 80 + AUX_RESERVE as usize);
 
-impl Links {
-    fn new(thread: Thread, ports: [Port; PORTS], earlier: Earlier) -> Self {
-        let storage = earlier.storage;
-        Self {
-            thread,
-            ports,
-            feeder: Cell::new(USB),
-            pool_space: Wake::default(),
-            parser_wake: Wake::default(),
-            commands: RefCell::new(Commands::default()),
-            commands_taken: Cell::new(false),
-            planner_wake: Wake::default(),
-            moves_wait: Cell::new(false),
-            last: Cell::new(Last::Other),
-            cycle_start: Wake::default(),
-            notices: Notices::default(),
-            reporter_wake: ReporterWake::default(),
-            queue_count: QueueCount::default(),
-            changes: Changes::new(Changes::SETTINGS | Changes::ORIGIN),
-            rate: Cell::new(None),
-            restart: Cell::new(None),
-            cleared_by: Cell::new(USB),
-            heat: Heaters::new(),
-            #[cfg(feature = "sd")]
-            card: earlier.card,
-            probe: Probe::default(),
-            signs: Signs::default(),
-            job: Cell::default(),
-            storage,
-            report: RefCell::new(Memory::new()),
-            // `recall` sets the defaults later, in place. Here they would need as much space again on the stack.
-            settings: RefCell::new(Settings::blank()),
-            model: RefCell::new(Interpreter::with(storage)),
-        }
-    }
-}
-
 /// Creates the links in their static place. Not inlined, so that its stack space is free again when it returns.
 #[inline(never)]
 #[small]
@@ -90,22 +46,14 @@ fn place(thread: Thread, ports: [Port; PORTS], earlier: Earlier) -> &'static Lin
     place!(Links, Links::new(thread, ports, earlier))
 }
 
-/// What is created before the links, so that the stack holds only one of them at a time.
-struct Earlier {
-    storage: &'static Storage,
-    #[cfg(feature = "sd")]
-    card: &'static RefCell<crate::card::Card>,
-}
-
-impl Earlier {
-    #[inline(never)]
-    #[small]
-    fn place(thread: Thread) -> Self {
-        Self {
-            storage: place!(Storage, Storage::new(thread, Log::open(&Eeprom::of(thread)))),
-            #[cfg(feature = "sd")]
-            card: place_card(thread),
-        }
+/// Creates what is created before the links.
+#[inline(never)]
+#[small]
+fn place_earlier(thread: Thread) -> Earlier {
+    Earlier {
+        storage: place!(Storage, Storage::new(thread, Log::open(&Eeprom::of(thread)))),
+        #[cfg(feature = "sd")]
+        card: place_card(thread),
     }
 }
 
@@ -113,8 +61,11 @@ impl Earlier {
 #[cfg(feature = "sd")]
 #[inline(never)]
 #[small]
-fn place_card(thread: Thread) -> &'static RefCell<crate::card::Card> {
-    place!(RefCell<crate::card::Card>, RefCell::new(crate::card::Card::new(thread)))
+fn place_card(thread: Thread) -> &'static core::cell::RefCell<crate::card::Card> {
+    place!(
+        core::cell::RefCell<crate::card::Card>,
+        core::cell::RefCell::new(crate::card::Card::new(thread))
+    )
 }
 
 /// Creates the stage in its static place, if this chip blends. Constant: the stack has no room for another one.
@@ -214,7 +165,7 @@ fn connect(
     boot: &Boot,
     rate: u32,
 ) -> Option<(&'static Links, Received, Option<Received>)> {
-    let earlier = Earlier::place(thread);
+    let earlier = place_earlier(thread);
     let AllEnds { usb: (received, outgoing), aux } = uart::start(thread, boot, rate)?;
     let mut ports = Vec::<Port, PORTS>::new();
     ports

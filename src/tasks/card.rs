@@ -20,7 +20,6 @@ use super::reporter::tell_at_once;
 use super::row;
 use super::view::View;
 use crate::card::{self, LINE_MAX, Line};
-use crate::gcode::command::Stop;
 use crate::machine;
 use crate::protocol::{Answers, Machine, Next, Notice, Request, Value};
 use crate::status::Status;
@@ -148,7 +147,7 @@ impl Feed {
         self.is_block = false;
         self.line.clear();
         match status {
-            Status::Ok if links.commands.borrow().stop == Stop::End => {
+            Status::Ok if links.command_sender().ends_program() => {
                 links.card.borrow_mut().end();
                 true
             }

@@ -387,7 +387,7 @@ pub(super) fn go_on(links: &Links) {
 fn drop_queue(links: &Links) {
     links.parser_wake.signal();
     // Wakes the planner wherever it waits.
-    links.planner_wake.signal();
+    links.wake_planner();
     links.cycle_start.signal();
     flags::set(Event::BlockDone);
 }

@@ -4,7 +4,7 @@
 //! |---|---|---|---|---|---|---|
 //! | `uart` receive ring | bytes | 255; 63 | 259 B, 67 B | RX interrupt | reader | what is damaged or lost is refused with status 13 |
 //! | [`Port::lines`] | lines | 9 lines; 412 B, 96 B | 448 B, 132 B | reader | parser | bytes stay in the receive ring |
-//! | [`Links::commands`] | canonical commands | 1 | 98 B | parser | planner | the parser takes control lines only |
+//! | [`commands`] | canonical commands | 1 | 98 B | parser | planner | the parser takes control lines only |
 //! | block ring | blocks | 61 | 2,079 B with the speed constraints | planner | exec | the planner waits; `commands` stays taken |
 //! | segment ring | segments | 7 | 131 B | exec | step interrupt | exec waits for its next run |
 //! | `uart` transmit ring | bytes | 127 each port | 131 B each | parser, reporter | TX interrupt | parser: the port waits, response half sent; reporter: waits |
@@ -28,7 +28,11 @@
 //! All links except the interrupt rings belong to thread-mode tasks of one executor, which take turns. They are plain
 //! `RefCell`s, never borrowed across an `.await`.
 
+mod commands;
+
 use core::cell::{Cell, RefCell};
+
+pub use commands::{CommandReceiver, CommandSender};
 
 use super::heat::Heaters;
 use super::ports::Port;
@@ -39,12 +43,12 @@ use crate::config::Settings;
 use crate::gcode::command::Commands;
 use crate::gcode::interpreter::Interpreter;
 use crate::hal::byte::SharedByte;
-use crate::hal::serial::PORTS;
+use crate::hal::serial::{PORTS, USB};
 use crate::hal::{Interrupt, Thread};
 use crate::jobs::Job;
 use crate::machine::{Notices, Probe, Signs};
 use crate::motion::queue;
-use crate::protocol::Memory;
+use crate::protocol::{Memory, Remembers};
 
 /// The links. There is one for the machine, made at start-up.
 // In this order: AVR reaches a field within 63 bytes of the first in one instruction.
@@ -55,13 +59,13 @@ pub struct Links {
     /// The number of the port that feeds the machine.
     pub feeder: Cell<u8>,
     /// The planner works on `commands`.
-    pub commands_taken: Cell<bool>,
+    commands_taken: Cell<bool>,
     /// What the last line does that the planner has been given.
     pub last: Cell<Last>,
     /// A line has come, or the planner is ready: wakes the parser.
     pub parser_wake: Wake,
     /// `commands` has been filled.
-    pub planner_wake: Wake,
+    planner_wake: Wake,
     /// Something that reports show may have changed.
     pub reporter_wake: ReporterWake,
     /// A line has left a pool. The reader waits for this when a pool is full.
@@ -101,11 +105,58 @@ pub struct Links {
     /// The serial ports.
     pub ports: [Port; PORTS],
     /// The commands for the planner; valid while `commands_taken`.
-    pub commands: RefCell<Commands>,
+    commands: RefCell<Commands>,
     /// The G-code model. The parser advances it; reports read it.
     pub model: RefCell<Interpreter<&'static Storage>>,
     /// Settings in force.
     pub settings: RefCell<Settings>,
+}
+
+/// What is created before the links, so that the stack holds only one of them at a time.
+pub struct Earlier {
+    /// What is to be saved.
+    pub storage: &'static Storage,
+    /// The card.
+    #[cfg(feature = "sd")]
+    pub card: &'static RefCell<crate::card::Card>,
+}
+
+impl Links {
+    /// Creates the links. The planner carries out `SETTINGS` and `ORIGIN` before the first line.
+    pub fn new(thread: Thread, ports: [Port; PORTS], earlier: Earlier) -> Self {
+        let storage = earlier.storage;
+        Self {
+            thread,
+            ports,
+            feeder: Cell::new(USB),
+            pool_space: Wake::default(),
+            parser_wake: Wake::default(),
+            commands: RefCell::new(Commands::default()),
+            commands_taken: Cell::new(false),
+            planner_wake: Wake::default(),
+            moves_wait: Cell::new(false),
+            last: Cell::new(Last::Other),
+            cycle_start: Wake::default(),
+            notices: Notices::default(),
+            reporter_wake: ReporterWake::default(),
+            queue_count: QueueCount::default(),
+            changes: Changes::new(Changes::SETTINGS | Changes::ORIGIN),
+            rate: Cell::new(None),
+            restart: Cell::new(None),
+            cleared_by: Cell::new(USB),
+            heat: Heaters::new(),
+            #[cfg(feature = "sd")]
+            card: earlier.card,
+            probe: Probe::default(),
+            signs: Signs::default(),
+            job: Cell::default(),
+            storage,
+            report: RefCell::new(Memory::new()),
+            // `recall` sets the defaults later, in place. Here they would need as much space again on the stack.
+            settings: RefCell::new(Settings::blank()),
+            model: RefCell::new(Interpreter::with(storage)),
+        }
+    }
 }
 
 /// What a line does, as far as the answers to later lines depend on it.

@@ -121,7 +121,7 @@ fn step(thread: Thread, which: Override, percent: i8, anew: bool, least: u16) {
 #[small]
 pub fn tell(links: &Links) {
     spindle::follow(links.thread, now(links.thread).in_force(Override::Spindle));
-    links.planner_wake.signal();
+    links.wake_planner();
     flags::set(Event::BlockDone);
     links.reporter_wake.signal();
 }

@@ -1,6 +1,6 @@
 //! The parser task: takes lines, answers them, and hands their commands to the planner.
 //!
-//! Reads the line pools, writes `Links::commands`, the G-code model, the settings and the response; waits for lines,
+//! Reads the line pools, fills the slot of `links::commands`, writes the G-code model, the settings and the response; waits for lines,
 //! for the planner, and for room to transmit. Control lines are taken at any time. Data lines of the port that feeds
 //! the machine are taken only while the planner is free and no built-in job runs, so that a long job never locks the
 //! sender out. A line that has to wait for the tables ([`Status::Again`]) stays where it is, and so do the lines

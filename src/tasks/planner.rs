@@ -1,6 +1,6 @@
 //! The planner task: canonical commands into blocks.
 //!
-//! Reads `Links::commands` and the settings, writes the block queue. Waits for commands, for room in the queue, and at
+//! Reads the commands of `links::commands` and the settings, writes the block queue. Waits for commands, for room in the queue, and at
 //! a program stop for cycle start if the settings say so. One turn builds one block. While the task waits for a line,
 //! the parser has plain moves carried out itself ([`take_at_once`]). In a queue flush the planner forgets the line,
 //! has exec drop the blocks, and starts from where the motors are.
@@ -174,14 +174,14 @@ pub fn run(links: &'static Links, shared: &'static Shared) -> impl Future<Output
         loop {
             let waits = shared.lock().await.has_waiting();
             match waits {
-                false => links.planner_wake.wait().await,
+                false => links.command_receiver().woken().await,
                 true => {
-                    select(links.planner_wake.wait(), nothing_follows(links, shared)).await;
+                    select(links.command_receiver().woken(), nothing_follows(links, shared)).await;
                 }
             }
             let mut planner = shared.lock().await;
             planner.replan();
-            if !links.commands_taken.get() {
+            if !links.command_receiver().has_commands() {
                 planner.make_up();
             } else if planner.owes_answers() || !planner.carry_out_at_once() {
                 planner.begin();
@@ -214,7 +214,7 @@ pub fn run(links: &'static Links, shared: &'static Shared) -> impl Future<Output
             }
             // In this order, because a line is told to wait or to be carried out at any time.
             links.moves_wait.set(planner.has_waiting());
-            links.commands_taken.set(false);
+            links.command_receiver().done();
             if planner.is_flushed() {
                 planner.queue.drop_staged();
                 seek::drop_blocks(links.thread).await;
@@ -232,7 +232,7 @@ pub fn run(links: &'static Links, shared: &'static Shared) -> impl Future<Output
     }
 }
 
-/// Carries out the move in `Links::commands` while the planner's task waits for a line, if there is room. Neither a
+/// Carries out the move in the slot of commands while the planner's task waits for a line, if there is room. Neither a
 /// wake-up of that task nor a turn of the executor comes between. Returns false if the task has to carry the move out;
 /// nothing has been done then that the task would not do. Called in the parser's turn. Cost: 9,000 cycles if a
 /// block is planned; 1,400 for a move that joins a chain.
@@ -250,7 +250,7 @@ pub fn take_at_once(planner: &mut Planner) -> bool {
         }
         if !waited {
             // The task limits the time for which lines wait.
-            planner.links.planner_wake.signal();
+            planner.links.wake_planner();
         }
     }
     done
@@ -302,7 +302,7 @@ impl Planner {
     /// lines, with nothing done.
     #[inline(never)]
     fn carry_out_at_once(&mut self) -> bool {
-        let commands = self.links.commands.borrow();
+        let commands = self.links.command_receiver().commands();
         let (target, feed) = match &commands.motion {
             Motion::Traverse { target } => (target, None),
             Motion::Feed { target, feed } => (target, Some(feed)),
@@ -355,12 +355,12 @@ impl Planner {
         true
     }
 
-    /// Begins with the line in `Links::commands`.
+    /// Begins with the line whose commands have been sent.
     #[inline(never)]
     fn begin(&mut self) {
         self.steps = Steps::default();
         self.take_up_changes();
-        let commands = self.links.commands.borrow();
+        let commands = self.links.command_receiver().commands();
         let smooths = self.stops || self.wanted_spans(&commands) != self.spans;
         match self.announcement {
             // That of the means follows.
@@ -407,7 +407,7 @@ impl Planner {
             return Turn::More;
         }
         let links = self.links;
-        let commands = links.commands.borrow();
+        let commands = links.command_receiver().commands();
         if self.has_chain() {
             return self.end_chain(&commands);
         }
@@ -636,7 +636,7 @@ impl Planner {
             }
             Announcement::Smooth => {
                 let links = self.links;
-                let commands = links.commands.borrow();
+                let commands = links.command_receiver().commands();
                 // Other lines do not wait for exec; the next one that moves will.
                 if commands.moves() {
                     self.smooth(self.wanted_spans(&commands));

@@ -37,7 +37,7 @@ pub async fn run(links: &'static Links) -> ! {
         }
         if links.moves_wait.get() {
             // The lines may have waited long enough.
-            links.planner_wake.signal();
+            links.wake_planner();
         }
         after_ms(LOOK_MS).await;
     }

@@ -63,7 +63,7 @@ pub(super) fn run(links: &Links, shared: &planner::Shared) -> Row {
             let Some(block) = speech.fast_path(line) else { break Row::Over };
             line = block.of(line);
         }
-        let mut commands = links.commands.borrow_mut();
+        let mut commands = links.command_sender().slot();
         if !links.model.borrow_mut().fast_path(line, writer, &*settings, &mut commands) {
             break Row::Declined;
         }
@@ -99,8 +99,7 @@ pub(super) fn run(links: &Links, shared: &planner::Shared) -> Row {
 pub(super) fn hand_over(links: &Links, planner: Option<&mut Planner>) -> bool {
     let done = !flags::has(Event::Realtime) && planner.is_some_and(planner::take_at_once);
     if !done {
-        links.commands_taken.set(true);
-        links.planner_wake.signal();
+        links.command_sender().send();
     }
     done
 }
@@ -118,7 +117,7 @@ pub(super) fn interpret(links: &Links, line: &[u8]) -> bool {
     if !is_printing(port, &settings) {
         return false;
     }
-    let mut commands = links.commands.borrow_mut();
+    let mut commands = links.command_sender().slot();
     links.model.borrow_mut().fast_path(line, Writer::Prints, &*settings, &mut commands)
 }
 

@@ -104,7 +104,7 @@ impl Seen {
     /// Returns the present state of the machine. Thread mode.
     fn now(links: &Links, settings: &Settings) -> Self {
         // In this order, because exec may begin a queued block in between.
-        let (taken, queued) = (links.commands_taken.get(), has_moves(links));
+        let (taken, queued) = (!links.command_sender().is_free(), has_moves(links));
         let mut motion = snapshot(links.thread).moment();
         let runs = queued || motion.running;
         if !runs {
@@ -121,7 +121,7 @@ fn has_moves(links: &Links) -> bool {
 
 /// Whether a line waits to be carried out, or a block of it.
 fn is_queued(links: &Links) -> bool {
-    links.commands_taken.get() || has_moves(links)
+    !links.command_sender().is_free() || has_moves(links)
 }
 
 #[small]
@@ -282,12 +282,11 @@ impl<'a> View<'a> {
             // Nothing has been reported to the new feeder yet.
             self.report.refresh();
         }
-        let mut commands = links.commands.borrow_mut();
+        let mut commands = links.command_sender().slot();
         commands.clear();
         commands.motion = motion;
         machine::carry_out(self.links.thread, cycle);
-        links.commands_taken.set(true);
-        links.planner_wake.signal();
+        links.command_sender().send();
         Status::Ok
     }
 

@@ -5,7 +5,6 @@ use heapless::Vec;
 use super::answer::has_room;
 #[cfg(feature = "card-write")]
 use crate::card;
-use crate::gcode::command::Stop;
 use crate::hal::Thread;
 use crate::hal::eeprom::Eeprom;
 use crate::jobs::Job;
@@ -25,7 +24,7 @@ use crate::tasks::view::View;
 /// Whether a block can be carried out or refused now: not while the planner or the tables are busy, or while anything
 /// is being dropped.
 pub fn is_free(links: &Links) -> bool {
-    let waits = links.commands_taken.get() || links.storage.is_awaited();
+    let waits = !links.command_sender().is_free() || links.storage.is_awaited();
     !waits && !machine::is_flushing()
 }
 
@@ -62,7 +61,7 @@ pub(super) fn job_line(links: &Links) {
                     tell_startup(links, startup.unwrap_or(0), status);
                 }
             }
-            Status::Ok if links.commands.borrow().stop == Stop::End => job.end(),
+            Status::Ok if links.command_sender().ends_program() => job.end(),
             Status::Ok | Status::Noop => {}
             status => {
                 job = Job::default();
@@ -136,10 +135,9 @@ fn interpret_rewritten(links: &Links, port: &Port, block: &[u8]) -> (Status, boo
 #[inline(never)]
 #[small]
 fn move_back(links: &Links) -> Status {
-    let mut commands = links.commands.borrow_mut();
+    let mut commands = links.command_sender().slot();
     links.model.borrow_mut().move_back(&mut commands);
-    links.commands_taken.set(true);
-    links.planner_wake.signal();
+    links.command_sender().send();
     Status::Again
 }
 
@@ -166,7 +164,7 @@ fn interpret(links: &Links, block: &[u8], declined: bool) -> (Status, bool) {
         let _ = alarm::clear(links, &links.settings.borrow());
     }
     let done = carry_out(links, block, declined);
-    if machine::is_checking() && links.commands.borrow().stop == Stop::End {
+    if machine::is_checking() && links.command_sender().ends_program() {
         links.except(Status::ProgramChecked);
     }
     done
@@ -203,7 +201,7 @@ fn carry_out(links: &Links, block: &[u8], declined: bool) -> (Status, bool) {
         // The end of a jog drops the queue. So nothing that has been answered may be queued after a jog.
         return (Status::Again, true);
     }
-    let mut commands = links.commands.borrow_mut();
+    let mut commands = links.command_sender().slot();
     let settings = links.settings.borrow();
     let mut model = links.model.borrow_mut();
     let done = match (words, declined) {
@@ -220,8 +218,7 @@ fn carry_out(links: &Links, block: &[u8], declined: bool) -> (Status, bool) {
                 if words.is_some() != jogs {
                     enter(links.thread, words.is_some());
                 }
-                links.commands_taken.set(true);
-                links.planner_wake.signal();
+                links.command_sender().send();
             }
             if model.take_moved_origin() {
                 // The planner tells exec before the next line that does something.

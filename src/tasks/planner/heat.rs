@@ -92,7 +92,7 @@ impl Planner {
             (queue::used() == 0 || self.is_flushed()).then_some(())
         })
         .await;
-        if let Motion::Heat(heat) = &links.commands.borrow().motion {
+        if let Motion::Heat(heat) = &links.command_receiver().commands().motion {
             links.heat.begin_wait(*heat);
         }
         wait(links.thread, Event::BlockDone, || {

@@ -164,7 +164,7 @@ impl Planner {
 
     /// Returns the parameters of the line: the axes as bits, and whether their positions are set.
     fn homed_by_line(&self) -> (u8, bool) {
-        match self.links.commands.borrow().motion {
+        match self.links.command_receiver().commands().motion {
             Motion::Home { axes, set } => (axes, set),
             _ => (0, false),
         }

@@ -25,7 +25,7 @@ impl Planner {
     #[small]
     fn begin_jog(&mut self) {
         let links = self.links;
-        if let Motion::Jog { target } = &links.commands.borrow().motion {
+        if let Motion::Jog { target } = &links.command_receiver().commands().motion {
             self.straight(target, None);
         }
     }

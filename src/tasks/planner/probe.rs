@@ -63,7 +63,7 @@ impl Planner {
     #[small]
     fn begin_probe(&mut self) -> bool {
         let links = self.links;
-        let commands = links.commands.borrow();
+        let commands = links.command_receiver().commands();
         let Motion::Probe { target, feed, mode } = &commands.motion else { return false };
         links.probe.begin();
         let awaited = match mode {
@@ -89,7 +89,7 @@ impl Planner {
         let links = self.links;
         let at = self.located(contact);
         links.probe.found(&at);
-        let commands = links.commands.borrow();
+        let commands = links.command_receiver().commands();
         let Motion::Probe { feed, .. } = commands.motion else { return false };
         if !links.settings.borrow().backs_off_probe() {
             return false;
@@ -114,7 +114,7 @@ impl Planner {
         let links = self.links;
         links.probe.found(&self.position);
         links.probe.tell(ProbeState::Failed);
-        let loudly = match &links.commands.borrow().motion {
+        let loudly = match &links.command_receiver().commands().motion {
             Motion::Probe { mode, .. } => {
                 matches!(mode, MotionMode::ProbeTowards | MotionMode::ProbeAway)
             }

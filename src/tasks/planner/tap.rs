@@ -29,7 +29,10 @@ impl Planner {
     /// Whether the line is G33.1.
     #[small]
     pub(super) fn returns(&self) -> bool {
-        matches!(self.links.commands.borrow().motion, Motion::Thread { returns: true, .. })
+        matches!(
+            self.links.command_receiver().commands().motion,
+            Motion::Thread { returns: true, .. }
+        )
     }
 
     /// Returns how far the axes may follow the spindle beyond an end, mm, with `turn` counts a turn and `lead` along

@@ -276,7 +276,7 @@ impl Planner {
     #[small]
     fn retract_length(&self) -> Length {
         let length = self.spindle_setting(spindle::R);
-        match &self.links.commands.borrow().motion {
+        match &self.links.command_receiver().commands().motion {
             // X leaves towards the drive line.
             Motion::ThreadCycle(cycle) if cycle.peak.0 < 0 => Length(length.abs()),
             Motion::ThreadCycle(_) => Length(-length.abs()),
@@ -370,7 +370,7 @@ impl Planner {
     #[inline(never)]
     #[small]
     fn check_cycle(&self, turn: u32) -> Result<(), Status> {
-        let commands = self.links.commands.borrow();
+        let commands = self.links.command_receiver().commands();
         let Motion::ThreadCycle(cycle) = &commands.motion else { return Ok(()) };
         if !self.turns_as_told() {
             return Err(Status::WrongWay);
@@ -459,7 +459,7 @@ impl Planner {
     #[inline(never)]
     #[small]
     pub(super) fn piece(&self, line: u8, from: &PerAxis<Length>) -> Option<Piece> {
-        let commands = self.links.commands.borrow();
+        let commands = self.links.command_receiver().commands();
         let (target, lead) = self.steps.pass(&commands.motion, from, line)?;
         let mut ways = [0.0; FIRST_ROTARY];
         let (mut most, mut square) = (0.0f32, 0.0);

@@ -39,7 +39,7 @@ pub(super) fn level(view: &mut View<'_>, what: Level) -> Status {
     if machine::is_checking() {
         return Status::NotAccepted;
     }
-    if links.commands_taken.get() || machine::is_flushing() {
+    if !links.command_sender().is_free() || machine::is_flushing() {
         return Status::Again;
     }
     let mut model = links.model.borrow_mut();
@@ -50,7 +50,7 @@ pub(super) fn level(view: &mut View<'_>, what: Level) -> Status {
             return Status::OutOfRange;
         }
     }
-    let mut commands = links.commands.borrow_mut();
+    let mut commands = links.command_sender().slot();
     commands.clear();
     commands.motion = match what {
         Level::Follow(follows) => Motion::FollowBed(follows),
@@ -61,7 +61,6 @@ pub(super) fn level(view: &mut View<'_>, what: Level) -> Status {
         }
     };
     model.set_position(&target);
-    links.commands_taken.set(true);
-    links.planner_wake.signal();
+    links.command_sender().send();
     Status::Ok
 }

@@ -46,14 +46,13 @@ pub(super) fn extruder(view: &mut View<'_>, what: Extruder) -> Status {
             if let Err(status) = Setup::extrudes(&*view.settings) {
                 return status;
             }
-            let done = model.extrude(by, feed as f32, &mut links.commands.borrow_mut());
+            let done = model.extrude(by, feed as f32, &mut links.command_sender().slot());
             if let Err(status) = done {
                 return status;
             }
             // The origin of its words moves along.
             links.changes.note(Changes::ORIGIN);
-            links.commands_taken.set(true);
-            links.planner_wake.signal();
+            links.command_sender().send();
         }
     }
     Status::Ok
@@ -80,15 +79,14 @@ pub(super) fn tune(view: &mut View<'_>, heater: u8, to: u16, cycles: u8, uses: b
     if machine::is_checking() {
         return Status::Ok;
     }
-    if links.commands_taken.get() || machine::is_flushing() {
+    if !links.command_sender().is_free() || machine::is_flushing() {
         return Status::Again;
     }
     heat::ask_tune(&links.heat, cycles, uses);
-    let mut commands = links.commands.borrow_mut();
+    let mut commands = links.command_sender().slot();
     commands.clear();
     commands.motion = Motion::Heat(Heat { part, to: Some(to), wait: Wait::Tuned });
-    links.commands_taken.set(true);
-    links.planner_wake.signal();
+    links.command_sender().send();
     Status::Ok
 }
 
@@ -136,7 +134,9 @@ pub(super) fn shape(view: &mut View<'_>, to: Resonances) -> Status {
 fn not_now(links: &Links) -> Option<Status> {
     match machine::alarm() {
         Alarm::None if machine::is_checking() => Some(Status::Ok),
-        Alarm::None if links.commands_taken.get() || machine::is_flushing() => Some(Status::Again),
+        Alarm::None if !links.command_sender().is_free() || machine::is_flushing() => {
+            Some(Status::Again)
+        }
         Alarm::None => None,
         alarm => Some(alarm.status()),
     }
