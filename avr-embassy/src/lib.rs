@@ -19,7 +19,8 @@
 //! | thread mode | tasks of the `Executor`, the main loop | as short interrupts, and all of Embassy; [`Event::wait`], [`interrupt::lock`] |
 //!
 //! Functions that belong to a level ask for its token, [`Thread`] or [`Interrupt`], which the other level cannot
-//! have. A value that both levels change is a [`Shared`]; a value that a handler and tasks use in turn is a
+//! have. [`Level`] stands for either, [`Boot`] for start-up, [`Exclusive`] for whoever is in interrupt mode or keeps it
+//! out. A value that both levels change is a [`Shared`]; a value that a handler and tasks use in turn is a
 //! [`Baton`].
 //!
 //! # Critical sections mask nothing
