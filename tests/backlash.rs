@@ -11,7 +11,7 @@ use kerf::units::Length;
 use proptest::prelude::*;
 
 use crate::cases::cases;
-use crate::jobs::{Job, Player, any_job};
+use crate::jobs::{Job, Player, Schedule, any_job};
 use crate::rig::{Config, Rig, at};
 
 /// Most turns of exec that a stop takes.
@@ -80,8 +80,7 @@ struct Tracker {
     rig: Rig,
     axes: [Axis; MOTORS],
     seen: usize,
-    events: std::vec::IntoIter<(u16, Event)>,
-    next: Option<(u16, Event)>,
+    events: Schedule<Event>,
 }
 
 impl Tracker {
@@ -95,9 +94,7 @@ impl Tracker {
         let position = rig.pins.position;
         let gap = trial.backlash.map(i64::from);
         let axes = core::array::from_fn(|m| Axis { place: position[m], gap: gap[m] });
-        let mut events = trial.events.clone().into_iter();
-        let next = events.next();
-        Self { rig, axes, seen: 0, events, next }
+        Self { rig, axes, seen: 0, events: Schedule::new(trial.events.clone()) }
     }
 
     fn follow(&mut self) {
@@ -180,14 +177,8 @@ impl Player for Tracker {
     }
 
     fn turn(&mut self) -> Step {
-        match &mut self.next {
-            Some((0, event)) => {
-                let event = *event;
-                self.next = self.events.next();
-                self.happen(event);
-            }
-            Some((left, _)) => *left -= 1,
-            None => {}
+        if let Some(event) = self.events.due() {
+            self.happen(event);
         }
         let step = self.rig.turn();
         self.rig.replan();
@@ -196,7 +187,7 @@ impl Player for Tracker {
     }
 
     fn is_due(&self) -> bool {
-        self.next.is_some()
+        self.events.has_more()
     }
 }
 

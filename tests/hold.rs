@@ -8,7 +8,7 @@ use kerf::motion::exec::Step;
 use proptest::prelude::*;
 
 use crate::cases::cases;
-use crate::jobs::{Job, Player, any_job, plan_held};
+use crate::jobs::{Job, Player, Schedule, any_job, plan_held};
 use crate::keeps::check_limits;
 use crate::rig::{Config, Rig, at};
 
@@ -28,15 +28,12 @@ fn any_holds(drops: bool) -> impl Strategy<Value = Holds> {
 /// Runs a job with holds.
 struct Holder {
     rig: Rig,
-    holds: std::vec::IntoIter<(u16, bool)>,
-    next: Option<(u16, bool)>,
+    holds: Schedule<bool>,
 }
 
 impl Holder {
     fn new(job: &Job, holds: &Holds) -> Self {
-        let mut holds = holds.clone().into_iter();
-        let next = holds.next();
-        Self { rig: Rig::new(job.config.clone()), holds, next }
+        Self { rig: Rig::new(job.config.clone()), holds: Schedule::new(holds.clone()) }
     }
 
     fn hold(&mut self, drop: bool) {
@@ -68,20 +65,14 @@ impl Player for Holder {
     }
 
     fn turn(&mut self) -> Step {
-        match &mut self.next {
-            Some((0, drop)) => {
-                let drop = *drop;
-                self.next = self.holds.next();
-                self.hold(drop);
-            }
-            Some((left, _)) => *left -= 1,
-            None => {}
+        if let Some(drop) = self.holds.due() {
+            self.hold(drop);
         }
         self.rig.turn()
     }
 
     fn is_due(&self) -> bool {
-        self.next.is_some()
+        self.holds.has_more()
     }
 }
 
@@ -143,16 +134,13 @@ proptest! {
 
     #[test]
     fn any_job_with_holds_keeps_its_limits(job in any_job(), holds in any_holds(false)) {
-        let mut holds = holds.into_iter();
-        let mut next = holds.next();
+        let mut holds = Schedule::new(holds);
         let mut holding = false;
         let planned = plan_held(&job, |_, at_rest| {
             if holding && at_rest {
                 holding = false;
-            } else if let Some((0, _)) = next {
-                (holding, next) = (true, holds.next());
-            } else if let Some((left, _)) = &mut next {
-                *left -= 1;
+            } else if holds.due().is_some() {
+                holding = true;
             }
             holding
         });

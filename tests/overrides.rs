@@ -8,7 +8,7 @@ use kerf::motion::factors::Factors;
 use proptest::prelude::*;
 
 use crate::cases::cases;
-use crate::jobs::{Job, Planned, any_job, plan_changed};
+use crate::jobs::{Job, Planned, Schedule, any_job, plan_changed};
 use crate::keeps::{check_changes, check_corners};
 use crate::rig::{Config, Rig, at};
 
@@ -35,39 +35,9 @@ fn feed(factor: f32) -> Factors {
     Factors { feed: factor, ..Factors::ONE }
 }
 
-/// Plays the events when they are due.
-struct Script {
-    ops: std::vec::IntoIter<(u16, Op)>,
-    next: Option<(u16, Op)>,
-}
-
-impl Script {
-    fn new(ops: &[(u16, Op)]) -> Self {
-        #[allow(clippy::unnecessary_to_owned, reason = "it outlives what it is made from")]
-        let mut ops = ops.to_vec().into_iter();
-        let next = ops.next();
-        Self { ops, next }
-    }
-
-    fn due(&mut self) -> Option<Op> {
-        match &mut self.next {
-            Some((0, op)) => {
-                let op = *op;
-                self.next = self.ops.next();
-                Some(op)
-            }
-            Some((left, _)) => {
-                *left -= 1;
-                None
-            }
-            None => None,
-        }
-    }
-}
-
 fn run(job: &Job, ops: &[(u16, Op)]) -> Rig {
     let mut rig = Rig::new(job.config.clone());
-    let mut script = Script::new(ops);
+    let mut script = Schedule::new(ops.to_vec());
     let mut turn = |rig: &mut Rig| {
         match script.due() {
             Some(Op::Feed(factor)) => rig.want(feed(factor)),
@@ -124,7 +94,7 @@ proptest! {
 
     #[test]
     fn any_job_keeps_the_limits_of_the_machine(job in any_job(), ops in any_deeds()) {
-        let script = core::cell::RefCell::new(Script::new(&ops));
+        let script = core::cell::RefCell::new(Schedule::new(ops));
         let holding = core::cell::Cell::new(false);
         let held = |_, at_rest| {
             if at_rest {

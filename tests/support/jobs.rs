@@ -27,6 +27,38 @@ pub struct Move {
     pub turns: u8,
 }
 
+/// What happens at random times: each event comes so many turns after the one before.
+pub struct Schedule<T> {
+    next: Option<(u16, T)>,
+    rest: std::vec::IntoIter<(u16, T)>,
+}
+
+impl<T> Schedule<T> {
+    pub fn new(events: Vec<(u16, T)>) -> Self {
+        let mut rest = events.into_iter();
+        Self { next: rest.next(), rest }
+    }
+
+    /// Counts a turn. Returns the event that comes before it, if one does.
+    pub fn due(&mut self) -> Option<T> {
+        match &mut self.next {
+            Some((0, _)) => {}
+            Some((left, _)) => {
+                *left -= 1;
+                return None;
+            }
+            None => return None,
+        }
+        let next = self.rest.next();
+        std::mem::replace(&mut self.next, next).map(|(_, event)| event)
+    }
+
+    /// Whether an event is still to come.
+    pub fn has_more(&self) -> bool {
+        self.next.is_some()
+    }
+}
+
 /// What runs a job, and does something meanwhile.
 pub trait Player {
     fn rig(&mut self) -> &mut Rig;
