@@ -11,6 +11,7 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use crate::process::root;
+use crate::sources::files;
 
 /// The documents.
 const DOCUMENTS: [&str; 7] = [
@@ -36,18 +37,10 @@ struct Source {
 }
 
 fn sources() -> Vec<Source> {
-    let mut files = Vec::new();
-    SOURCES.iter().for_each(|name| collect(&root().join(name), &mut files));
-    files.retain(|file| !file.ends_with("xtask/src/docs.rs"));
-    files.iter().filter_map(|file| read(file)).collect()
-}
-
-fn collect(path: &Path, files: &mut Vec<PathBuf>) {
-    match std::fs::read_dir(path) {
-        Ok(entries) => entries.flatten().for_each(|entry| collect(&entry.path(), files)),
-        Err(_) if !path.ends_with("Cargo.lock") => files.push(path.to_owned()),
-        Err(_) => {}
-    }
+    let is_read =
+        |file: &PathBuf| !file.ends_with("Cargo.lock") && !file.ends_with("xtask/src/docs.rs");
+    let files = SOURCES.iter().flat_map(|name| files(name)).filter(is_read);
+    files.filter_map(|file| read(&file)).collect()
 }
 
 fn read(file: &Path) -> Option<Source> {
@@ -209,8 +202,7 @@ fn names_tests(cell: &str, tests: &HashSet<String>) -> bool {
 #[test]
 fn each_difference_names_its_test() {
     let (page, least) = DIFFERENCES;
-    let mut files = Vec::new();
-    collect(&root().join("tests"), &mut files);
+    let files = files("tests");
     let tests = tests(&files);
     let text = std::fs::read_to_string(root().join(page)).expect(page);
     let tables = rows_with_tests(&text);

@@ -8,6 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use crate::process::root;
+use crate::sources::rust_files;
 
 /// Files in a folder that are a unit of their own: the beginnings of their paths, and the name of the unit.
 const APART: [(&str, &str); 6] = [
@@ -176,13 +177,6 @@ fn paths(code: &str, depth: usize) -> Vec<Used> {
     found
 }
 
-fn collect(path: &Path, files: &mut Vec<PathBuf>) {
-    match std::fs::read_dir(path) {
-        Ok(entries) => entries.flatten().for_each(|entry| collect(&entry.path(), files)),
-        Err(_) => files.push(path.to_owned()),
-    }
-}
-
 /// Returns the module path of a file below `src`, without endings.
 fn modules(file: &Path) -> String {
     let below = file.strip_prefix(root().join("src")).expect("in src").with_extension("");
@@ -221,11 +215,8 @@ fn shown(path: &[String]) -> String {
 
 /// Returns what each unit uses.
 fn uses() -> Uses {
-    let mut files = Vec::new();
-    collect(&root().join("src"), &mut files);
-    files.retain(|file| file.extension().is_some_and(|ending| ending == "rs"));
     let (mut sources, mut tests) = (Vec::new(), Vec::new());
-    for file in files {
+    for file in rust_files("src") {
         let text = std::fs::read_to_string(&file).expect("a source");
         let name = modules(&file);
         let (code, own) = without_tests(&code(&text));
@@ -340,8 +331,7 @@ fn there_is_no_circle() {
 /// Only the folder `hal`, and the place where an image begins, depend on the architecture.
 #[test]
 fn no_layer_asks_for_the_architecture() {
-    let mut files = Vec::new();
-    collect(&root().join("src"), &mut files);
+    let files = rust_files("src");
     let asks = |file: &&PathBuf| {
         code(&std::fs::read_to_string(file).unwrap_or_default()).contains("target_arch")
     };
@@ -374,8 +364,7 @@ fn the_chip_knows_nothing_of_motion() {
 /// The list is compared with the number of timers when Kerf is built.
 #[test]
 fn tasks_that_wait_for_a_time_are_counted() {
-    let mut files = Vec::new();
-    collect(&root().join("src"), &mut files);
+    let files = rust_files("src");
     let text = |file: &Path| std::fs::read_to_string(file).unwrap_or_default();
     let mut waiting: Vec<_> = files
         .iter()

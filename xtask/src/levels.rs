@@ -3,9 +3,7 @@
 //! Tokens are types of [`avr-embassy`](../../avr-embassy/src/level.rs). A comment that restricts the level and a
 //! signature without a token do not go together: nobody could see at the call that the level is wrong.
 
-use std::path::{Path, PathBuf};
-
-use crate::process::root;
+use crate::sources::rust_files;
 
 /// Beginnings of a sentence that restricts the level. A full stop, a comma, a semicolon or one of [`GO_ON`] follows.
 const LEVELS: [&str; 5] = ["Thread mode", "Exec", "Start-up", "Only thread mode", "Only exec"];
@@ -80,20 +78,11 @@ fn has_token(signature: &str) -> bool {
     arguments.split(|c| !is_word(c)).any(|word| TOKENS.contains(&word))
 }
 
-fn collect(path: &Path, files: &mut Vec<PathBuf>) {
-    match std::fs::read_dir(path) {
-        Ok(entries) => entries.flatten().for_each(|entry| collect(&entry.path(), files)),
-        Err(_) => files.push(path.to_owned()),
-    }
-}
-
 #[test]
 fn a_level_is_a_token() {
-    let mut files = Vec::new();
-    ["src", "avr-embassy/src"].iter().for_each(|folder| collect(&root().join(folder), &mut files));
     let (mut wrong, mut tokens) = (String::new(), 0);
-    for file in files.iter().filter(|file| file.extension().is_some_and(|end| end == "rs")) {
-        let text = std::fs::read_to_string(file).expect("a file of the sources");
+    for file in ["src", "avr-embassy/src"].into_iter().flat_map(rust_files) {
+        let text = std::fs::read_to_string(&file).expect("a file of the sources");
         for Function { about, signature } in functions(&text) {
             tokens += usize::from(has_token(&signature));
             if let Some(sentence) = restriction(&about).filter(|_| !has_token(&signature)) {

@@ -55,6 +55,8 @@ mod setup;
 mod shrink;
 mod sim;
 mod size;
+#[cfg(test)]
+mod sources;
 mod toolchain;
 mod verify;
 mod web;

@@ -2,9 +2,8 @@
 //!
 //! Tools for the host may know dialects: they print the numbers and texts of TinyG.
 
-use std::path::{Path, PathBuf};
-
 use crate::process::root;
+use crate::sources::files;
 
 /// Paths where a dialect may be named: its own folder, the table, and tools.
 const KNOWN: [&str; 7] = [
@@ -16,13 +15,6 @@ const KNOWN: [&str; 7] = [
     "src/canon/",
     "src/gcode/codes/docs/",
 ];
-
-fn collect(path: &Path, files: &mut Vec<PathBuf>) {
-    match std::fs::read_dir(path) {
-        Ok(entries) => entries.flatten().for_each(|entry| collect(&entry.path(), files)),
-        Err(_) => files.push(path.to_owned()),
-    }
-}
 
 /// Returns the lines of a file that name a dialect.
 fn naming<'a>(text: &'a str, dialects: &[String]) -> Vec<&'a str> {
@@ -52,11 +44,10 @@ fn dialects() -> Vec<String> {
 
 #[test]
 fn dialects_are_known_to_their_table_alone() {
-    let (dialects, mut files) = (dialects(), Vec::new());
+    let dialects = dialects();
     assert!(dialects.contains(&"tinyg".to_owned()));
-    collect(&root().join("src"), &mut files);
     let mut wrong = Vec::new();
-    for file in files {
+    for file in files("src") {
         let name = file
             .strip_prefix(root())
             .expect("in the checkout")
