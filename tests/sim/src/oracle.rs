@@ -81,6 +81,21 @@ impl MotorSetup {
     }
 }
 
+/// Returns what is wrong with a motor (1 is the first) that stands at `steps` after `total` steps in both directions.
+pub fn faults(
+    motor: usize,
+    (steps, expected): (i64, Option<i64>),
+    (total, least): (u64, Option<u64>),
+) -> impl Iterator<Item = String> {
+    let elsewhere = expected
+        .filter(|expected| *expected != steps)
+        .map(|expected| format!("motor {motor} is at {steps} steps instead of {expected}"));
+    let short = least
+        .filter(|least| *least > total)
+        .map(|least| format!("motor {motor} makes {total} steps of {least}"));
+    elsewhere.into_iter().chain(short)
+}
+
 impl Setup {
     /// Returns what each motor moves, for the meter of pauses. Two motors that drive X and Y together are treated as
     /// two axes turned by 45 degrees, with lengths multiplied by the root of 2.
@@ -171,11 +186,9 @@ pub fn ends<'a>(
     setup: &Setup,
 ) -> Vec<(usize, Vec<i64>)> {
     let mut reader = Reader::new(setup);
-    let clear = lines.into_iter().map_while(|(line, text)| {
-        reader.line(text).ok()?;
-        Some((line, reader.steps_here()))
-    });
-    clear.collect()
+    let clear = lines.into_iter().take_while(|(_, text)| reader.line(text).is_ok());
+    let numbers: Vec<_> = clear.map(|(line, _)| line).collect();
+    numbers.into_iter().zip(reader.places).collect()
 }
 
 /// Returns the longest dwell of a job, in milliseconds. Lines that cannot be read are skipped.

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::machine::Machine;
 use crate::meters::Window;
-use crate::oracle::{AXES, MotorSetup, Outcome, Setup, UNITS, Unclear};
+use crate::oracle::{self, AXES, MotorSetup, Outcome, Setup, UNITS, Unclear};
 use crate::pauses::Pause;
 use crate::print::{Followed, Heat};
 use crate::recorder::Motor;
@@ -307,16 +307,8 @@ impl Report {
     }
 
     fn wrong_motors(&self) -> impl Iterator<Item = String> {
-        let wrong = |m: &MotorReport| {
-            let MotorReport { motor, steps, total, .. } = *m;
-            let is_elsewhere = m.expected.filter(|expected| *expected != steps);
-            let elsewhere = is_elsewhere
-                .map(|expected| format!("motor {motor} is at {steps} steps instead of {expected}"));
-            let is_short = m.least.filter(|least| *least > total);
-            let short =
-                is_short.map(|least| format!("motor {motor} makes {total} steps of {least}"));
-            elsewhere.into_iter().chain(short)
-        };
+        let wrong =
+            |m: &MotorReport| oracle::faults(m.motor, (m.steps, m.expected), (m.total, m.least));
         self.motors.iter().flat_map(wrong)
     }
 }

@@ -135,14 +135,8 @@ fn motors(
 impl Report {
     fn hold_against(&mut self) {
         for (m, motor) in self.motors.iter().enumerate() {
-            if let Some(expected) = motor.expected.filter(|expected| *expected != motor.steps) {
-                let (m, at) = (m + 1, motor.steps);
-                self.problems.push(format!("motor {m} is at {at} steps instead of {expected}"));
-            }
-            if let Some(least) = motor.least.filter(|least| *least > motor.total) {
-                let (m, total) = (m + 1, motor.total);
-                self.problems.push(format!("motor {m} makes {total} steps of {least}"));
-            }
+            let at_end = (motor.steps, motor.expected);
+            self.problems.extend(oracle::faults(m + 1, at_end, (motor.total, motor.least)));
         }
     }
 }
