@@ -17,7 +17,7 @@ use crate::boards::outputs;
 use crate::config::Setting;
 use crate::gcode::modal::Coolant;
 use crate::hal::byte::SharedByte;
-use crate::hal::{Exclusive, Thread, exec, gpio, pwm, stepper};
+use crate::hal::{Exclusive, Thread, gpio, pwm, stepper};
 use crate::machine;
 use crate::motion::snapshot::Snapshot;
 use crate::spindle::{Changed, Spindle};
@@ -70,10 +70,7 @@ pub fn set_all(thread: Thread, storage: &Storage) {
     let settings = (Setting::WARM..Setting::COLD).filter_map(Setting::from_number);
     for setting in settings.filter(|setting| !setting.is_data()) {
         let value = storage.cold(setting);
-        common::with_outputs(thread, |common, alone| match common.spindle.set(setting, value) {
-            Changed::Frequency(millihertz) => pwm::set_frequency(alone, millihertz),
-            Changed::Outputs | Changed::Nothing => {}
-        });
+        take_over(thread, setting, value);
     }
     turning::set_up(thread, storage);
     tell(thread);
@@ -83,14 +80,22 @@ pub fn set_all(thread: Thread, storage: &Storage) {
 #[small]
 #[inline(never)]
 pub fn set(thread: Thread, setting: Setting, value: i32) {
-    match with(thread, |spindle| spindle.set(setting, value)) {
-        Changed::Nothing => return,
-        Changed::Outputs => {}
-        Changed::Frequency(millihertz) => {
-            exec::lock(thread, |ceiling| pwm::set_frequency(ceiling.exclusive(), millihertz))
-        }
+    if take_over(thread, setting, value) {
+        tell(thread);
     }
-    tell(thread);
+}
+
+/// Takes over the value of a setting. Returns whether the outputs have to be set by it.
+#[small]
+fn take_over(thread: Thread, setting: Setting, value: i32) -> bool {
+    common::with_outputs(thread, |common, alone| match common.spindle.set(setting, value) {
+        Changed::Nothing => false,
+        Changed::Outputs => true,
+        Changed::Frequency(millihertz) => {
+            pwm::set_frequency(alone, millihertz);
+            true
+        }
+    })
 }
 
 /// Multiplies S by this many thousandths from now on.
