@@ -9,6 +9,14 @@ use super::gpio::{self, Unit};
 use crate::boards::{ACTIVE, SdCard};
 use crate::hal::{Boot, Thread};
 
+const _: () = assert!(
+    match &ACTIVE.card {
+        Some(card) => !gpio::is_behind(card.select),
+        None => true,
+    },
+    "the pin that selects the card is one of the chip"
+);
+
 /// The divider of the clock before the card is initialized, and then: 252 kHz and 12.8 MHz at 128 MHz.
 const SLOW: (u8, u8) = (254, 1);
 const FAST: (u8, u8) = (2, 4);

@@ -50,7 +50,7 @@ fn is_inverted(pin: Pin) -> bool {
 }
 
 /// Whether a pin is an output of a shift register.
-fn is_behind(pin: Pin) -> bool {
+pub(super) const fn is_behind(pin: Pin) -> bool {
     matches!(pin.port, Port::Outputs)
 }
 
@@ -99,7 +99,7 @@ pub(super) fn switch(alone: Exclusive<'_>, output: Pin, high: bool) {
     set(output, high);
 }
 
-/// Drives a pin of the chip high or low, by one write. Any level.
+/// Drives a pin of the chip, which is not behind a register, high or low by one write. Any level.
 pub(super) fn set(pin: Pin, high: bool) {
     let out = SIO.gpio_out(0);
     let one = if high { out.value_set() } else { out.value_clr() };

@@ -22,6 +22,23 @@ const _: () = assert!(
     "this board has no heaters: leave `printer` out of its features"
 );
 
+const _: () = assert!(
+    match &ACTIVE.heaters {
+        Some(Heaters { heaters: [hot_end, bed], fan, cooler, .. }) => {
+            let has_cooler = match cooler {
+                Some(cooler) => !gpio::is_behind(*cooler),
+                None => true,
+            };
+            has_cooler
+                && !gpio::is_behind(hot_end.pin)
+                && !gpio::is_behind(bed.pin)
+                && !gpio::is_behind(*fan)
+        }
+        None => true,
+    },
+    "heaters and fans are at pins of the chip"
+);
+
 /// No reading.
 const NONE: u16 = u16::MAX;
 /// Polls of the converter before it counts as broken: some ten times the time of a conversion.
