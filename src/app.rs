@@ -4,11 +4,16 @@
 
 use kerf_macros::small;
 
+#[cfg(feature = "sd")]
+use core::cell::RefCell;
+
 use avr_embassy::{Boot, Interrupt, InterruptEnd, Thread, interrupt};
 use embassy_executor::Spawner;
 use embassy_sync::mutex::Mutex;
 use heapless::Vec;
 
+#[cfg(feature = "sd")]
+use crate::card::Card;
 use crate::config::{Setting, Settings};
 use crate::hal::eeprom::Eeprom;
 use crate::hal::segments::Segments;
@@ -61,11 +66,8 @@ fn place_earlier(thread: Thread) -> Earlier {
 #[cfg(feature = "sd")]
 #[inline(never)]
 #[small]
-fn place_card(thread: Thread) -> &'static core::cell::RefCell<crate::card::Card> {
-    place!(
-        core::cell::RefCell<crate::card::Card>,
-        core::cell::RefCell::new(crate::card::Card::new(thread))
-    )
+fn place_card(thread: Thread) -> &'static RefCell<Card> {
+    place!(RefCell<Card>, RefCell::new(Card::new(thread)))
 }
 
 /// Creates the stage in its static place, if this chip blends. Constant: the stack has no room for another one.
@@ -82,9 +84,8 @@ fn place_planner(links: &'static Links, queue: BlockQueue) -> &'static planner::
     place!(planner::Shared, Mutex::new(Planner::new(links, queue)))
 }
 
-/// Starts the firmware. `main` is the thread-mode executor and `thread` is its token; `boot` shows that
-/// nothing runs yet. The exec task has the interrupt
-/// executor to itself.
+/// Starts the firmware. `main` is the thread-mode executor and `thread` is its token; `boot` shows that nothing runs
+/// yet. The exec task has the interrupt executor to itself.
 ///
 /// Call it with interrupts off. Returns `None` if the firmware has been started before.
 #[inline(never)]

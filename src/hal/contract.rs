@@ -80,10 +80,13 @@ macro_rules! contract {
 pub(super) use contract;
 
 contract! {
-    /// The step timer and its interrupt, which owns the machine's only [`Dda`](crate::dda::Dda) and takes segments out of a ring.
+    /// The step timer and its interrupt, which owns the machine's only [`Dda`] and takes segments out of a ring.
     ///
-    /// At each tick the interrupt does what [`Dda::tick`](crate::dda::Dda::tick) does, without waiting. The ticks stop when a segment
+    /// At each tick the interrupt does what [`Dda::tick`] does, without waiting. The ticks stop when a segment
     /// ends and the ring is empty.
+    ///
+    /// [`Dda`]: crate::dda::Dda
+    /// [`Dda::tick`]: crate::dda::Dda::tick
     trait Stepper in stepper {
         /// Sets the timer up and returns the filling end of the segment ring, which belongs to exec. `None` after the
         /// first time.

@@ -13,11 +13,11 @@ use crate::config::Settings;
 use crate::machine::Alarm;
 use crate::status::Status;
 
-/// Seconds from one message to the next that a host did not request; 0 for none.
+/// Periods of messages that the board sends without a request; 0 for none.
 pub struct Intervals {
-    /// Of [`Notice::Temperatures`].
+    /// Of [`Notice::Temperatures`], s.
     pub temperatures_s: u8,
-    /// Of [`Notice::Busy`].
+    /// Of [`Notice::Busy`], s.
     pub busy_s: u8,
 }
 
@@ -107,7 +107,7 @@ pub trait Dialect {
         None
     }
 
-    /// Returns how often the host is told what it has not requested.
+    /// Returns the periods of the messages that the board sends without a request.
     fn intervals(memory: &Self::Memory) -> Intervals {
         let _ = memory;
         Intervals { temperatures_s: 0, busy_s: 0 }

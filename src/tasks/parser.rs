@@ -1,11 +1,11 @@
 //! The parser task: takes lines, answers them, and hands their commands to the planner.
 //!
-//! Reads the line pools, fills the slot of `links::commands`, writes the G-code model, the settings and the response; waits for lines,
-//! for the planner, and for room to transmit. Control lines are taken at any time. Data lines of the port that feeds
-//! the machine are taken only while the planner is free and no built-in job runs, so that a long job never locks the
-//! sender out. A line that has to wait for the tables ([`Status::Again`]) stays where it is, and so do the lines
-//! behind it. A line keeps its slot until its response has been written. Plain moves are carried out at once, in a
-//! [`row`]. In an alarm, lines of G-code are refused.
+//! Reads the line pools, fills the slot of `links::commands`, writes the G-code model, the settings and the response;
+//! waits for lines, for the planner, and for room to transmit. Control lines are taken at any time. Data lines of the
+//! port that feeds the machine are taken only while the planner is free and no built-in job runs, so that a long job
+//! never locks the sender out. A line that has to wait for the tables ([`Status::Again`]) stays where it is, and so do
+//! the lines behind it. A line keeps its slot until its response has been written. Plain moves are carried out at
+//! once, in a [`row`]. In an alarm, lines of G-code are refused.
 //!
 //! Each port has a [`Session`] of its own, so that no port waits for a line of another. No line is begun before the
 //! first part of its response has room in the transmit ring. A response that lacks room stays half written until there

@@ -1,7 +1,7 @@
 //! The planner task: canonical commands into blocks.
 //!
-//! Reads the commands of `links::commands` and the settings, writes the block queue. Waits for commands, for room in the queue, and at
-//! a program stop for cycle start if the settings say so. One turn builds one block. While the task waits for a line,
+//! Reads the commands of `links::commands` and the settings, writes the block queue. Waits for commands, for room in
+//! the queue, and at a program stop for cycle start if the settings say so. One turn builds one block. While the task waits for a line,
 //! the parser has plain moves carried out itself ([`take_at_once`]). In a queue flush the planner forgets the line,
 //! has exec drop the blocks, and starts from where the motors are.
 

@@ -37,8 +37,8 @@ pub(crate) fn is_prompt(context: *mut ()) -> bool {
     is_own
 }
 
-/// Starts the executor: `init` spawns its tasks. Does nothing if it has been started before. The program
-/// sets the priority of the interrupt.
+/// Starts the executor: `init` spawns its tasks. Does nothing if it has been started before. The program sets the
+/// priority of the interrupt.
 pub fn start(init: impl FnOnce(Spawner)) {
     if STARTED.get() != 0 {
         return;
