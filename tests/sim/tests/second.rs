@@ -15,17 +15,25 @@ use crate::common::share::share_of;
 use crate::common::{firmware, image};
 use crate::side::Side;
 
-/// The longest difference between the times of a step on the two simulators, cycles. None has been measured.
-const APART: u64 = 4;
-/// The longest difference between the times of a step in a thread, cycles: 0.1 ms. The edges of the spindle's sensors are
-/// rounded differently. Where one of them falls into the next clock of the timer that measures them, its time differs by
-/// 4 us, and the axes follow another speed. None has been measured since a pass is told its start before the first tick;
-/// until then it was 9,049 with one image, as the first tick took longer on one simulator.
-const APART_IN_THREADS: u64 = 1_600;
-/// The longest difference between the times of a step in a job that fills the queue, cycles: 10 ms. A block may end just
-/// before a line is answered or just behind it; then the sender is a line further, and the next blocks look further ahead
-/// and are faster. None has been measured with one image, 53,231 with the next.
-const APART_IN_JOBS: u64 = 160_000;
+/// How far apart a step may be on the two simulators.
+#[derive(Clone, Copy)]
+struct Apart {
+    cycles: u64,
+    /// So many steps of the motor earlier or later besides: a step lies between its neighbours on the other simulator.
+    steps: usize,
+}
+
+/// None has been measured.
+const APART: Apart = Apart { cycles: 4, steps: 0 };
+/// In a thread, 0.1 ms and a step. The edges of the spindle's sensors are rounded differently. Where one of them falls into
+/// the next clock of the timer that measures them, its time differs by 4 us, and the axes follow another speed. A step of
+/// a slow motor that lay just before the end of a segment then lies just behind it. With some images the two agree to
+/// the cycle; with others X, which leaves the thread slowly, was 5,614 cycles apart, less than half a step.
+const APART_IN_THREADS: Apart = Apart { cycles: 1_600, steps: 1 };
+/// In a job that fills the queue, 10 ms. A block may end just before a line is answered or just behind it; then the sender
+/// is a line further, and the next blocks look further ahead and are faster. None has been measured with one image, 53,231
+/// with the next.
+const APART_IN_JOBS: Apart = Apart { cycles: 160_000, steps: 0 };
 /// The longest difference between the times when the test sees the machine at rest, cycles: a millisecond. The test asks, and
 /// the byte that answers may leave one simulator an instruction later than the other. Where the last step was is held above.
 const APART_AT_REST: u64 = 16_000;
@@ -143,8 +151,7 @@ struct Script<'a> {
     lines: Vec<String>,
     /// An input whose switch closes so many ms after the beginning of the job.
     closes: Option<(usize, u64)>,
-    /// The longest difference between the times of a step, cycles.
-    apart: u64,
+    apart: Apart,
 }
 
 impl Script<'_> {
@@ -252,8 +259,8 @@ fn both(name: &str, script: &Script) -> Told {
     second
 }
 
-/// Checks that two results are alike, their times within `most` cycles.
-fn agree(name: &str, first: &Told, second: &Told, most: u64) {
+/// Checks that two results are alike, the times of their steps and ends within `most`.
+fn agree(name: &str, first: &Told, second: &Told, most: Apart) {
     assert_eq!(first.totals, second.totals, "{name}: steps of the motors");
     assert_eq!(first.steps, second.steps, "{name}: positions at the end");
     assert_eq!(first.answers, second.answers, "{name}: answers");
@@ -266,8 +273,18 @@ fn agree(name: &str, first: &Told, second: &Told, most: u64) {
         pairs.count(),
         (second.ended - second.began) as f64 / 16e6
     );
-    assert!(apart <= most, "{name}: steps {apart} cycles apart");
-    assert!(ends <= most.max(APART_AT_REST), "{name}: ends {ends} cycles apart");
+    for (motor, (a, b)) in first.times.iter().zip(&second.times).enumerate() {
+        let far = (0..a.len()).find(|step| !is_near(a[*step], b, *step, most));
+        assert_eq!(far.map(|n| (n, a[n], b[n])), None, "{name}: a step of motor {motor}");
+    }
+    assert!(ends <= most.cycles.max(APART_AT_REST), "{name}: ends {ends} cycles apart");
+}
+
+/// Returns whether a time of a step is near those of the same step, and of its neighbours, in the other simulator.
+fn is_near(time: u64, others: &[u64], step: usize, most: Apart) -> bool {
+    let first = others[step.saturating_sub(most.steps)];
+    let last = others[(step + most.steps).min(others.len() - 1)];
+    (first.saturating_sub(most.cycles)..=last + most.cycles).contains(&time)
 }
 
 /// The bracket: each part of it, such as a hole, begins with a comment. Without `KERF_LONG=1` every third part.
@@ -408,5 +425,5 @@ fn a_write_takes_as_long() {
     let mut second = Second::load(&image(&MEGA2560_GRBL), &MEGA2560_GRBL).unwrap();
     let (first, second) = (took(&mut firmware(&MEGA2560_GRBL)), took(&mut second));
     println!("kept after {first} and {second} cycles");
-    assert!(first.abs_diff(second) <= APART);
+    assert!(first.abs_diff(second) <= APART.cycles);
 }
