@@ -90,19 +90,19 @@ macro_rules! each_motor {
 pub(crate) use each_motor;
 
 /// Calls the macro `$call` with the tokens that follow and the numbers of all motors.
-#[cfg(not(any(feature = "board-pico6", feature = "board-picobob")))]
+#[cfg(not(any(feature = "motors-5", feature = "motors-6")))]
 macro_rules! motor_numbers {
     ($call:ident, $($given:tt)*) => {
         $call!($($given)*; 0 1 2 3)
     };
 }
-#[cfg(feature = "board-picobob")]
+#[cfg(feature = "motors-5")]
 macro_rules! motor_numbers {
     ($call:ident, $($given:tt)*) => {
         $call!($($given)*; 0 1 2 3 4)
     };
 }
-#[cfg(feature = "board-pico6")]
+#[cfg(feature = "motors-6")]
 macro_rules! motor_numbers {
     ($call:ident, $($given:tt)*) => {
         $call!($($given)*; 0 1 2 3 4 5)

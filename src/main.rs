@@ -1,7 +1,7 @@
 //! The entry point of the image. On the host, the entry point of the command line.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
-#[cfg(target_arch = "avr")]
+#[cfg(feature = "chip-atmega2560")]
 mod image {
     use avr_embassy::{Boot, Executor};
     use kerf::baud;
@@ -32,7 +32,7 @@ mod image {
     }
 }
 
-#[cfg(all(target_arch = "arm", target_os = "none"))]
+#[cfg(feature = "chip-rp2040")]
 mod image {
     use avr_embassy::{Boot, Executor};
     use kerf::baud;

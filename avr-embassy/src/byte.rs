@@ -69,19 +69,19 @@ pub use imp::SharedByte;
 
 /// The number of a slot of a [ring](crate::ring), as wide as the CPU reads and writes in one instruction, at most 16
 /// bits.
-#[cfg(not(all(target_arch = "arm", target_os = "none")))]
+#[cfg(not(feature = "_cortex-m"))]
 pub type Index = u8;
 /// The number of a slot of a [ring](crate::ring): 16 bits on Cortex-M.
-#[cfg(all(target_arch = "arm", target_os = "none"))]
+#[cfg(feature = "_cortex-m")]
 pub type Index = u16;
 
 /// An index of a ring that two levels share: a byte on AVR.
-#[cfg(not(all(target_arch = "arm", target_os = "none")))]
+#[cfg(not(feature = "_cortex-m"))]
 pub type SharedIndex = SharedByte;
-#[cfg(all(target_arch = "arm", target_os = "none"))]
+#[cfg(feature = "_cortex-m")]
 pub use wide::SharedIndex;
 
-#[cfg(all(target_arch = "arm", target_os = "none"))]
+#[cfg(feature = "_cortex-m")]
 mod wide {
     use core::sync::atomic::{AtomicU16, Ordering};
 

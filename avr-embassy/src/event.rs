@@ -216,7 +216,7 @@ pub(crate) mod flags {
 }
 
 /// Stands in for the register on Cortex-M: a byte, and the CPU's event (`sev`) that ends its sleep.
-#[cfg(all(target_arch = "arm", target_os = "none"))]
+#[cfg(feature = "_cortex-m")]
 pub(crate) mod flags {
     use crate::byte::SharedByte;
 

@@ -34,13 +34,13 @@ pub use avr::start;
 #[cfg(target_arch = "avr")]
 pub(crate) use avr::{handler, idle};
 
-#[cfg(all(target_arch = "arm", target_os = "none"))]
+#[cfg(feature = "_cortex-m")]
 mod cortex_m;
-#[cfg(all(target_arch = "arm", target_os = "none"))]
+#[cfg(feature = "_cortex-m")]
 use cortex_m as imp;
-#[cfg(all(target_arch = "arm", target_os = "none"))]
+#[cfg(feature = "_cortex-m")]
 pub use cortex_m::start;
-#[cfg(all(target_arch = "arm", target_os = "none"))]
+#[cfg(feature = "_cortex-m")]
 pub(crate) use cortex_m::{idle, run};
 
 #[cfg(not(target_os = "none"))]
@@ -54,13 +54,13 @@ pub(crate) use host::{executor, idle, take_request};
 
 pub(crate) use imp::woken;
 
-#[cfg(all(target_arch = "arm", target_os = "none"))]
+#[cfg(feature = "_cortex-m")]
 pub mod prompt;
-#[cfg(all(target_arch = "arm", target_os = "none"))]
+#[cfg(feature = "_cortex-m")]
 pub(crate) use prompt::is_prompt;
 
 /// Whether a task of the prompt executor has been woken: always false, because this chip has no such executor.
-#[cfg(not(all(target_arch = "arm", target_os = "none")))]
+#[cfg(not(feature = "_cortex-m"))]
 #[inline(always)]
 pub(crate) fn is_prompt(_context: *mut ()) -> bool {
     false

@@ -107,13 +107,15 @@ mod baton;
 pub mod byte;
 #[cfg(target_arch = "avr")]
 mod chip;
-#[cfg(all(target_arch = "arm", target_os = "none"))]
+#[cfg(feature = "rp2040")]
 #[path = "chip/rp2040.rs"]
 mod chip;
+#[cfg(all(target_os = "none", not(any(target_arch = "avr", feature = "_cortex-m"))))]
+compile_error!("name the chip by a feature");
 pub mod event;
 #[cfg(target_arch = "avr")]
 mod executor;
-#[cfg(all(target_arch = "arm", target_os = "none"))]
+#[cfg(feature = "_cortex-m")]
 #[path = "executor/cortex_m.rs"]
 mod executor;
 #[cfg(not(target_os = "none"))]
@@ -152,7 +154,7 @@ pub fn mask<R>(act: impl FnOnce() -> R) -> R {
         unsafe { core::arch::asm!("out 0x3F, {status}", status = in(reg) status) };
         result
     }
-    #[cfg(all(target_arch = "arm", target_os = "none"))]
+    #[cfg(feature = "_cortex-m")]
     return cortex_m::interrupt::free(|_| act());
     #[cfg(not(target_os = "none"))]
     act()

@@ -35,15 +35,18 @@ pub mod resets;
 pub mod segments;
 pub mod serial;
 
-#[cfg(target_arch = "avr")]
+#[cfg(feature = "chip-atmega2560")]
 #[path = "avr/mod.rs"]
 pub mod imp;
-#[cfg(all(target_arch = "arm", target_os = "none"))]
+#[cfg(feature = "chip-rp2040")]
 #[path = "rp2040/mod.rs"]
 pub mod imp;
 #[cfg(not(target_os = "none"))]
 #[path = "host/mod.rs"]
 pub mod imp;
+
+#[cfg(all(target_os = "none", not(any(feature = "chip-atmega2560", feature = "chip-rp2040"))))]
+compile_error!("an image needs a board, whose feature names the chip: `board-NAME`");
 
 /// The parts of `rp2040` that are plain Rust, compiled here for their tests.
 #[cfg(test)]

@@ -328,12 +328,13 @@ fn there_is_no_circle() {
     assert!(open.is_empty(), "in a circle:\n{}", circle.collect::<Vec<_>>().join("\n"));
 }
 
-/// Only the folder `hal`, and the place where an image begins, depend on the architecture.
+/// Only the folder `hal`, and the place where an image begins, depend on the architecture or the chip.
 #[test]
-fn no_layer_asks_for_the_architecture() {
+fn no_layer_asks_for_the_chip() {
     let files = rust_files("src");
     let asks = |file: &&PathBuf| {
-        code(&std::fs::read_to_string(file).unwrap_or_default()).contains("target_arch")
+        let text = std::fs::read_to_string(file).unwrap_or_default();
+        code(&text).contains("target_arch") || text.contains("feature = \"chip-")
     };
     let asking: BTreeSet<_> = files.iter().filter(asks).map(|file| unit(&modules(file))).collect();
     assert_eq!(asking, ["hal", "main", "primitives"].map(str::to_owned).into());
